@@ -33,7 +33,7 @@ TOLD_S = 60.0
 
 
 def resident_mb(pid: int) -> float:
-    """Give the memory of a process [MB]."""
+    """Return the memory of a process [MB]."""
     pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
     return pages * 4096 / 1e6
 

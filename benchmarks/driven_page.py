@@ -75,7 +75,7 @@ class Browser:
 
     def processor_s(self, kind: str = '') -> float:
         """
-        Give the processor time that the browser's processes have used so far [s].
+        Return the processor time that the browser's processes have used so far [s].
 
         :param kind: of those that count, such as `gpu-process`, which draws; all where empty.
         """
@@ -120,7 +120,7 @@ class DrivenPage:
 
     @property
     def browser(self) -> Browser:
-        """Give the browser that looks at the page."""
+        """Return the browser that looks at the page."""
         assert self._browser is not None
         return self._browser
 

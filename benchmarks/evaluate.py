@@ -18,7 +18,7 @@ COLUMNS = f'{"workers":>8}{"cells":>7}{"wall [s]":>10}{"cells/h":>9}{"a cell, me
 
 
 def memory_mb() -> float:
-    """Give the resident memory of this process [MB]."""
+    """Return the resident memory of this process [MB]."""
     pages = int(Path('/proc/self/statm').read_text().split()[1])
     return pages * resource.getpagesize() / 1e6
 

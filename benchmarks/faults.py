@@ -82,7 +82,7 @@ class Ear:
         self.heard[key].append(at_s)
 
     def speaks(self, node: str) -> Callable[[float], float | None]:
-        """Give what tells since when a node works, after a time; None: not yet."""
+        """Return what tells since when a node works, after a time; None: not yet."""
         kind, _, vehicle = node.partition('_node')
         vehicle = vehicle.removeprefix('_')
         sign = {'planner': ('/<av>/plan', vehicle), 'perception': ('/<av>/plan_request', vehicle),
@@ -105,7 +105,7 @@ class Ear:
             return False
 
     def longest_gap_s(self, avs: list[str], from_s: float) -> float:
-        """Give the longest time without a plan for an AV."""
+        """Return the longest time without a plan for an AV."""
         longest = 0.0
         for av in avs:
             times = [at for at in self.heard['/<av>/plan', av] if at > from_s - 1.0]

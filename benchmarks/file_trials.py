@@ -80,7 +80,7 @@ def warm_up(folder: Path) -> None:
 
 
 def trials(folder: Path, published: Iterable[Path]) -> dict[str, Trial]:
-    """Give the kinds of file, of what `prepare` has made and of scenarios besides."""
+    """Return the kinds of file, of what `prepare` has made and of scenarios besides."""
     scenarios = (*sorted(folder.glob('*.xml')), *published)
     timelines = sorted((*folder.glob('*.keys.yaml'), *folder.glob('*.joy.yaml')))
     games = sorted(path for path in folder.glob('*.yaml') if 'scenario:' in path.read_text())

@@ -57,7 +57,7 @@ def theirs(environment: Path) -> 'subprocess.Popen[str]':
 
 def asked(process: 'subprocess.Popen[str]', name: str, vehicles: int, decisions: int,
           rate: int, steps: int) -> float:
-    """Give the processor time of a step of highway-env [s]."""
+    """Return the processor time of a step of highway-env [s]."""
     config = {'lanes_count': 4, 'vehicles_count': vehicles - 1, 'simulation_frequency': rate,
               'policy_frequency': decisions, 'duration': 20,
               'action': {'type': 'ContinuousAction'},
@@ -69,7 +69,7 @@ def asked(process: 'subprocess.Popen[str]', name: str, vehicles: int, decisions:
 
 
 def motorway(vehicles: int, rate: int) -> Game:
-    """Give the game of a motorway with so many vehicles, the agent's among them."""
+    """Return the game of a motorway with so many vehicles, the agent's among them."""
     game = load_game(scenarios_directory() / 'dense_merge.yaml')
     # As many come as leave.
     return replace(game, humans=(), duration=20.0,
@@ -87,7 +87,7 @@ class Ours:
         self.vehicles: list[int] = []
 
     def step_s(self, steps: int) -> float:
-        """Give the processor time of a step, without resets [s]."""
+        """Return the processor time of a step, without resets [s]."""
         spent, action = 0.0, np.zeros(2, np.float32)
         for _ in range(steps):
             start = time.process_time()
@@ -141,7 +141,7 @@ def together(steps: int) -> list[str]:
 
 
 def _step_s(env: SyncVectorEnv | GamesTogether, steps: int) -> float:
-    """Give the processor time of a step of one game, without resets [s]."""
+    """Return the processor time of a step of one game, without resets [s]."""
     actions = np.zeros((env.num_envs, 2), np.float32)
     env.reset(seed=0)
     start = time.process_time()

@@ -50,13 +50,13 @@ class LiveGraph:
         return self._process.poll() is None
 
     def node_pids(self) -> dict[str, int]:
-        """Give the process ids that the launcher has told, by node."""
+        """Return the process ids that the launcher has told, by node."""
         text = self._log.read_text(encoding='utf-8', errors='replace')
         return {name: int(pid) for name, pid in re.findall(
             r'^(\S+): process (\d+)$', text, re.MULTILINE)}
 
     def cpu_seconds(self) -> dict[str, float]:
-        """Give the processor time that each node has used so far [s], of those that still run."""
+        """Return the processor time that each node has used so far [s], of those that still run."""
         used = {}
         for name, pid in self.node_pids().items():
             try:

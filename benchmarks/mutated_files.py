@@ -64,7 +64,7 @@ class Outcome:
 
     @property
     def is_good(self) -> bool:
-        """Tell whether a user would be served."""
+        """Return whether a user would be served."""
         return self.kind in (LOADED, REFUSED)
 
 
@@ -101,7 +101,7 @@ class Harness:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Give the kinds of file."""
+        """Return the kinds of file."""
         return tuple(self._trials)
 
     def case(self, number: int, sound: str | None = None) -> Case:

@@ -36,7 +36,7 @@ COLD_STARTS = 3
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Give the CPU time of a call [s]."""
+    """Return the CPU time of a call [s]."""
     start = time.process_time()
     work()
     return time.process_time() - start

@@ -51,7 +51,7 @@ class Scene:
         self.grid = OccupancyGrid((-80.0, -80.0), 0.2, occupied)
 
     def scans(self, count: int, grid: OccupancyGrid | None = None) -> Callable[[int], None]:
-        """Give the work of a number of sensors that scan at once."""
+        """Return the work of a number of sensors that scan at once."""
         bodies = SensedBodies(self.objects)
         bodies.place(self.poses)
         sensors = [create_sensor(spec) for spec in self.sensors[:count]]
@@ -63,7 +63,7 @@ class Scene:
         return work
 
     def perception(self, sensors: tuple[SensorSpec, ...]) -> Perception:
-        """Give the perception of an AV among the objects."""
+        """Return the perception of an AV among the objects."""
         vehicle = load_vehicle_parameters()
         av = ObjectDescription('av0', 'car', Role.AUTONOMOUS, vehicle.shape,
                                vehicle.rear_to_center)
@@ -71,11 +71,11 @@ class Scene:
                           [av, *self.objects], vehicle, RigidTransform(), self.ego(0), 0, DT_S)
 
     def ego(self, n: int) -> VehicleState:
-        """Give the AV's state at step n."""
+        """Return the AV's state at step n."""
         return VehicleState(0.1 * n, 0.0, 0.0, 10.0)
 
     def steps(self, sensors: tuple[SensorSpec, ...], firing: bool) -> Callable[[int], None]:
-        """Give the work of one observed step: of those at which 10 Hz sensors fire, or not."""
+        """Return the work of one observed step: of those at which 10 Hz sensors fire, or not."""
         perception = self.perception(sensors)
         states = np.array([self.ego(0)])
 
@@ -86,7 +86,7 @@ class Scene:
         return work
 
     def request(self) -> Callable[[int], None]:
-        """Give the work of turning one request."""
+        """Return the work of turning one request."""
         perception = self.perception(self.sensors)
         perception.observe(0, np.array([self.ego(0)]), self.poses, self.velocities)
         names = [*vehicle_joint_names('av0'),

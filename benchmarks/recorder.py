@@ -16,7 +16,7 @@ WARM_UP = 0.2
 
 
 def resident_mib(pid: int) -> float:
-    """Give the memory of a process that no other shares [MiB]; 0 if it has ended."""
+    """Return the memory of a process that no other shares [MiB]; 0 if it has ended."""
     try:
         text = Path(f'/proc/{pid}/smaps_rollup').read_text(encoding='ascii')
     except (FileNotFoundError, ProcessLookupError):

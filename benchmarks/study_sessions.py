@@ -72,7 +72,7 @@ def conduct(session: StudySession, kills: list[tuple[float, str]], log: list[str
 
 
 def check(file: Path, out: Path, sessions: list[StudySession]) -> list[str]:
-    """Say what is wrong with the data; nothing should be."""
+    """Return what is wrong with the data; nothing should be."""
     wrong: list[str] = []
     study = load_study(file)
     for place, session in enumerate(sessions):
@@ -108,7 +108,7 @@ def check(file: Path, out: Path, sessions: list[StudySession]) -> list[str]:
 
 
 def marker_errors(session: StudySession) -> list[tuple[str, float]]:
-    """Give how far each marker is from the clock of the picture in which it was set [s]."""
+    """Return how far each marker is from the clock of the picture in which it was set [s]."""
     told = {entry['name']: entry['time_s'] for entry in session.entries
             if entry['entry'] == 'marker'}
     return [(name, math.nan if told.get(name) is None else told[name] - shown_s)
@@ -116,7 +116,7 @@ def marker_errors(session: StudySession) -> list[tuple[str, float]]:
 
 
 def clock_errors(session: StudySession) -> list[float]:
-    """Give how far each marker's time is from the run's clock at its moment, as recorded [s]."""
+    """Return how far each marker's time is from the run's clock at its moment, as recorded [s]."""
     entries = [entry for entry in session.entries
                if entry['entry'] == 'marker' and entry.get('time_s') is not None]
     errors = []

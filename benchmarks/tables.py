@@ -87,21 +87,21 @@ class SyntheticRun:
         self._lanes = 3.5 * (ways % 3)
 
     def motion(self, time_s: float) -> tuple[Rows, Rows]:
-        """Give poses and velocities (objects + 2, 3) at a time."""
+        """Return poses and velocities (objects + 2, 3) at a time."""
         angles = self._rates * time_s + self._phases
         still = np.zeros_like(angles)
         return (np.column_stack((150.0 + 140.0 * np.sin(angles), self._lanes, still)),
                 np.column_stack((140.0 * self._rates * np.cos(angles), still, still)))
 
     def vehicles(self, time_s: float) -> Rows:
-        """Give the states (2, 8) of human and AV."""
+        """Return the states (2, 8) of human and AV."""
         poses, velocities = self.motion(time_s)
         states = np.zeros((2, STATE_WIDTH))
         states[:, :3], states[:, 3] = poses[:2], velocities[:2, 0]
         return states
 
     def messages(self) -> Iterator[tuple[str, str, int, bytes]]:
-        """Give what the graph would have published: topic, type, log time and content."""
+        """Yield what the graph would have published: topic, type, log time and content."""
         setup, scheduler = self.setup, self.scheduler
         for topic, text in (
                 ('/scenario/xml', setup.loaded.xml_text),
@@ -132,7 +132,7 @@ class SyntheticRun:
 
     def _at_tick(self, stamp_ns: int, at_ns: int, time_s: float
                  ) -> Iterator[tuple[str, str, int, bytes]]:
-        """Give the objects, the AV's request and its plan."""
+        """Yield the objects, the AV's request and its plan."""
         step_s, step_ns = self.scheduler.time_step_s, self.scheduler.time_step_ns
         poses, velocities = self.motion(time_s)
         names = [name for item in self.objects for name in object_joint_names(item.id)]

@@ -96,7 +96,7 @@ def our_motorway(start: Start) -> Traffic:
 
 
 def town_size(count: int) -> int:
-    """Give the crossings along each side of a town for so many vehicles."""
+    """Return the crossings along each side of a town for so many vehicles."""
     return max(1, round(math.sqrt(count / PER_CROSSING)))
 
 
@@ -109,7 +109,7 @@ def our_town(count: int) -> Traffic:
 
 
 def stepper(traffic: Traffic) -> Callable[[], None]:
-    """Give the work of one scenario time step."""
+    """Return the work of one scenario time step."""
     ticks = iter(range(10**9))
 
     def step() -> None:

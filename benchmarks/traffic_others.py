@@ -133,7 +133,7 @@ def highway_env(given: dict[str, Any], steps: int) -> list[Row]:
 
 
 def highway_env_step(given: dict[str, Any], as_it_is: bool) -> Callable[[], None]:
-    """Give the work of 0.1 s."""
+    """Return the work of 0.1 s."""
     from highway_env.road.road import Road, RoadNetwork
     from highway_env.vehicle.behavior import IDMVehicle
     import numpy as np

@@ -187,7 +187,7 @@ def check_profile() -> Check:
 
 
 def _is_ours(profile: str | None) -> bool:
-    """Tell whether a profile is that of the package, be it of another copy of it."""
+    """Return whether a profile is that of the package, be it of another copy of it."""
     try:
         return Path(profile or '').read_bytes() == loopback_profile().read_bytes()
     except OSError:

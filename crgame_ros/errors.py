@@ -49,12 +49,12 @@ def short(value: Any) -> str:
 
 
 def one_line(text: str) -> str:
-    """Give a remark in a line that any terminal takes, cut where nobody would read on."""
+    """Return a remark in a line that any terminal takes, cut where nobody would read on."""
     return _cut(_plain(text), LONGEST)
 
 
 def _plain(text: str) -> str:
-    """Give text that any terminal and any file takes: one line, what cannot be shown escaped."""
+    """Return text that any terminal and any file takes: one line, what cannot be shown escaped."""
     return ''.join(character if character.isprintable() else ascii(character)[1:-1]
                    for character in ' '.join(text.split()))
 

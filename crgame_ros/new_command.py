@@ -68,7 +68,7 @@ def _new(values: argparse.Namespace) -> int:
 
 
 def _game(values: argparse.Namespace) -> 'Game':
-    """Give the game, its humans not yet placed unless problems place them."""
+    """Return the game, its humans not yet placed unless problems place them."""
     from crgame_ros.game.game import AvSpec, DEFAULT_PLANNER, Game, HumanSpec
     from crgame_ros.scenario.loading import load_scenario
     loaded = load_scenario(values.scenario)

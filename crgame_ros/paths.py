@@ -35,14 +35,14 @@ def share_directory() -> Path:
 
 
 def numbered(wanted: Path) -> Iterator[Path]:
-    """Give a name, then the same with _2, _3, …: what is there already stays as it is."""
+    """Yield a name, then the same with _2, _3, …: what is there already stays as it is."""
     yield wanted
     for number in count(2):
         yield wanted.with_name(f'{wanted.name}_{number}')
 
 
 def irregular(mode: int) -> str | None:
-    """Say what a file is, by its mode, that is nothing to read from: a pipe may never end."""
+    """Return what a file is, by its mode, that is nothing to read from: a pipe may never end."""
     if stat.S_ISDIR(mode):
         return 'a directory'
     return None if stat.S_ISREG(mode) else 'no regular file'

@@ -130,7 +130,7 @@ class ModelRegistry:
         return found
 
     def label(self, name: str, where: str = '') -> str:
-        """Say which one a message is about, and where it was named."""
+        """Return which one a message is about, and where it was named."""
         return f'{where}: {self.kind} {name}' if where else f'{self.kind} {name}'
 
     def _from_file(self, path: Path, attribute: str, label: str) -> Any:

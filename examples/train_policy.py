@@ -39,7 +39,7 @@ CLEAR = 80.0
 
 def features(seen: Mapping[str, NDArray[np.float32]]) -> tuple[Array, Array]:
     """
-    Give what pedal and steering depend on, of B observations.
+    Return what pedal and steering depend on, of B observations.
 
     :return: (B, 7) and (B, 5), all of the order of 1
     """
@@ -73,7 +73,7 @@ def actions(weights: Array, seen: Mapping[str, NDArray[np.float32]]) -> NDArray[
 
 
 def load() -> Policy:
-    """Give the trained policy: what `policy:train_policy.py:load` in a game file calls."""
+    """Return the trained policy: what `policy:train_policy.py:load` in a game file calls."""
     if not WEIGHTS.exists():
         raise FileNotFoundError(f'{WEIGHTS} is missing: run {Path(__file__).name} first')
     weights: Array = np.load(WEIGHTS)['weights']
@@ -81,7 +81,7 @@ def load() -> Policy:
 
 
 def returns(games: GamesTogether, weights: Array, seed: int) -> Array:
-    """Give the sum of rewards (B) of one episode of each policy, all from the same start."""
+    """Return the sum of rewards (B) of one episode of each policy, all from the same start."""
     seen, _ = games.reset(seed=[seed] * len(weights))
     total, going = np.zeros(len(weights)), np.ones(len(weights), dtype=bool)
     while going.any():

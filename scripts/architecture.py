@@ -40,13 +40,13 @@ CELL, NAMES, TOP = 22, 150, 120
 
 
 def modules() -> dict[str, Path]:
-    """Give every module of the package, by its dotted name."""
+    """Return every module of the package, by its dotted name."""
     return {'.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
             for path in sorted(PACKAGE.rglob('*.py'))}
 
 
 def folder_of(path: Path) -> str:
-    """Give the folder that a file belongs to."""
+    """Return the folder that a file belongs to."""
     folder = path.parent.relative_to(PACKAGE).as_posix()
     if folder != '.':
         return folder
@@ -54,7 +54,7 @@ def folder_of(path: Path) -> str:
 
 
 def imports() -> dict[tuple[str, str], list[str]]:
-    """Give what folders import from other folders, as `file imports module`; by both folders."""
+    """Return what folders import from other folders, as `file imports module`; by both folders."""
     known = modules()
     found: dict[tuple[str, str], list[str]] = {}
     for path in known.values():
@@ -80,7 +80,7 @@ def _imported(path: Path, known: dict[str, Path]) -> set[str]:
 
 
 def sentence(folder: str) -> str:
-    """Give the sentence that a folder says of itself."""
+    """Return the sentence that a folder says of itself."""
     if folder == LOWEST:
         return 'What everybody uses: errors, paths, the registry, guarded YAML.'
     if folder == HIGHEST:
@@ -91,7 +91,7 @@ def sentence(folder: str) -> str:
 
 
 def table(counts: Counter[tuple[str, str]]) -> str:
-    """Give the list of the folders as Markdown."""
+    """Return the list of the folders as Markdown."""
     rows = ['| folder | files | what it is | imports from |', '|---|---|---|---|']
     for folder in FOLDERS:
         files = sum(folder_of(path) == folder and path.stem != '__init__'
@@ -103,7 +103,7 @@ def table(counts: Counter[tuple[str, str]]) -> str:
 
 
 def picture(counts: Counter[tuple[str, str]]) -> str:
-    """Give the folders as a matrix: a row's folder imports from the columns' (SVG)."""
+    """Return the folders as a matrix: a row's folder imports from the columns' (SVG)."""
     size = len(FOLDERS) * CELL
     most = max(counts.values())
     parts = [

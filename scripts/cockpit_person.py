@@ -64,7 +64,7 @@ class Person:
         self.browser.run(f'document.querySelector({selector!r}).click()')
 
     def state(self) -> tuple[float, ...]:
-        """Give t [s], x, y [m], yaw [rad], speed [m/s] and steering angle [rad]."""
+        """Return t [s], x, y [m], yaw [rad], speed [m/s] and steering angle [rad]."""
         values: Sequence[float] = self.browser.run(STATE)
         return tuple(values)
 
@@ -111,7 +111,7 @@ class Person:
 def wheel_angle(path: FloatArray, pose: tuple[float, float, float], speed: float,
                 wheelbase: float = 2.6) -> float:
     """
-    Give the angle of the front wheels that leads onto a path: pure pursuit [rad].
+    Return the angle of the front wheels that leads onto a path: pure pursuit [rad].
 
     :param path: (N, 2) points [m]
     :param pose: x, y [m] and yaw [rad] of the rear axle

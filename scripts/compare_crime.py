@@ -45,7 +45,7 @@ NEAR_S = 0.05
 
 
 def subjects(loaded: LoadedScenario) -> list[DynamicObstacle]:
-    """Give the rectangular obstacles that move on trajectories."""
+    """Return the rectangular obstacles that move on trajectories."""
     return [item for item in loaded.scenario.dynamic_obstacles
             if hasattr(item.obstacle_shape, 'length')
             and getattr(item.prediction, 'trajectory', None) is not None]
@@ -87,7 +87,7 @@ def measured(loaded: LoadedScenario, moving: list[DynamicObstacle]) -> dict[str,
 
 
 def crime_python(environment: Path) -> Path:
-    """Give the interpreter of an environment with commonroad-crime; make it where it is not."""
+    """Return the interpreter of an environment with commonroad-crime; make it where it is not."""
     python = environment / 'bin' / 'python'
     if not python.exists():
         print(f'installing {PACKAGE} into {environment} …', file=sys.stderr, flush=True)

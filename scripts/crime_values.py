@@ -22,7 +22,7 @@ from commonroad_crime.measure.time.ttc import TTC
 
 
 def compute(measure: Any, scenario: Any, asked: Iterable[dict[str, Any]]) -> list[float | None]:
-    """Give its value of each pair at a step; None where it fails."""
+    """Return its value of each pair at a step; None where it fails."""
     found: list[float | None] = []
     for each in asked:
         try:

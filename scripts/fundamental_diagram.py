@@ -122,7 +122,7 @@ def _detect(angles: FloatArray, radius: float) -> tuple[float, float]:
 def equilibrium_density(model: str, speed: FloatArray, limit: float, time_gap: float = 1.5,
                         standstill_gap: float = 2.0) -> FloatArray:
     """
-    Give the density at which vehicles follow each other steadily, in closed form.
+    Return the density at which vehicles follow each other steadily, in closed form.
 
     A vehicle takes its length and its gap: s0 + T v where FS 3 is zero (acc), and
     (s0 + T v) / sqrt(1 - (v / v0)^4) where the IDM is (idm; Treiber et al. 2000, equation 5).
@@ -137,7 +137,7 @@ def equilibrium_density(model: str, speed: FloatArray, limit: float, time_gap: f
 
 
 def equilibrium_speed(model: str, density: FloatArray, limit: float) -> FloatArray:
-    """Give the steady speed at densities (N); the limit where the road is free [m/s]."""
+    """Return the steady speed at densities (N); the limit where the road is free [m/s]."""
     speed = np.linspace(0.0, limit * (1.0 - 1e-9), 20001)
     dense = equilibrium_density(model, speed, limit)
     return np.asarray(np.interp(-density, -dense, speed))

@@ -24,7 +24,7 @@ DOCUMENT = Path(__file__).resolve().parent.parent / 'docs' / 'gym.md'
 
 
 def observations() -> str:
-    """Give the columns of each part."""
+    """Return the columns of each part."""
     lines = ['| part | number | unit | what | bounds |', '|---|---|---|---|---|']
     for part, columns in (('state', STATE_COLUMNS), ('route', ROUTE_COLUMNS),
                           ('objects', OBJECT_COLUMNS)):
@@ -38,7 +38,7 @@ def _column(part: str, index: int, column: ObservedColumn) -> str:
 
 
 def terms() -> str:
-    """Give the terms of the reward."""
+    """Return the terms of the reward."""
     lines = ['| term | unit | what | default weight |', '|---|---|---|---|']
     lines += [f'| `{name}` | {term.unit} | {term.meaning} | {USUAL_REWARD.get(name, 0.0):g} |'
               for name, term in TERMS.items()]

@@ -21,7 +21,7 @@ history of every topic is keep last."""
 
 
 def document(source: Path = SOURCE) -> str:
-    """Give the whole page for a contract file."""
+    """Return the whole page for a contract file."""
     contract = load_contract(source)
     general, trajectories = _comments(source.read_text(encoding='utf-8'))
     parts = ['# Interfaces', NOTICE, *general, '## Vehicles and objects in a JointTrajectory',
@@ -34,7 +34,7 @@ def document(source: Path = SOURCE) -> str:
 
 
 def _comments(text: str) -> tuple[list[str], list[str]]:
-    """Give the file's two explanations: at its head, and that of trajectories as a table."""
+    """Return the file's two explanations: at its head, and that of trajectories as a table."""
     head, trajectories = (
         [line[1:].removeprefix(' ') for line in block.splitlines()]
         for block in re.findall(r'^#[^\n]*(?:\n#[^\n]*)+', text, re.MULTILINE)[:2])

@@ -47,7 +47,7 @@ _TABLE = re.compile(r'(<!-- keys: ([\w.]+):(\w+) -->\n).*?(<!-- keys: end -->)',
 
 
 def reference() -> str:
-    """Give the page of every key."""
+    """Return the page of every key."""
     parts, done = [NOTICE], set[Any]()
     for file_kind in FILE_KINDS.values():
         top = file_kind.declared
@@ -59,7 +59,7 @@ def reference() -> str:
 
 
 def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:
-    """Give a dataclass and all that it holds, by the keys that lead there."""
+    """Yield a dataclass and all that it holds, by the keys that lead there."""
     yield label, kind
     for key in keys_of(kind):
         keyed = key.mark(Keyed)
@@ -73,7 +73,7 @@ def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:
 
 
 def held(hint: Any) -> Iterator[Any]:
-    """Give the dataclasses that a type is made of."""
+    """Yield the dataclasses that a type is made of."""
     kind, marks = split(hint)
     for choice in () if mark_of(marks, Special) else choices_of(kind):
         if is_dataclass(choice):
@@ -84,7 +84,7 @@ def held(hint: Any) -> Iterator[Any]:
 
 
 def summary(kind: Any) -> str:
-    """Give the first sentence of a docstring, and what a bare text stands for."""
+    """Return the first sentence of a docstring, and what a bare text stands for."""
     text = inspect.cleandoc(kind.__doc__ or '').split('\n')[0]
     form = form_of(kind)
     if form.short:
@@ -93,7 +93,7 @@ def summary(kind: Any) -> str:
 
 
 def table(kind: Any) -> str:
-    """Give the keys of a dataclass as a table."""
+    """Return the keys of a dataclass as a table."""
     rows = [['key', 'value', 'default', 'meaning'], ['---'] * 4]
     form, sentences = form_of(kind), sentences_of(kind)
     for key in keys_of(kind):
@@ -110,7 +110,7 @@ def table(kind: Any) -> str:
 
 
 def value(key: Key, kind: Any) -> str:
-    """Say what may stand there."""
+    """Return what may stand there."""
     if key.mark(Keyed):
         return 'a mapping'
     choices = form_of(kind).choices.get(key.name)
@@ -126,7 +126,7 @@ def value(key: Key, kind: Any) -> str:
 
 
 def default(key: Key) -> str:
-    """Say what holds without the key."""
+    """Return what holds without the key."""
     numbered = key.mark(Numbered)
     if numbered is not None:
         return f'{numbered.prefix}0, …'
@@ -141,7 +141,7 @@ def default(key: Key) -> str:
 
 
 def meaning(key: Key, sentences: dict[str, str]) -> str:
-    """Give its sentence, and beside which keys alone it stands."""
+    """Return its sentence, and beside which keys alone it stands."""
     beside = key.mark(OnlyWith)
     only = '' if beside is None or key.name in beside.keys \
         else f'(with {", ".join(f"`{name}`" for name in beside.keys)}) '
@@ -154,7 +154,7 @@ def escaped(text: str) -> str:
 
 
 def pages() -> dict[Path, str]:
-    """Give every page with tables of keys, as it has to be."""
+    """Return every page with tables of keys, as it has to be."""
     found = {REFERENCE: reference()}
     for page in sorted(DOCS.glob('*.md')):
         text = page.read_text(encoding='utf-8') if page != REFERENCE else ''

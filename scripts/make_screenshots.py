@@ -114,12 +114,12 @@ def page(folder: Path, theme: str, *arguments: str) -> Iterator[Person]:
 
 
 def game(name: str, *arguments: str) -> tuple[str, ...]:
-    """Give the launcher's arguments for a game of ours that does not end by itself."""
+    """Return the launcher's arguments for a game of ours that does not end by itself."""
     return (str(scenarios_directory() / f'{name}.yaml'), '--duration', '100000', *arguments)
 
 
 def waiting(folder: Path, name: str) -> tuple[str, ...]:
-    """Give the launcher's arguments for a game that waits for a person."""
+    """Return the launcher's arguments for a game that waits for a person."""
     return game(name, '--driver', 'cockpit', '--out', str(folder / 'run'))
 
 

@@ -66,7 +66,7 @@ def take_session(folder: Path) -> None:
 
 
 def ready(session: StudySession) -> bool:
-    """Tell whether the page waits for the participant's word before a trial."""
+    """Return whether the page waits for the participant's word before a trial."""
     return bool(session.browser.run(
         'const button = document.querySelector(".gate:not([hidden]) button.primary");'
         'return button && !button.disabled'

@@ -76,7 +76,7 @@ def merge(path: Path, seconds: float) -> None:
 
 def _tracks(seconds: float, cooperative: bool,
             ) -> tuple[list[NDArray[np.float64]], NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Give pieces of (time, x) on the right lane, their speeds [km/h], and those on the ramp."""
+    """Return pieces of (time, x) on the right lane, their speeds [km/h], and those on the ramp."""
     scenario = load_scenario(scenarios_directory() / 'ZAM_DenseMerge-1_1_T-1.xml').scenario
     network = RoadNetwork(scenario.lanelet_network)
     spec = TrafficSpec(agents=40, flow=1100.0, cooperative=cooperative)

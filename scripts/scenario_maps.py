@@ -103,7 +103,7 @@ class Obstacle:
 
     @property
     def is_static(self) -> bool:
-        """Tell whether the obstacle never moves."""
+        """Return whether the obstacle never moves."""
         return len(self.states) == 1
 
 

@@ -26,7 +26,7 @@ _CLOSING = re.compile(r'(?:FAILED|ERROR) (\S+::.*?)@([\w/.-]+)(?: - .*)?')
 
 
 def failed(text: str) -> Iterator[tuple[str, str]]:
-    """Give id and group of each test that failed, as pytest's closing lines name them."""
+    """Yield id and group of each test that failed, as pytest's closing lines name them."""
     for line in dict.fromkeys(text.splitlines()):
         match = _CLOSING.fullmatch(line)
         if match is not None:

@@ -146,14 +146,14 @@ class Shell:
 
 
 def blocks(text: str, language: str) -> Iterator[str]:
-    """Give the blocks of a document in a language."""
+    """Yield the blocks of a document in a language."""
     for match in re.finditer(r'^```(\w*)\n(.*?)^```$', text, re.S | re.M):
         if match.group(1) == language:
             yield match.group(2)
 
 
 def commands(block: str) -> Iterator[str]:
-    """Give the commands of a block, without comments."""
+    """Yield the commands of a block, without comments."""
     for line in block.splitlines():
         if command := re.sub(r'(^|\s+)#.*', '', line).strip():
             yield command

@@ -109,7 +109,7 @@ def shared_scenarios() -> Path:
 
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    """Give the test, and the processes it starts, a ROS domain that nobody else uses."""
+    """Return the test, and the processes it starts, a ROS domain that nobody else uses."""
     domain = own_domain_id()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     return domain

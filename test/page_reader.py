@@ -32,13 +32,13 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        """Give all text but that of styles, a line each."""
+        """Return all text but that of styles, a line each."""
         return ''.join(f'{text}\n' for path, text in self.texts if 'style' not in path)
 
     def text_of(self, tag: str) -> list[str]:
-        """Give the texts that stand in elements of a kind."""
+        """Return the texts that stand in elements of a kind."""
         return [text for path, text in self.texts if tag in path]
 
     def attributes(self, tag: str) -> list[dict[str, str | None]]:
-        """Give the attributes of all elements of a kind."""
+        """Return the attributes of all elements of a kind."""
         return [found for name, found in self.elements if name == tag]

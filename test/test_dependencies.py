@@ -54,7 +54,7 @@ NOT_IN_WHEELS = {'tf2_msgs'}
 
 
 def _imported() -> Iterator[str]:
-    """Give the first part of every module that the package imports, or asks the place of."""
+    """Yield the first part of every module that the package imports, or asks the place of."""
     files = [*(ROOT / 'crgame_ros').rglob('*.py'), *(ROOT / 'launch').glob('*.py')]
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
@@ -69,7 +69,7 @@ def _imported() -> Iterator[str]:
 
 @pytest.fixture(scope='module')
 def imported() -> set[str]:
-    """Give what is imported beyond Python and the package itself."""
+    """Return what is imported beyond Python and the package itself."""
     return set(_imported()) - sys.stdlib_module_names - {'crgame_ros', 'ros_wheels_bootstrapper'}
 
 

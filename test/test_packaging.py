@@ -390,7 +390,7 @@ def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:
 
 
 def _examples() -> Iterator[tuple[Path, str]]:
-    """Give every example of the README and the docs that calls crgame, without its comment."""
+    """Yield every example of the README and the docs that calls crgame, without its comment."""
     for page in (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'docs').glob('*.md')):
         for block in re.findall(r'^```bash\n(.*?)^```', page.read_text(encoding='utf-8'),
                                 re.MULTILINE | re.DOTALL):

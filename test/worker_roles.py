@@ -51,13 +51,13 @@ def group_of(item: pytest.Item, folder: Path) -> str:
 
 
 def keeps_to_the_clock(group: str) -> bool:
-    """Tell whether the tests of a group may not be slowed: most speak with running graphs."""
+    """Return whether the tests of a group may not be slowed: most speak with running graphs."""
     return group == ALONE or group in ORDINARY or (
         group.partition('/')[0] in REAL_TIME_FOLDERS and group not in TIMELESS)
 
 
 def order_of(group: str) -> int:
-    """Give the place of a group: graphs, those that are alone, and what computes."""
+    """Return the place of a group: graphs, those that are alone, and what computes."""
     return 1 if group == ALONE else 0 if keeps_to_the_clock(group) else 2
 
 

@@ -38,7 +38,7 @@ def hard_brakings(history: History, roads: JudgedRoads) -> list[Event]:
 
 
 def _way(history: History, row: int, agent: int) -> shapely.LineString:
-    """Give the centre's way from a time on, straight on from where it is later."""
+    """Return the centre's way from a time on, straight on from where it is later."""
     until = row + round(NEXT_S / history.time_step_s)
     rows = np.arange(row, min(until, len(history) - 1) + 1)
     rows = rows[history.born[rows, agent] == history.born[row, agent]]
@@ -100,7 +100,7 @@ def _cause(history: History, roads: JudgedRoads, lines: list[Stop], row: int, ag
 
 
 def _on(history: History, row: int, agent: int, other: int, way: shapely.LineString) -> bool:
-    """Tell whether another one was on the way at an earlier time."""
+    """Return whether another one was on the way at an earlier time."""
     past = shapely.LineString(np.concatenate((
         history.poses[row, agent:agent + 1, :2], shapely.get_coordinates(way))))
     corridor = past.buffer(0.5 * history.width[agent] + MARGIN, cap_style='flat')
@@ -109,7 +109,7 @@ def _on(history: History, row: int, agent: int, other: int, way: shapely.LineStr
 
 def _light(history: History, lines: list[Stop], row: int, agent: int,
            way: shapely.LineString) -> bool:
-    """Tell whether a light that is not green lies on the way."""
+    """Return whether a light that is not green lies on the way."""
     if history.lights is None:
         return False
     half = 0.5 * float(history.length[agent])

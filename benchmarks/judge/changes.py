@@ -12,7 +12,7 @@ STEPS = 12
 
 
 def lanes_of(history: History, roads: JudgedRoads) -> IntArray:
-    """Give the lanes (T, A) under the agents' centres; -1 where there is none."""
+    """Return the lanes (T, A) under the agents' centres; -1 where there is none."""
     poses = history.poses[:, :history.agents]
     return roads.lanes_at(poses.reshape(-1, 3)).reshape(poses.shape[:2])
 
@@ -49,7 +49,7 @@ def changes(history: History, roads: JudgedRoads, lanes: IntArray) -> tuple[int,
 
 
 def _side(roads: JudgedRoads, old: int, new: int) -> int:
-    """Give 1 for a change to the left, -1 to the right, 0 for none."""
+    """Return 1 for a change to the left, -1 to the right, 0 for none."""
     if _leads(roads, old, new, 3):
         return 0
     for side, beside in ((1, roads.left), (-1, roads.right)):
@@ -61,7 +61,7 @@ def _side(roads: JudgedRoads, old: int, new: int) -> int:
 
 
 def _leads(roads: JudgedRoads, old: int, new: int, steps: int = STEPS) -> bool:
-    """Tell whether a lane leads into another, or is it."""
+    """Return whether a lane leads into another, or is it."""
     reached = edge = {old}
     for _ in range(steps):
         if new in reached:

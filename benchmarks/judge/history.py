@@ -80,7 +80,7 @@ class History:
 
     @cached_property
     def present(self) -> BoolArray:
-        """Tell who (T, N) is there."""
+        """Return who (T, N) is there."""
         return np.isfinite(self.poses).all(axis=2)
 
     @cached_property
@@ -128,7 +128,7 @@ class History:
         return result
 
     def corners(self, row: int, column: int) -> FloatArray:
-        """Give the (n, 2) corners of one object at one time [m]."""
+        """Return the (n, 2) corners of one object at one time [m]."""
         x, y, yaw = self.poses[row, column]
         turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
         return np.asarray(self.outlines[column] @ turn + (x, y))

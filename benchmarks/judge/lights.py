@@ -53,12 +53,12 @@ class Stop:
 
     @cached_property
     def ahead(self) -> FloatArray:
-        """Give the direction across the line."""
+        """Return the direction across the line."""
         across = self.right - self.left
         return np.array((-across[1], across[0])) / max(float(np.hypot(*across)), 1e-9)
 
     def place(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Give points (..., 2) beyond and along the line, from its middle [m]."""
+        """Return points (..., 2) beyond and along the line, from its middle [m]."""
         off = points - 0.5 * (self.left + self.right)
         across = np.array((self.ahead[1], -self.ahead[0]))
         return off @ self.ahead, off @ across
@@ -93,7 +93,7 @@ def stops(roads: JudgedRoads) -> list[Stop]:
 
 
 def ways(roads: JudgedRoads, lane: int) -> Iterator[Way]:
-    """Give the ways from the end of a lane through its junction and on."""
+    """Yield the ways from the end of a lane through its junction and on."""
     told: dict[int, set[str]] = {}
     for intersection in roads.network.intersections:
         for incoming in intersection.incomings:
@@ -161,7 +161,7 @@ def _crossings(history: History, stop: Stop) -> IntArray:
 
 def _driven(history: History, agent: int, found: list[tuple[int, Stop]]
             ) -> Iterator[tuple[int, Stop, set[str]]]:
-    """Give the lines that an agent did pass, of those that lie over each other one."""
+    """Yield the lines that an agent did pass, of those that lie over each other one."""
     window = round(1.0 / history.time_step_s)
     while found:
         row = found[0][0]
@@ -176,7 +176,7 @@ def _driven(history: History, agent: int, found: list[tuple[int, Stop]]
 
 
 def _fits(history: History, agent: int, row: int, stop: Stop) -> list[tuple[float, str]]:
-    """Give the mean distance of the centre's further way from each way through [m]."""
+    """Return the mean distance of the centre's further way from each way through [m]."""
     born = history.born[:, agent]
     rows = row + np.flatnonzero(np.cumprod(born[row:] == born[row]))
     points = history.poses[rows, agent, :2]
@@ -211,14 +211,14 @@ def _red(history: History, agent: int, row: int, stop: Stop,
 
 
 def _start(states: np.ndarray, row: int, names: tuple[str, ...]) -> int:
-    """Give the row from which on a light has shown one of these."""
+    """Return the row from which on a light has shown one of these."""
     others = np.flatnonzero(~np.isin(states[:row + 1], names))
     return int(others[-1]) + 1 if len(others) else 0
 
 
 def needed_braking(history: History, agent: int, row: int, left_green: int) -> float:
     """
-    Give the deceleration that would have stopped an agent before the line it passes after row.
+    Return the deceleration that would have stopped an agent before the line it passes after row.
 
     From where and how fast it was when its light left green, or when it appeared if that is
     later, one time step after that for seeing it [m/s^2].

@@ -26,7 +26,7 @@ JUMP = 0.3
 
 
 def lateral(history: History) -> FloatArray:
-    """Give the lateral accelerations (T - 2, A) at rows 1 … T - 2; NaN for who stands [m/s^2]."""
+    """Return the lateral accelerations (T - 2, A) at rows 1 … T - 2; NaN for who stands [m/s^2]."""
     poses, two = history.poses[:, :history.agents], 2.0 * history.time_step_s
     moved = np.hypot(*np.moveaxis(poses[2:, :, :2] - poses[:-2, :, :2], -1, 0)) / two
     rate = wrapped(poses[2:, :, 2] - poses[:-2, :, 2]) / two
@@ -35,14 +35,14 @@ def lateral(history: History) -> FloatArray:
 
 
 def accelerations(history: History) -> FloatArray:
-    """Give the (T - 1, A) accelerations along the bodies; NaN where absent [m/s^2]."""
+    """Return the (T - 1, A) accelerations along the bodies; NaN where absent [m/s^2]."""
     speed = history.speed[:, :history.agents]
     same = (history.born[1:] == history.born[:-1])[:, :history.agents]
     return np.where(same, np.diff(speed, axis=0) / history.time_step_s, np.nan)
 
 
 def jerks(history: History) -> FloatArray:
-    """Give the (T - 1 - n, A) jerks; NaN where absent [m/s^3]."""
+    """Return the (T - 1 - n, A) jerks; NaN where absent [m/s^3]."""
     stride = max(1, round(0.1 / history.time_step_s))
     a = accelerations(history)
     same = (history.born[stride:-1] == history.born[:-1 - stride])[:, :history.agents]
@@ -126,7 +126,7 @@ def hard_stretches(history: History) -> list[tuple[int, int, int, float]]:
 
 
 def _dense(outline: FloatArray) -> FloatArray:
-    """Give points (n, 2) along an outline: a long side may cut a corner in its middle."""
+    """Return points (n, 2) along an outline: a long side may cut a corner in its middle."""
     ring = shapely.LinearRing(outline)
     at = np.unique(np.concatenate((
         shapely.line_locate_point(ring, shapely.points(outline)),

@@ -43,7 +43,7 @@ def touching(history: History) -> IntArray:
 
 def _separated(history: History, poses: FloatArray, column: IntArray, a: IntArray,
                b: IntArray) -> BoolArray:
-    """Tell which pairs an axis of the first one's box separates."""
+    """Return which pairs an axis of the first one's box separates."""
     # Half extents around the centre: a polygon need not be symmetric.
     size = np.array([np.abs(x).max(axis=0) for x in history.outlines])
     turn = poses[b, 2] - poses[a, 2]

@@ -73,7 +73,7 @@ class JudgedRoads:
         self._drivable = np.array([not x.lanelet_type & NO_LANE for x in self.lanelets])
 
     def _meet(self, lane: int, onto: int) -> bool:
-        """Tell whether a lane does begin where another ends; some files say so of others."""
+        """Return whether a lane does begin where another ends; some files say so of others."""
         gap = self.lanes[onto].vertices[0] - self.lanes[lane].vertices[-1]
         return lane != onto and float(np.hypot(*gap)) < MEET
 
@@ -117,7 +117,7 @@ class JudgedRoads:
         return result
 
     def heading(self, lane: int, places: shapely.Geometry) -> FloatArray:
-        """Give the headings of a lane beside points (n) [rad]."""
+        """Return the headings of a lane beside points (n) [rad]."""
         found = self.lanes[lane]
         s = shapely.line_locate_point(found.line, places)
         segment = np.searchsorted(found.s, s, side='right') - 1

@@ -40,7 +40,7 @@ class Spillback:
         return float(self._roads.lanes[lane].line.project(shapely.Point(pose[:2])))
 
     def _driven(self, agent: int) -> shapely.LineString:
-        """Give the way that an agent took from now on."""
+        """Return the way that an agent took from now on."""
         row, born = self._row, self._history.born[:, agent]
         places = self._history.poses[row::5, agent, :2][born[row::5] == born[row]]
         return shapely.LineString(places if len(places) > 1 else places[[0, 0]])

@@ -67,7 +67,7 @@ def stands(history: History, roads: JudgedRoads) -> list[Event]:
 
 def _reasons(history: History, roads: JudgedRoads, lines: list[Stop], row: int,
              waiting: IntArray, unexplained: FloatArray) -> dict[int, tuple[str, str]]:
-    """Give the state of everybody who stands at a time, and who is ahead."""
+    """Return the state of everybody who stands at a time, and who is ahead."""
     ahead = dict(zip(waiting.tolist(), _ahead(history, row, waiting).tolist(), strict=True))
     lit = dict(zip(waiting.tolist(), (_at_light(history, lines, row, waiting) | _human(
         history, row, waiting)).tolist(), strict=True))
@@ -150,7 +150,7 @@ def _human(history: History, row: int, agents: IntArray) -> BoolArray:
 
 
 def _seen(poses: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give places (O, 3) along and aside as seen from poses (A, 3), each (A, O) [m]."""
+    """Return places (O, 3) along and aside as seen from poses (A, 3), each (A, O) [m]."""
     off = others[None, :, :2] - poses[:, None, :2]
     cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
     return off[..., 0] * cos + off[..., 1] * sin, off[..., 1] * cos - off[..., 0] * sin

@@ -55,11 +55,11 @@ class Alternative:
 
     @property
     def state_hash(self) -> str | None:
-        """Give the hash over all states of an offline run."""
+        """Return the hash over all states of an offline run."""
         return None if self.result is None else self.result.state_hash
 
     def as_dict(self) -> dict[str, Any]:
-        """Say what came of it, as JSON has it."""
+        """Return what came of it, as JSON has it."""
         return {
             'planner': self.planner, 'state_hash': self.state_hash,
             'human_differs_s': self.human_differs_s, 'others_differ_s': self.others_differ_s,
@@ -142,7 +142,7 @@ def _compare(planner: str, log: RunLog, recorded: RunLog,
 
 def _differs_s(log: RunLog, recorded: RunLog, found: NDArray[np.float64],
                expected: NDArray[np.float64]) -> float | None:
-    """Give the time from which on poses (K, N, 3) of two runs differ; None where they never do."""
+    """Return the time from which on poses (K, N, 3) of two runs differ; None where they never do."""
     ks, here, there = np.intersect1d(log.ks, recorded.ks, return_indices=True)
     apart = np.abs(found[here] - expected[there]) > SAME
     absent = np.isnan(found[here]) != np.isnan(expected[there])

@@ -14,7 +14,7 @@ HEAD = ('planner', 'vehicle', 'gap [m]', 'ttc [s]', 'a_req [m/s^2]', 'distance [
 
 def replay_rows(found: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
     """
-    Give a row for each planner and vehicle, as `HEAD` names its cells.
+    Yield a row for each planner and vehicle, as `HEAD` names its cells.
 
     :param found: entries of `Alternative.as_dict`; of what was recorded without the comparison.
     """

@@ -30,7 +30,7 @@ class RunMeasures(NamedTuple):
     detection: tuple[DetectionScore, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Say it as `crgame measure --json` does."""
+        """Return it as `crgame measure --json` does."""
         return {**self.criticality.as_dict(),
                 'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour},
                 **({'detection_response': [each.as_dict() for each in self.detection]}

@@ -21,12 +21,12 @@ _LONGEST_JOURNAL = 200_000_000
 
 
 def is_study(path: Path) -> bool:
-    """Tell whether a folder is that of a study that people take part in."""
+    """Return whether a folder is that of a study that people take part in."""
     return (path / STUDY_FILE).is_file()
 
 
 def study_parts(path: Path) -> list[Path]:
-    """Give what is to be checked: study, questionnaires, journals, games, runs, tables."""
+    """Return what is to be checked: study, questionnaires, journals, games, runs, tables."""
     return list(_parts(path))
 
 

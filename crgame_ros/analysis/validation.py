@@ -72,7 +72,7 @@ def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
 
 
 def parts_of(path: Path) -> list[Path]:
-    """Give what is to be checked of a path: of the folder of a run or study all its files."""
+    """Return what is to be checked of a path: of the folder of a run or study all its files."""
     if is_study(path):
         return study_parts(path)
     if not path.is_dir() or recording_in(path) == path:

@@ -55,11 +55,11 @@ class Access:
 
     @property
     def refusal(self) -> str:
-        """Say to somebody without a cookie what to do."""
+        """Return to somebody without a cookie what to do."""
         return WITH_TOKEN if self.invitations is None else UNKNOWN
 
     def at_port(self, port: int) -> 'Access':
-        """Give the same at another port."""
+        """Return the same at another port."""
         return replace(self, port=port)
 
     @property
@@ -69,17 +69,17 @@ class Access:
 
     @property
     def urls(self) -> list[str]:
-        """Give the addresses to open in a browser, with the token."""
+        """Return the addresses to open in a browser, with the token."""
         query = f'?token={self.token}' if self.token is not None else ''
         return [self._address(host) + query for host in reachable_addresses(self.host)]
 
     @property
     def url(self) -> str:
-        """Give the first of these addresses."""
+        """Return the first of these addresses."""
         return self.urls[0]
 
     def link(self, token: str) -> str:
-        """Give the address with a token that lets one browser in."""
+        """Return the address with a token that lets one browser in."""
         return f'{self._address(reachable_addresses(self.host)[0])}?token={token}'
 
     def _address(self, host: str) -> str:
@@ -88,7 +88,7 @@ class Access:
 
     def allows_host(self, host: str, port: int) -> bool:
         """
-        Tell whether a Host header names this server.
+        Return whether a Host header names this server.
 
         A page of another site whose name was made to point here (DNS rebinding) sends that name.
 
@@ -105,7 +105,7 @@ class Access:
 
     def rights(self, cookie: str | None) -> Rights | None:
         """
-        Give what a browser may do.
+        Return what a browser may do.
 
         :param cookie: that it shows.
         :return: None if it is not let in.
@@ -128,7 +128,7 @@ class Access:
         return self.token
 
     def knows(self, token: str | None) -> bool:
-        """Tell whether a token is the right one, in a time that does not depend on it."""
+        """Return whether a token is the right one, in a time that does not depend on it."""
         if self.token is None:
             return True
         given = (token or '').encode('utf-8', 'surrogatepass')
@@ -137,7 +137,7 @@ class Access:
 
 def is_own_origin(origin: str | None, host: str) -> bool:
     """
-    Tell whether a request comes from a page of this server, or from no page at all.
+    Return whether a request comes from a page of this server, or from no page at all.
 
     :param origin: the Origin header; None if there is none: a program, no browser.
     :param host: the Host header.
@@ -153,7 +153,7 @@ def is_own_origin(origin: str | None, host: str) -> bool:
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether only this machine can connect to an address."""
+    """Return whether only this machine can connect to an address."""
     if host == 'localhost':
         return True
     try:

@@ -72,4 +72,4 @@ class ReplayControls(Backend, Protocol):
     """A recording behind the page: it answers requests of its own."""
 
     def routes(self) -> list[web.RouteDef]:
-        """Give the routes below /api/replay/ that the server is to have; called once."""
+        """Return the routes below /api/replay/ that the server is to have; called once."""

@@ -71,7 +71,7 @@ def tls_context(certificate: Path, key: Path) -> ssl.SSLContext:
 
 def fingerprint(certificate: Path) -> str:
     """
-    Give the SHA-256 fingerprint as browsers show it.
+    Return the SHA-256 fingerprint as browsers show it.
 
     :raises InputError: if it is no PEM file.
     """

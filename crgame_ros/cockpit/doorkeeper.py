@@ -30,7 +30,7 @@ class Doorkeeper:
         self._open: dict[asyncio.BaseTransport, _Watched] = {}
 
     def watched(self, make: Callable[[], asyncio.Protocol]) -> Callable[[], asyncio.Protocol]:
-        """Give a factory of protocols that are watched."""
+        """Return a factory of protocols that are watched."""
         return lambda: _Watched(self, make())
 
     def begins(self, transport: asyncio.BaseTransport | None) -> None:
@@ -140,7 +140,7 @@ class WatchedSite(web.BaseSite):
 
     @property
     def name(self) -> str:
-        """Give the address."""
+        """Return the address."""
         return f'{"https" if self._ssl_context else "http"}://{self._host}:{self._port}'
 
     async def start(self) -> None:
@@ -163,7 +163,7 @@ class _StrangersMistakes(logging.Filter):
 
 
 def server_log() -> logging.Logger:
-    """Give the log of the HTTP server, in which requests that are no HTTP leave no traceback."""
+    """Return the log of the HTTP server, in which requests that are no HTTP leave no traceback."""
     log = logging.getLogger(f'{__name__}.http')
     if not log.filters:
         log.addFilter(_StrangersMistakes())

@@ -77,12 +77,12 @@ class HeldSeat:
         self._lever.hold(())
 
     def is_silent(self, now_s: float) -> bool:
-        """Tell whether the page has not been heard for too long."""
+        """Return whether the page has not been heard for too long."""
         return not self.away and now_s - self._heard_s > SILENCE_S
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """
-        Give the command of cycle n; while nobody is there it is released, but for the indicators.
+        Return the command of cycle n; while nobody is there it is released, but for the indicators.
 
         :param dt_s: length of a cycle in simulation time [s]
         """

@@ -51,7 +51,7 @@ class Hub:
 
     @property
     def clients(self) -> Mapping[str, Client]:
-        """Give the clients that are connected now, by their id."""
+        """Return the clients that are connected now, by their id."""
         return MappingProxyType(self._clients)
 
     def make_room(self, address: str, now_s: float) -> bool:

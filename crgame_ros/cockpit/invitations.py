@@ -84,7 +84,7 @@ class Invitations:
         return cookie
 
     def rights(self, cookie: str | None) -> Rights | None:
-        """Give what the browser with a cookie may do; None if it came by no link."""
+        """Return what the browser with a cookie may do; None if it came by no link."""
         link = _find(self._links, 'cookie', cookie) if cookie else None
         return None if link is None else Rights.of(link.role, link.seat)
 

@@ -96,7 +96,7 @@ class Library:
         self._loaded = ''
 
     async def listing(self) -> dict[str, Any]:
-        """Give the answer of /api/scenarios, as the folders are now."""
+        """Return the answer of /api/scenarios, as the folders are now."""
         folders = await asyncio.to_thread(self._list)
         self._entries = {entry.id: entry for _, entries in folders for entry in entries}
         return {
@@ -181,7 +181,7 @@ class Library:
         return await asyncio.to_thread(self._store_game, text)
 
     def is_upload(self, entry_id: str) -> bool:
-        """Tell whether somebody has sent an entry."""
+        """Return whether somebody has sent an entry."""
         entry = self._entries.get(entry_id)
         return entry is not None and entry.kind == 'upload'
 
@@ -249,7 +249,7 @@ def _entry_id(path: Path) -> str:
 
 
 def _game_title(path: Path) -> str:
-    """Give the title of a game file, empty if the file is no game."""
+    """Return the title of a game file, empty if the file is no game."""
     try:
         values = read_yaml(path, 'game file')
     except InputError:
@@ -261,7 +261,7 @@ def _game_title(path: Path) -> str:
 
 
 def _scenario_title(path: Path) -> str:
-    """Give the benchmark id, without reading more than the file's beginning."""
+    """Return the benchmark id, without reading more than the file's beginning."""
     try:
         with path.open('rb') as stream:
             found = _BENCHMARK.search(stream.read(4096))

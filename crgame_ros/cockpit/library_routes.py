@@ -113,7 +113,7 @@ def refusable(handler: Answer) -> Answer:
 
 
 def asker_gone(request: web.Request) -> Callable[[], bool]:
-    """Give a function that tells whether nobody waits for the answer any more."""
+    """Return a function that tells whether nobody waits for the answer any more."""
     def gone() -> bool:
         return request.transport is None or request.transport.is_closing()
     return gone

@@ -16,7 +16,7 @@ _GLOBAL = '00'
 
 def reachable_addresses(host: str) -> tuple[str, ...]:
     """
-    Give the addresses that others can open when a server listens on one.
+    Return the addresses that others can open when a server listens on one.
 
     :param host: an address, or `0.0.0.0` or `::` for all of this machine.
     :return: of all, those of its interfaces, loopback left out unless there is nothing else.

@@ -60,18 +60,18 @@ def _lanelet(lanelet: Lanelet, roads: RoadNetwork, crossing: set[int],
 
 
 def _raised(vertices: Points, heights: Points | None) -> Points:
-    """Give the vertices their heights, if they have any: (N, 3), else (N, 2) [m]."""
+    """Return the vertices their heights, if they have any: (N, 3), else (N, 2) [m]."""
     return vertices[:, :2] if heights is None else np.column_stack((vertices[:, :2], heights))
 
 
 def _heights(vertices: Points) -> list[float] | None:
-    """Give a bound's heights [m]; None of a lanelet that is flat."""
+    """Return a bound's heights [m]; None of a lanelet that is flat."""
     return flat(vertices[:, 2]) if vertices.shape[1] > 2 else None
 
 
 def gap_outlines(network: LaneletNetwork) -> list[list[float]]:
     """
-    Give the slits between lanelets that are no ground to the eye, only cracks in the map.
+    Return the slits between lanelets that are no ground to the eye, only cracks in the map.
 
     They are for display alone: whether a vehicle is on the road is not decided with them.
     """

@@ -64,17 +64,17 @@ class MessageFrames:
         self.mounts = SensorMounts(self._game.avs, self.columns, self._game.scheduler.dt_s)
 
     def place(self, n: int) -> Place:
-        """Give where in the run a simulation step is."""
+        """Return where in the run a simulation step is."""
         scheduler = self._game.scheduler
         return Place(self._game.epoch, n, scheduler.k(n), n * scheduler.dt_s)
 
     def place_of(self, message: Any) -> Place | None:
-        """Give where a message with a stamp belongs; None if it is of an earlier run."""
+        """Return where a message with a stamp belongs; None if it is of an earlier run."""
         n = self._game.scheduler.step_of_stamp(stamp_of(message))
         return None if n < 0 else self.place(n)
 
     def states(self, message: Any) -> FloatArray:
-        """Give (V, 8) states of the vehicles, and remember them for scans."""
+        """Return (V, 8) states of the vehicles, and remember them for scans."""
         states = self._world.vehicle_states(message)
         self.mounts.add_states(self._game.scheduler.step_of_stamp(stamp_of(message)), states)
         return states
@@ -169,7 +169,7 @@ class MessageFrames:
 
 def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
     """
-    Give the rows (V, 13) of a frame of states (V, 8).
+    Return the rows (V, 13) of a frame of states (V, 8).
 
     :param commands: (V, 6) consumed, of which pages get the first five; None where they are not
         known.

@@ -52,7 +52,7 @@ class Opening:
 
     def lines(self, access: Access, seats: Sequence[str]) -> list[str]:
         """
-        Say where the page is, and make the first links.
+        Return where the page is, and make the first links.
 
         :param access: with the port at which the server listens.
         :param seats: for each a link is made for its driver.

@@ -61,7 +61,7 @@ class Replay:
 
     def chunk(self, number: int) -> bytes:
         """
-        Give a chunk, built anew unless it was asked for lately.
+        Return a chunk, built anew unless it was asked for lately.
 
         :raises InputError: if there is no such chunk, or the recording is damaged in it.
         """
@@ -74,7 +74,7 @@ class Replay:
         return self._chunks[number]
 
     def criticality(self) -> tuple[Epoch, bytes | None]:
-        """Give the run, and its CRITICALITY frames as somebody recorded them; None if nobody."""
+        """Return the run, and its CRITICALITY frames as somebody recorded them; None if nobody."""
         return self.index.run, recorded_criticality(self._reader, self.index.run)
 
     def info(self) -> dict[str, Any]:
@@ -134,7 +134,7 @@ class ReplayBackend:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Say what is wrong with the recording although it can be shown."""
+        """Return what is wrong with the recording although it can be shown."""
         return self._reader.notices
 
     def close(self) -> None:
@@ -166,7 +166,7 @@ class ReplayBackend:
 
     def chunk(self, number: int, epoch: int | None = None) -> bytes:
         """
-        Give frames, each after its length in bytes; waits until they have been read.
+        Return frames, each after its length in bytes; waits until they have been read.
 
         :param number: which chunk, from 0.
         :raises InputError: if there is no such chunk or epoch, or the recording is damaged there.
@@ -181,7 +181,7 @@ class ReplayBackend:
         return self._run(self.epoch if epoch is None else epoch).chunk(number)
 
     def outline(self, epoch: int | None = None) -> bytes:
-        """Give thinned-out STATE frames of the whole run, each after its length in bytes."""
+        """Return thinned-out STATE frames of the whole run, each after its length in bytes."""
         return self._thread.submit(self._outline, epoch).result()
 
     def _outline(self, epoch: int | None) -> bytes:
@@ -191,7 +191,7 @@ class ReplayBackend:
         return self._run(epoch).criticality()
 
     def routes(self) -> list[web.RouteDef]:
-        """Give what the server is to answer besides the page."""
+        """Return what the server is to answer besides the page."""
         return [web.get('/api/replay/info', self._answer_info),
                 web.get('/api/replay/chunk', self._answer_chunk),
                 web.get('/api/replay/outline', self._answer_outline),

@@ -95,7 +95,7 @@ class ChunkBuilder:
         return pack(entry.frame for entry in entries)
 
     def _carried(self, low: int) -> Iterator[_Entry]:
-        """Give what was in force before step `low`."""
+        """Yield what was in force before step `low`."""
         self._frames.forget()
         for topic in self._makers:
             log_ns = self._index.places[topic].before(low)
@@ -111,7 +111,7 @@ class ChunkBuilder:
                         yield _Entry(low, _BEFORE, -1, frame)
 
     def _carried_scans(self, topic: str, last_ns: int, low: int) -> Iterator[_Entry]:
-        """Give the last scan of each sensor of a topic; they share it."""
+        """Yield the last scan of each sensor of a topic; they share it."""
         newest: dict[str, bytes] = {}
         for message in self._reader.decoded([VEHICLES_TOPIC, topic], last_ns - CARRIED_NS,
                                             last_ns + 1):
@@ -176,7 +176,7 @@ class ChunkBuilder:
         return found
 
     def _step_before(self, low: int) -> int:
-        """Give the step of the state before step `low`, -1 where there is none."""
+        """Return the step of the state before step `low`, -1 where there is none."""
         steps = self._index.places[VEHICLES_TOPIC].steps
         place = int(np.searchsorted(steps, low))
         return int(steps[place - 1]) if place else -1
@@ -215,5 +215,5 @@ class ChunkBuilder:
 
 def _single(make: Callable[..., Frame | None],
             *av: str) -> Callable[[Place, Any], list[Frame | None]]:
-    """Give what makes one frame at most of a message, of a given AV perhaps."""
+    """Return what makes one frame at most of a message, of a given AV perhaps."""
     return lambda place, content: [make(place, *av, content)]

@@ -17,7 +17,7 @@ from crgame_ros.recording.run_log import read_run_log
 
 def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
     """
-    Give the frames of the whole run, each after its length in bytes; None if nobody recorded any.
+    Return the frames of the whole run, each after its length in bytes; None if nobody recorded any.
 
     :param reader: the recording.
     :param run: in it.

@@ -29,7 +29,7 @@ IntArray = NDArray[np.int64]
 
 
 def perception_topics(game: GameDocument) -> dict[str, str]:
-    """Give the topics of perception by name, with their types, and the map's."""
+    """Return the topics of perception by name, with their types, and the map's."""
     topics = {OCCUPANCY_TOPIC: 'nav_msgs/msg/OccupancyGrid'}
     for av in game.avs:
         if av.perception is not None:
@@ -66,11 +66,11 @@ class Places:
 
     @property
     def steps(self) -> IntArray:
-        """Give the step of each message."""
+        """Return the step of each message."""
         return np.array(self._first, dtype=np.int64)
 
     def span(self, low: int, high: int) -> tuple[int, int] | None:
-        """Give the first and the last log time of what concerns low <= n < high; None if none."""
+        """Return the first and the last log time of what concerns low <= n < high; None if none."""
         if not self._log_ns:
             return None
         first, last = np.frombuffer(self._first, np.int64), np.frombuffer(self._last, np.int64)
@@ -80,7 +80,7 @@ class Places:
         return self._log_ns[int(found[0])], self._log_ns[int(found[-1])]
 
     def before(self, step: int) -> int | None:
-        """Give the log time of the last message of a step before this one; None if none."""
+        """Return the log time of the last message of a step before this one; None if none."""
         found = np.flatnonzero(self.steps < step)
         return self._log_ns[int(found[-1])] if len(found) else None
 

@@ -51,5 +51,5 @@ class MarkList:
         self._marks.append(Mark(n, n, kind, subject, text))
 
     def marks(self) -> tuple[Mark, ...]:
-        """Give all marks in the order of n."""
+        """Return all marks in the order of n."""
         return tuple(sorted(self._marks, key=lambda mark: mark.n))

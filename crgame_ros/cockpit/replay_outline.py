@@ -42,7 +42,7 @@ class Outline:
         self._commands: dict[int, FloatArray] = {}
 
     def wants(self, n: int) -> bool:
-        """Tell whether the state of a step is a sample."""
+        """Return whether the state of a step is a sample."""
         return n % self.stride == 0
 
     def add_state(self, n: int, content: Any) -> None:
@@ -63,7 +63,7 @@ class Outline:
                     self._commands[n] = commands
 
     def encoded(self) -> bytes:
-        """Give the samples as STATE frames, each after its length in bytes."""
+        """Return the samples as STATE frames, each after its length in bytes."""
         game = self._run.game
         return pack(frames.encode_state(
             game.epoch, n, game.scheduler.k(n), n * game.scheduler.dt_s,

@@ -96,7 +96,7 @@ class TrackCollector:
 
     def finish(self, steps: NDArray[np.int64]) -> RunTracks:
         """
-        Give everything.
+        Return everything.
 
         :param steps: of the recorded states.
         """

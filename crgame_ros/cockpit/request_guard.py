@@ -34,7 +34,7 @@ _HEADERS = {
 def guard(access: Access, keeper: Doorkeeper,
           also: Callable[[web.Request], bool] = lambda _: False) -> Middleware:
     """
-    Give what lets requests through.
+    Return what lets requests through.
 
     :param access: who is let in.
     :param keeper: counts the connections.
@@ -55,7 +55,7 @@ def header_writer(is_static: Callable[[str], bool], frames: Callable[[web.Reques
                   = None, framed_by: str = ''
                   ) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
     """
-    Give what writes the headers of every answer.
+    Return what writes the headers of every answer.
 
     :param is_static: whether the answer to a path stays the same while its tag does.
     :param frames: addresses of pages that a page may show inside itself; None for none.
@@ -120,7 +120,7 @@ async def _answer(access: Access, request: web.Request,
 
 
 def _refusal(access: Access, request: web.Request, port: int) -> str:
-    """Say why a request is refused whatever its token, empty if it is not."""
+    """Return why a request is refused whatever its token, empty if it is not."""
     host = request.headers.get(hdrs.HOST, '')
     if not access.allows_host(host, port):
         return f'This is not the name of this server: open http://127.0.0.1:{port}/'

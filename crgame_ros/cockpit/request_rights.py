@@ -18,7 +18,7 @@ _BROWSERS = (('Firefox/', 'Firefox'), ('Edg/', 'Edge'), ('OPR/', 'Opera'),
 
 
 def granted(request: web.Request) -> Rights:
-    """Give what the browser's link or address grants."""
+    """Return what the browser's link or address grants."""
     return request.get(RIGHTS, ALL_RIGHTS)
 
 

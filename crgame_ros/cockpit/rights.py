@@ -33,25 +33,25 @@ class Rights:
 
     @classmethod
     def of(cls, role: str, seat: str = '') -> 'Rights':
-        """Give the rights of a role: direct, drive, watch or all."""
+        """Return the rights of a role: direct, drive, watch or all."""
         return cls(role in ('direct', 'all'), role in ('drive', 'all'), seat)
 
     @property
     def role(self) -> str:
-        """Give the role in words."""
+        """Return the role in words."""
         words = [word for has, word in ((self.directs, 'director'), (self.drives, 'driver'))
                  if has]
         return ' and '.join(words) or 'spectator'
 
     def narrowed(self, role: str) -> 'Rights':
-        """Give as much of a role as these rights hold."""
+        """Return as much of a role as these rights hold."""
         wanted = Rights.of(role)
         return replace(self, directs=self.directs and wanted.directs,
                        drives=self.drives and wanted.drives)
 
     def refusal(self, kind: str, action: str = '') -> str:
         """
-        Say why something may not be done, empty if it may.
+        Return why something may not be done, empty if it may.
 
         :param kind: of a message, load, invite, runs or delete.
         :param action: of the run control.
@@ -73,5 +73,5 @@ ALL_RIGHTS = Rights()
 
 
 def refusal_of(rights: Rights, message: Mapping[str, Any]) -> str:
-    """Say why a page's message is refused, empty if it is not."""
+    """Return why a page's message is refused, empty if it is not."""
     return rights.refusal(message['type'], message.get('action', ''))

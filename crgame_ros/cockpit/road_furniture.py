@@ -70,7 +70,7 @@ def _sign(sign: TrafficSign, own: list[Lanelet], network: LaneletNetwork) -> lis
 
 
 def _heading_near(line: Points, point: NDArray[np.float64]) -> tuple[float, float]:
-    """Give the distance [m] of a point to a polyline (N, 2), and its heading there [rad]."""
+    """Return the distance [m] of a point to a polyline (N, 2), and its heading there [rad]."""
     starts, along = line[:-1], np.diff(line, axis=0)
     squares = np.maximum((along ** 2).sum(axis=1), 1e-12)
     share = np.clip(((point - starts) * along).sum(axis=1) / squares, 0.0, 1.0)

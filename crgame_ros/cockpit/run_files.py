@@ -15,13 +15,13 @@ RUN_FILES = ('game.yaml', 'bag*', '*.xml', 'timing*.json', 'report*.html')
 
 
 def run_id(folder: Path) -> str:
-    """Give the name by which pages know a run; it says nothing of where it is."""
+    """Return the name by which pages know a run; it says nothing of where it is."""
     return hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
 
 
 def files_document(session: Path, epoch: int) -> dict[str, Any]:
     """
-    Give the files document.
+    Return the files document.
 
     :param session: folder of the session.
     :param epoch: of the run.
@@ -36,7 +36,7 @@ def files_document(session: Path, epoch: int) -> dict[str, Any]:
 
 
 def _contacts(folder: Path) -> list[dict[str, Any]]:
-    """Give the contacts as the timing reports of a run name them."""
+    """Return the contacts as the timing reports of a run name them."""
     found: list[dict[str, Any]] = []
     for path in sorted(folder.glob('timing*.json')):
         try:

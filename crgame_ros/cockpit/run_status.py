@@ -90,7 +90,7 @@ class RunStatus:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Give what is wrong now, the oldest first."""
+        """Return what is wrong now, the oldest first."""
         return tuple(self._alarms.values())
 
     def take(self, status: Status, t: float) -> None:
@@ -158,7 +158,7 @@ class RunStatus:
             self._calm()
 
     def document(self) -> dict[str, Any]:
-        """Give what the status document says of the run's health."""
+        """Return what the status document says of the run's health."""
         over = self.run == 'ended'
         return {'run': self.run, 'reason': self.reason, 'stays': self.stays,
                 'awaited': self.awaited, 'countdown_s': self.countdown_s,
@@ -170,7 +170,7 @@ class RunStatus:
                 'seats_lost': {} if over else self.seats_lost}
 
     def alarms_document(self) -> dict[str, Any]:
-        """Give the alarms document."""
+        """Return the alarms document."""
         return {'active': [
             {'id': alarm.id, 'kind': alarm.kind, 'subject': alarm.subject, 'text': alarm.text,
              'since_t': alarm.since_t} for alarm in self.alarms]}
@@ -245,12 +245,12 @@ class RunStatus:
             self.departures.append({'vehicle': vehicle, 't': t})
 
     def _hit(self, vehicle: str) -> Sequence[str]:
-        """Give whom the last verdict on a vehicle names."""
+        """Return whom the last verdict on a vehicle names."""
         hit: Sequence[str] = self.drivability.get(vehicle, {}).get('hit', ())
         return hit
 
     def _was_stopped(self, vehicle: str, other: str, t: float) -> bool:
-        """Tell whether one of two has just been stopped by the other."""
+        """Return whether one of two has just been stopped by the other."""
         return any({*(event.touching or ())} == {vehicle, other}
                    and abs(t - at_t) < SAME_CONTACT_S for event, at_t in self._stops.items())
 
@@ -267,7 +267,7 @@ class RunStatus:
 
 
 def _tracking(values: Mapping[str, str]) -> dict[str, float | None] | None:
-    """Give how far an AV is from its plan, now and at worst; None unless it tracks plans."""
+    """Return how far an AV is from its plan, now and at worst; None unless it tracks plans."""
     if TRACKING[0] not in values:
         return None
     return {name: _number(values.get(name)) for name in TRACKING}

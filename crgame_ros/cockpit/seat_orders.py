@@ -34,7 +34,7 @@ class SeatOrders:
         self._orders: dict[str, _Order] = {}
 
     def __contains__(self, seat: object) -> bool:
-        """Tell whether an order about a seat is on its way."""
+        """Return whether an order about a seat is on its way."""
         return seat in self._orders
 
     def note(self, demand: SeatDemand, seats: Seats, tenants: Tenants, now_s: float) -> None:
@@ -58,7 +58,7 @@ class SeatOrders:
 
     def due(self, now_s: float) -> list[SeatDemand]:
         """
-        Give the orders to send again, and forget those without an answer.
+        Return the orders to send again, and forget those without an answer.
 
         :param now_s: steady clock [s].
         """
@@ -74,7 +74,7 @@ class SeatOrders:
 
 def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
            tenant: SeatTenant | None) -> bool:
-    """Tell whether a seat is as ordered."""
+    """Return whether a seat is as ordered."""
     if entry is None:
         return False
     drives = entry['source'] == COCKPIT
@@ -86,6 +86,6 @@ def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
 
 
 def _is_in_vain(demand: SeatDemand, tenant: SeatTenant | None) -> bool:
-    """Tell whether somebody at another cockpit was quicker."""
+    """Return whether somebody at another cockpit was quicker."""
     return demand.source == COCKPIT and demand.person is not None and tenant is not None \
         and tenant.here and tenant.person.id not in (demand.person.id, demand.displaced)

@@ -78,7 +78,7 @@ class SeatTable:
         self.absent_s = {name: self.absent_s.get(name, now_s) for name in gone}
 
     def kept_for(self, seat: str, now_s: float) -> float:
-        """Give for how long a seat is still kept for who has gone [s]; 0 if it is not."""
+        """Return for how long a seat is still kept for who has gone [s]; 0 if it is not."""
         if seat in self.held or seat not in self.absent_s:
             return 0.0
         return max(0.0, self.absent_s[seat] + KEEP_S - now_s)
@@ -96,7 +96,7 @@ class SeatTable:
     def claim(self, client: str, seat: str, names: Mapping[str, str], *, person: str = '',
               may_displace: bool = True, now_s: float = 0.0) -> HeldSeat:
         """
-        Give a free seat to a client; one that it held before has to be left first.
+        Return a free seat to a client; one that it held before has to be left first.
 
         :param names: of the clients by id, for messages.
         :param person: id of the client's person.
@@ -128,7 +128,7 @@ class SeatTable:
 
     def release(self, client: str, seat: str) -> HeldSeat | None:
         """
-        Give a seat back to the driver or planner of the game.
+        Return a seat back to the driver or planner of the game.
 
         Anybody may do that with a seat that has been left.
 
@@ -210,7 +210,7 @@ class SeatTable:
     def document(self, names: Mapping[str, str], lost: Mapping[str, bool],
                  now_s: float = 0.0) -> dict[str, Any]:
         """
-        Give the seats for the page.
+        Return the seats for the page.
 
         :param names: of the clients that may drive, by id.
         :param lost: seats whose driver is silent.
@@ -259,7 +259,7 @@ class SeatTable:
 
     def holding(self, client: str, seat: str) -> HeldSeat:
         """
-        Give the seat that a client holds.
+        Return the seat that a client holds.
 
         :raises InputError: if it does not.
         """

@@ -50,7 +50,7 @@ class SensorMounts:
 
     @property
     def avs(self) -> tuple[str, ...]:
-        """Give the AVs with perception."""
+        """Return the AVs with perception."""
         return tuple(self._mounts)
 
     def add_states(self, n: int, states: FloatArray) -> None:
@@ -64,14 +64,14 @@ class SensorMounts:
             self._states.popitem(last=False)
 
     def sensor(self, frame_id: str) -> tuple[str, Mount] | None:
-        """Give AV and mount of a sensor by its frame `<av>/<sensor>`; None if it has none."""
+        """Return AV and mount of a sensor by its frame `<av>/<sensor>`; None if it has none."""
         av, _, name = frame_id.partition('/')
         mount = self._mounts.get(av, {}).get(name)
         return None if mount is None else (av, mount)
 
     def pose(self, av: str, mount: Mount, n: int) -> tuple[float, float, float] | None:
         """
-        Give x, y [m], yaw [rad] of a sensor in map at step n, of the true vehicle.
+        Return x, y [m], yaw [rad] of a sensor in map at step n, of the true vehicle.
 
         A state that was not received is reached from the nearest, at constant speed and yaw rate.
 

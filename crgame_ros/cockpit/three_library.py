@@ -24,7 +24,7 @@ _NPM_S, _PIP_S = 120.0, 600.0
 
 
 def wanted_version() -> str:
-    """Give the version that config/page_libraries/package.json pins."""
+    """Return the version that config/page_libraries/package.json pins."""
     text = (config_directory() / 'page_libraries' / 'package.json').read_text(encoding='utf-8')
     return str(json.loads(text)['dependencies']['three'])
 
@@ -69,7 +69,7 @@ def fetch_library() -> Path:
 
 
 def _places() -> Iterator[Path]:
-    """Give the folders that may hold the library: the environment's, then the user's."""
+    """Yield the folders that may hold the library: the environment's, then the user's."""
     yield Path(sys.prefix) / 'share' / PACKAGE
     home = os.environ.get('XDG_DATA_HOME') or Path.home() / '.local' / 'share'
     yield Path(home) / PACKAGE
@@ -94,7 +94,7 @@ def _installed(work: Path) -> Path:
 
 
 def _npm(work: Path) -> list[str]:
-    """Give the command of the machine's npm, or of one that pip brings into a folder."""
+    """Return the command of the machine's npm, or of one that pip brings into a folder."""
     npm = shutil.which('npm')
     if npm is not None and shutil.which('node') is not None:
         return [npm]

@@ -129,7 +129,7 @@ class LqrTracker(Tracker):
             / (max(abs(speed), TABLE_SPEEDS[0]) * heading_gain)
 
     def gain(self, speed: float) -> tuple[float, float, float]:
-        """Give K at a speed: of e [rad/m], of psi [-] and of d [-]."""
+        """Return K at a speed: of e [rad/m], of psi [-] and of d [-]."""
         magnitude = min(max(abs(speed), TABLE_SPEEDS[0]), TABLE_SPEEDS[-1])
         i = min(bisect_right(TABLE_SPEEDS, magnitude), len(TABLE_SPEEDS) - 1) - 1
         f = (magnitude - TABLE_SPEEDS[i]) / (TABLE_SPEEDS[i + 1] - TABLE_SPEEDS[i])
@@ -163,7 +163,7 @@ def error_model(speed: float, wheelbase: float, dt_s: float,
 
 def weights(speed: float, wheelbase: float, settings: LqrSettings) -> tuple[Array, Array]:
     """
-    Give the weights by Bryson's rule.
+    Return the weights by Bryson's rule.
 
     :return: Q (3, 3) and R (1, 1)
     """

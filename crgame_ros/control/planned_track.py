@@ -97,7 +97,7 @@ class PlannedTrack:
                        if abs(speed) <= PLANNED_REST]
 
     def at(self, time_s: float) -> TrackPoint:
-        """Give what is planned for a time from the first state [s], held beyond both ends."""
+        """Return what is planned for a time from the first state [s], held beyond both ends."""
         i, f = self._locate(time_s)
         v, w = self._speeds[i], self._speeds[i + 1]
         x, y = self._point(i, f)
@@ -109,16 +109,16 @@ class PlannedTrack:
                           self._ways[i] + min(1.0, max(0.0, share)) * self._lengths[i])
 
     def curvature(self, time_s: float) -> float:
-        """Give the curvature planned for a time [1/m]."""
+        """Return the curvature planned for a time [1/m]."""
         i, f = self._locate(time_s)
         return self._curvatures[i] + f * (self._curvatures[i + 1] - self._curvatures[i])
 
     def direction(self, time_s: float) -> float:
-        """Give the direction of travel at a time, 1 or -1; at rest that of the next motion."""
+        """Return the direction of travel at a time, 1 or -1; at rest that of the next motion."""
         return self._signs[min(max(int(time_s / self.time_step_s), 0), self.last)]
 
     def moves_after(self, time_s: float) -> bool:
-        """Tell whether there is motion left after a time from the first state [s]."""
+        """Return whether there is motion left after a time from the first state [s]."""
         i, _ = self._locate(time_s)
         return self._ways[-1] - self._ways[i] > SHORTEST_STEP
 
@@ -234,7 +234,7 @@ class PlannedTrack:
 
 
 def _signs(speeds: Array) -> Array:
-    """Give each segment's direction of travel; rest belongs to the motion that follows it."""
+    """Return each segment's direction of travel; rest belongs to the motion that follows it."""
     mean = 0.5 * (speeds[1:] + speeds[:-1])
     moving = np.flatnonzero(np.abs(mean) > PLANNED_REST)
     if not len(moving):

@@ -77,7 +77,7 @@ class PurePursuitTracker(Tracker):
         return Control(angle, self._speed.command(pose, reference, position.s))
 
     def look_ahead(self, speed: float) -> float:
-        """Give the look-ahead distance l_d at a speed [m]."""
+        """Return the look-ahead distance l_d at a speed [m]."""
         settings = self.settings
         return min(settings.longest_look_ahead, max(
             settings.shortest_look_ahead, settings.look_ahead_time * abs(speed)))

@@ -122,7 +122,7 @@ class SpeedController:
 
 
 def _needed(speed: float, way: float) -> float:
-    """Give the constant acceleration that ends at rest after a way [m/s^2]."""
+    """Return the constant acceleration that ends at rest after a way [m/s^2]."""
     if way > STOP_TOLERANCE:
         return -0.5 * speed * speed / way
     return -max(FIRM_DECELERATION, 0.5 * speed * speed / OVERRUN)

@@ -37,12 +37,12 @@ class Reference:
             object.__setattr__(self, 'track', PlannedTrack(self.states, self.time_step_s))
 
     def at(self, since_s: float) -> 'Reference':
-        """Give the same plan at another time, without making the curve anew [s]."""
+        """Return the same plan at another time, without making the curve anew [s]."""
         return replace(self, since_s=since_s)
 
     @property
     def used_up(self) -> bool:
-        """Tell whether now is at or beyond the last state."""
+        """Return whether now is at or beyond the last state."""
         return self.since_s >= self.track.end_s - 1e-9
 
 

@@ -51,7 +51,7 @@ class Course:
 
 def touched_side(mine: Course, other: Course, step: int) -> Side:
     """
-    Tell which side of a body another touched.
+    Return which side of a body another touched.
 
     That side beyond which all of the other was, furthest, one step before; where they overlapped
     from the start, the one through which the way out is shortest.
@@ -89,7 +89,7 @@ def kind_of(speed: float, other_speed: float, side: Side) -> Kind:
 
 def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
     """
-    Tell whether a body would not have touched another, had it braked when that was in its way.
+    Return whether a body would not have touched another, had it braked when that was in its way.
 
     It brakes along the path that it took, from its reaction time after the other came into that
     path (ahead of it, up to where they touched) and stayed, and is then never faster than it was.
@@ -132,7 +132,7 @@ def _in_the_way_since(mine: Course, other: Course, step: int, stride: int,
 
 
 def _way(mine: Course, first: int, last: int, stride: int) -> shapely.Geometry:
-    """Give what a body covers from its centre at one step to beyond its front at another."""
+    """Return what a body covers from its centre at one step to beyond its front at another."""
     centers = mine.poses[[*range(first, last, stride), last]]
     yaw = float(centers[-1, 2])
     reach = 0.5 * mine.shape.length + _BEYOND

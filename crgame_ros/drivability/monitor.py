@@ -48,12 +48,12 @@ class VehicleDrivability(NamedTuple):
 
     @property
     def is_valid(self) -> bool:
-        """Tell whether nothing is violated."""
+        """Return whether nothing is violated."""
         return not (self.collision or self.off_road)
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Say what is violated, for people."""
+        """Return what is violated, for people."""
         return tuple(text for wrong, text in (
             (self.collision, 'collision with ' + ', '.join(self.hit)),
             (self.off_road, 'off the road')) if wrong)
@@ -94,17 +94,17 @@ class DrivabilityMonitor:
 
     @property
     def verdicts(self) -> tuple[VehicleDrivability, ...]:
-        """Give all verdicts on the state that was observed last; none before the first."""
+        """Return all verdicts on the state that was observed last; none before the first."""
         return self._verdicts
 
     @property
     def changed(self) -> tuple[VehicleDrivability, ...]:
-        """Give those of them that say something new (`changes`)."""
+        """Return those of them that say something new (`changes`)."""
         return self._changed
 
     @property
     def stop(self) -> VehicleDrivability | None:
-        """Give the violation in the state observed last that ends the run, if there is one."""
+        """Return the violation in the state observed last that ends the run, if there is one."""
         return next((item for item in self._verdicts if item.stop_requested), None)
 
     def prepare(self, vehicle_states: NDArray[np.float64]) -> None:
@@ -131,7 +131,7 @@ class DrivabilityMonitor:
         self._violations.extend(self._changed)
 
     def report(self) -> tuple[VehicleDrivability, ...]:
-        """Give every verdict that said something new, in order."""
+        """Return every verdict that said something new, in order."""
         return tuple(self._violations)
 
     def set_objects(self, states: ObjectStates) -> None:

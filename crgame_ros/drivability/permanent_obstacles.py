@@ -41,7 +41,7 @@ class PermanentObstacles:
 
     def is_hit(self, index: int, center: tuple[float, float, float]) -> bool:
         """
-        Tell whether the footprint of a vehicle overlaps an occupied cell.
+        Return whether the footprint of a vehicle overlaps an occupied cell.
 
         :param index: of the vehicle.
         :param center: x [m], y [m], yaw [rad] of its centre; NaN: it is absent and hits nothing.

@@ -43,7 +43,7 @@ class Code(Special):
         return {'enum': sorted(name for name in ecodes.ecodes if name.startswith(self._prefix))}
 
     def __str__(self) -> str:
-        """Say where the names come from."""
+        """Return where the names come from."""
         return f'evdev codes ({self._prefix}...) as `evtest` prints them'
 
 
@@ -71,7 +71,7 @@ class AxisEntry:
             raise InputError(f'"rest" is {self.rest:g}', '', 'let it lie between min and max')
 
     def binding(self, axis: int, centred: bool, deadzone: float) -> AxisBinding:
-        """Give it as the program has it."""
+        """Return it as the program has it."""
         return AxisBinding(axis, self.min, self.max, self.rest, self.inverted, centred, deadzone)
 
 
@@ -126,7 +126,7 @@ class AxisPair:
     deadzone: Annotated[float, Within(0.0, 0.5)] = 0.0
 
     def bindings(self, centred: bool) -> tuple[AxisBinding, AxisBinding]:
-        """Give it as the program has it: evdev, joy."""
+        """Return it as the program has it: evdev, joy."""
         return (self.evdev.binding(self.evdev.axis, centred, self.deadzone),
                 self.joy.binding(self.joy.axis, centred, self.deadzone))
 
@@ -175,12 +175,12 @@ class ButtonEntry:
     put_back: tuple[ButtonPair, ...] = ()
 
     def gears(self, way: Literal['evdev', 'joy']) -> GearButtons:
-        """Give those of the gear as the program has them, in one way of reading the device."""
+        """Return those of the gear as the program has them, in one way of reading the device."""
         return GearButtons(*(_codes(pairs, way) for pairs in (
             self.reverse_on, self.reverse_off, self.reverse_toggle, self.reverse_held)))
 
     def lights(self, way: Literal['evdev', 'joy']) -> LightButtons:
-        """Give those of indicators and horn as the program has them."""
+        """Return those of indicators and horn as the program has them."""
         return LightButtons(*(_codes(pairs, way) for pairs in (
             self.left_indicator, self.right_indicator, self.hazard, self.horn)))
 
@@ -265,7 +265,7 @@ class DeviceFile:
                                  'mend it') from error
 
     def controls(self) -> tuple[ControlBindings, ControlBindings] | None:
-        """Give the controls as the program has them, in evdev and joy; None for a keyboard."""
+        """Return the controls as the program has them, in evdev and joy; None for a keyboard."""
         if self.steering is None or self.buttons is None:
             return None
         none = (None, None)

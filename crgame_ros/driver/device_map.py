@@ -52,12 +52,12 @@ class KeyBindings:
 
     @property
     def lights(self) -> LightButtons:
-        """Give the keys of indicators and horn."""
+        """Return the keys of indicators and horn."""
         return LightButtons(self.left_indicator, self.right_indicator, self.hazard, self.horn)
 
     def held(self, pressed: Set[int], reverse: bool, lights: int = 0) -> KeyState:
         """
-        Give the driving keys held.
+        Return the driving keys held.
 
         :param pressed: codes of all pressed keys.
         :param reverse: the gear that they have chosen.
@@ -95,7 +95,7 @@ class DeviceMap:
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
         """
-        Tell whether a device is of this map: its name matches and it has every bound control.
+        Return whether a device is of this map: its name matches and it has every bound control.
 
         :param name: the device's name.
         :param axes: its evdev axis codes.

@@ -136,7 +136,7 @@ class EvdevDevice:
 
     @property
     def name(self) -> str:
-        """Give the device's name; empty while none is open."""
+        """Return the device's name; empty while none is open."""
         return str(self._device.name) if self._device is not None else ''
 
     @property
@@ -146,7 +146,7 @@ class EvdevDevice:
 
     @property
     def keys(self) -> KeyState:
-        """Give the driving keys held on a keyboard; none held on other devices."""
+        """Return the driving keys held on a keyboard; none held on other devices."""
         if self.device_map is None or self.device_map.keys is None:
             return KeyState()
         return self.device_map.keys.held(self.decoder.pressed, self.decoder.reverse,
@@ -154,7 +154,7 @@ class EvdevDevice:
 
     @property
     def joy(self) -> JoyState:
-        """Give what the `joy` node would publish; for a keyboard, its driving keys as buttons."""
+        """Return what the `joy` node would publish; for a keyboard, its driving keys as buttons."""
         if self.device_map is not None and self.device_map.keys is not None:
             return JoyState((), tuple(map(int, self.keys)))
         rests = {axis.code: axis.rest for axis in self.layout.ranges} if self.layout else {}
@@ -162,17 +162,17 @@ class EvdevDevice:
                          self._buttons)
 
     def fileno(self) -> int | None:
-        """Give the descriptor to wait on until something can be read; None if disconnected."""
+        """Return the descriptor to wait on until something can be read; None if disconnected."""
         return self._device.fd if self._device is not None else None
 
     @property
     def force_limits(self) -> ForceLimits | None:
-        """Tell what may be asked of its motor; None without one, or where the map has none."""
+        """Return what may be asked of its motor; None without one, or where the map has none."""
         return self.device_map.force if self._can_push and self.device_map else None
 
     @property
     def force_device(self) -> Any:
-        """Give what its motor is driven through (`ForceDevice`); None without one."""
+        """Return what its motor is driven through (`ForceDevice`); None without one."""
         return self._device if self._can_push else None
 
     def poll(self, now_s: float) -> bool:
@@ -191,7 +191,7 @@ class EvdevDevice:
 
     def take_input_s(self) -> float | None:
         """
-        Give when the first input since the last call changed something, by the kernel's stamp.
+        Return when the first input since the last call changed something, by the kernel's stamp.
 
         :return: steady clock [s]; None without any, or where the kernel stamps by another clock.
         """

@@ -120,7 +120,7 @@ class ForceFeedback:
         self._effect = None
 
     def _current_effect(self, now_s: float) -> ForceEffect | None:
-        """Give the effect on the device that is there now, which may be another than before."""
+        """Return the effect on the device that is there now, which may be another than before."""
         device, limits = self._device.force_device, self._device.force_limits
         if device is None or limits is None or limits.strength == 0.0:
             self._effect = None

@@ -49,7 +49,7 @@ class IndicatorLever:
 
     @property
     def lights(self) -> int:
-        """Give what is on, as `DriverCommand.lights`."""
+        """Return what is on, as `DriverCommand.lights`."""
         horn = 0 if self._buttons.horn.isdisjoint(self._pressed) else Light.HORN
         return int((HAZARD if self._hazard else self._side) | horn)
 

@@ -45,7 +45,7 @@ class InputDelay:
             self._pending = None
 
     def total_ms(self, round_trip_ms: float | None) -> float | None:
-        """Give the delay from the hand to the answer at the page [ms]: with the way of both."""
+        """Return the delay from the hand to the answer at the page [ms]: with the way of both."""
         if self.turn_ms is None or round_trip_ms is None:
             return None
         return self.turn_ms + round_trip_ms

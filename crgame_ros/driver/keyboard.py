@@ -39,7 +39,7 @@ class KeyState(NamedTuple):
 
     @property
     def lights(self) -> int:
-        """Give what is on, as `DriverCommand.lights`."""
+        """Return what is on, as `DriverCommand.lights`."""
         return lights_of(self.left_indicator, self.right_indicator, self.horn)
 
 
@@ -94,7 +94,7 @@ class KeyboardFilter:
 
     def advanced(self, state: DriverCommand, keys: KeyState, dt_s: float) -> DriverCommand:
         """
-        Give the state after one cycle: CRG 18 for the pedals, CRG 19 for the steering.
+        Return the state after one cycle: CRG 18 for the pedals, CRG 19 for the steering.
 
         Braking takes precedence over the throttle: beta_th = b_th (1 - b_br). Both steering
         keys together hold the steering, for b_L - b_R = 0 in the first case of CRG 19.
@@ -138,7 +138,7 @@ class KeyboardFilter:
         return self.command(self.state)
 
     def look_ahead(self, keys: KeyState, dt_s: float) -> DriverCommand:
-        """Give the command of the coming cycle from the last committed state, uncommitted."""
+        """Return the command of the coming cycle from the last committed state, uncommitted."""
         return self.command(self.advanced(self.state, keys, dt_s))
 
 
@@ -162,7 +162,7 @@ class KeyboardCycles:
 
     def command(self, n: int, keys: KeyState, dt_s: float) -> DriverCommand:
         """
-        Give the command of cycle n with these keys held.
+        Return the command of cycle n with these keys held.
 
         :raises ValueError: if n is less than the cycle asked for last.
         """

@@ -29,11 +29,11 @@ class ReplayDriver(DriverSource):
         self._end = SeatWatchdog()
 
     def drives(self, n: int) -> bool:
-        """Tell whether somebody drove in the recorded cycle n."""
+        """Return whether somebody drove in the recorded cycle n."""
         return n < self._recorded and not math.isnan(self._commands[n].throttle)
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the recorded command of cycle n; after the last one that of a seat left alone."""
+        """Return the recorded command of cycle n; after the last one that of a seat left alone."""
         if n >= len(self._commands) == self._recorded:
             last = self._commands[-1] if self._commands else RELEASED
             self._end.filter(last, 0.0, dt_s, 0.0)

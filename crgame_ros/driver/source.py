@@ -50,7 +50,7 @@ class SourceSpec:
     argument: str = ''
 
     def __str__(self) -> str:
-        """Give the text that `parse_source` reads."""
+        """Return the text that `parse_source` reads."""
         return f'{self.kind}:{self.argument}' if self.argument else self.kind
 
     @property
@@ -76,7 +76,7 @@ def parse_source(text: str) -> SourceSpec:
 
 def is_replay(text: str) -> bool:
     """
-    Tell whether a driver source is a recording, which the simulation reads itself.
+    Return whether a driver source is a recording, which the simulation reads itself.
 
     :raises InputError: as `parse_source`.
     """
@@ -125,7 +125,7 @@ class DriverSource(ABC):
     @abstractmethod
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """
-        Give the command for cycle n.
+        Return the command for cycle n.
 
         :param n: the cycle, never less than the one asked for last (`reset` begins anew).
         :param dt_s: length of a cycle in simulation time [s].
@@ -141,7 +141,7 @@ class DriverSource(ABC):
         """
 
     def drives(self, n: int) -> bool:
-        """Tell whether an AV's seat is taken in cycle n; while not, it follows its plan."""
+        """Return whether an AV's seat is taken in cycle n; while not, it follows its plan."""
         return True
 
     def poll(self, now_s: float) -> bool:
@@ -154,11 +154,11 @@ class DriverSource(ABC):
         return False
 
     def fileno(self) -> int | None:
-        """Give a descriptor that becomes readable when `poll` has something to take."""
+        """Return a descriptor that becomes readable when `poll` has something to take."""
         return None
 
     def joy(self) -> JoyState | None:
-        """Give the raw device as a `joy` node would publish it; None if there is none."""
+        """Return the raw device as a `joy` node would publish it; None if there is none."""
         return None
 
     def reset(self) -> None:  # noqa: B027 - most sources remember nothing
@@ -172,7 +172,7 @@ class IdleDriver(DriverSource):
     """Nobody: every pedal released."""
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the released command."""
+        """Return the released command."""
         return RELEASED
 
 
@@ -203,7 +203,7 @@ class ScriptedDriver(DriverSource):
         return cls(parse_timeline(text, where))
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the command for cycle n."""
+        """Return the command for cycle n."""
         self._time_s = n * dt_s
         if isinstance(self.timeline, JoyTimeline):
             raw = self.timeline.raw_at(self._time_s)
@@ -215,7 +215,7 @@ class ScriptedDriver(DriverSource):
         return self._cycles.command(n, self.timeline.keys_at(self._time_s), dt_s)
 
     def joy(self) -> JoyState:
-        """Give the scripted axes and the gear, or the held keys as buttons."""
+        """Return the scripted axes and the gear, or the held keys as buttons."""
         if isinstance(self.timeline, JoyTimeline):
             raw = self.timeline.raw_at(self._time_s)
             held = self.timeline.held.keys_at(self._time_s)
@@ -286,7 +286,7 @@ class JoyDriver(DriverSource):
         return self.connected != before
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the command of the last message."""
+        """Return the command of the last message."""
         command = normalize(self._raw, self._layout, self._reverse, self._lever.lights)
         self._lever.turn(command.steering)
         return command
@@ -320,11 +320,11 @@ class EvdevDriver(DriverSource):
         return changed
 
     def fileno(self) -> int | None:
-        """Give the device's descriptor; None while disconnected."""
+        """Return the device's descriptor; None while disconnected."""
         return self.device.fileno()
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the command for cycle n from the device's state now."""
+        """Return the command for cycle n from the device's state now."""
         decoder = self.device.decoder
         if self.device.layout is not None:
             command = normalize(self.device.raw, self.device.layout, decoder.reverse,
@@ -335,7 +335,7 @@ class EvdevDriver(DriverSource):
         return command
 
     def joy(self) -> JoyState | None:
-        """Give the raw device; None while disconnected."""
+        """Return the raw device; None while disconnected."""
         return self.device.joy if self.device.connected else None
 
     def reset(self) -> None:

@@ -109,7 +109,7 @@ class SteeringTorque:
         self._end = p.end_stop_from * vehicle.max_steering_wheel_angle
 
     def slip(self, speed: float, yaw_rate: float, wheel_angle: float) -> float:
-        """Give theta alpha of the front tyres, forwards; from 1 on they slide [-]."""
+        """Return theta alpha of the front tyres, forwards; from 1 on they slide [-]."""
         share = self._mass * speed * yaw_rate / self._grip
         steady = 1.0 - math.cbrt(1.0 - min(abs(share), 1.0))
         angle = self._steering.target_angle(wheel_angle / self._full_turn, speed)
@@ -117,7 +117,7 @@ class SteeringTorque:
         return math.copysign(steady, share) + self.parameters.slip_stiffness / 3.0 * ahead
 
     def aligning(self, speed: float, yaw_rate: float, wheel_angle: float) -> float:
-        """Give the torque by which the tyres turn the wheel back [N m]."""
+        """Return the torque by which the tyres turn the wheel back [N m]."""
         if speed <= 0.0 or self._grip == 0.0:
             return 0.0
         p = self.parameters
@@ -127,18 +127,18 @@ class SteeringTorque:
         return -math.copysign(self._grip * moment, slip) * self._share * math.tanh(speed)
 
     def resistance(self, speed: float, wheel_rate: float) -> float:
-        """Give damping and friction, the more the slower the vehicle is [N m]."""
+        """Return damping and friction, the more the slower the vehicle is [N m]."""
         p = self.parameters
         friction = p.friction + p.scrub * math.exp(-abs(speed) / p.scrub_speed)
         return -p.damping * wheel_rate - friction * math.tanh(wheel_rate / p.friction_rate)
 
     def end_stop(self, wheel_angle: float) -> float:
-        """Give what holds the wheel back at its ends [N m]."""
+        """Return what holds the wheel back at its ends [N m]."""
         beyond = max(0.0, abs(wheel_angle) - self._end)
         return -math.copysign(self.parameters.end_stop * beyond, wheel_angle)
 
     def shaking(self, motion: WheelMotion) -> float:
-        """Give rumble and jolt [N m]."""
+        """Return rumble and jolt [N m]."""
         p = self.parameters
         torque = 0.0
         if motion.off_road:
@@ -151,7 +151,7 @@ class SteeringTorque:
         return torque
 
     def torque(self, motion: WheelMotion) -> float:
-        """Give the sum [N m]."""
+        """Return the sum [N m]."""
         return (self.aligning(motion.speed, motion.yaw_rate, motion.wheel_angle)
                 + self.resistance(motion.speed, motion.wheel_rate)
                 + self.end_stop(motion.wheel_angle) + self.shaking(motion))

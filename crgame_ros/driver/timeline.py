@@ -74,7 +74,7 @@ class KeyTimeline:
 
     def keys_at(self, t_s: float) -> KeyState:
         """
-        Give the keys held at a simulation time [s], rounded to the nearest nanosecond.
+        Return the keys held at a simulation time [s], rounded to the nearest nanosecond.
 
         The rounding makes n * dt meet the times in the file, whatever the step.
         """
@@ -118,7 +118,7 @@ class JoyTimeline:
         return max(self.times_s[-1], self.held.end_s)
 
     def raw_at(self, t_s: float) -> RawInput:
-        """Give the raw device of `SCRIPTED_LAYOUT` at a simulation time [s]."""
+        """Return the raw device of `SCRIPTED_LAYOUT` at a simulation time [s]."""
         after = bisect_right(self.times_s, t_s)
         if after in (0, len(self.times_s)):
             values = self.values[min(after, len(self.times_s) - 1)]

@@ -57,7 +57,7 @@ class Span:
                              '', 'let "from" be less than "to"')
 
     def interval(self, keys: tuple[str, ...]) -> KeyInterval:
-        """Give it as the program has it."""
+        """Return it as the program has it."""
         return KeyInterval(round(self.start * 1e9), round(self.end * 1e9), keys)
 
 
@@ -126,7 +126,7 @@ class JoyEntry:
                              place, 'let the times rise')
 
     def timeline(self) -> JoyTimeline:
-        """Give it as the program has it."""
+        """Return it as the program has it."""
         at = [dict(zip(self.axes, point[1:], strict=True)) for point in self.points]
         return JoyTimeline(
             tuple(point[0] for point in self.points),
@@ -178,7 +178,7 @@ def parse_timeline(text: str, where: str) -> Timeline:
 
 @lru_cache(_KEPT)
 def timeline_text(timeline: Timeline) -> str:
-    """Give a timeline as the text of a file; `parse_timeline` reads the same again."""
+    """Return a timeline as the text of a file; `parse_timeline` reads the same again."""
     if isinstance(timeline, KeyTimeline):
         document = {'keys': write(tuple(
             HeldKeys(*_seconds(held), held.keys)  # type: ignore[arg-type]

@@ -74,7 +74,7 @@ class SeatWatchdog:
     def filter(self, last_command: DriverCommand, age_s: float, dt_s: float,  # noqa: A003
                speed: float) -> DriverCommand:
         """
-        Give the command that the vehicle is to obey in this step.
+        Return the command that the vehicle is to obey in this step.
 
         :param last_command: the last one heard, finite; `RELEASED` if none has been.
         :param age_s: since it was heard, or since the run began if none was, on the steady

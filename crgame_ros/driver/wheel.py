@@ -65,7 +65,7 @@ class AxisRange:
 
     def deflection(self, raw: RawInput) -> float:
         """
-        Give the signed share of the travel from the rest: CRG 17 for theta_sw.
+        Return the signed share of the travel from the rest: CRG 17 for theta_sw.
 
         Linear on each side of the rest, exactly -1, 0 and 1 at minimum, rest and maximum
         (signs turned if inverted), clipped. Beyond the deadzone the rest of the travel is
@@ -80,7 +80,7 @@ class AxisRange:
         return math.copysign(size, -share if self.inverted else share) if size else 0.0
 
     def travel(self, raw: RawInput) -> float:
-        """Give a pedal's share of its travel from the rest, in [0, 1]: CRG 17 for ell."""
+        """Return a pedal's share of its travel from the rest, in [0, 1]: CRG 17 for ell."""
         return max(0.0, self.deflection(raw))
 
 
@@ -102,7 +102,7 @@ class GearButtons:
 
     def after(self, reverse: bool, button: int, pressed: bool) -> bool:
         """
-        Give the gear after a button changed.
+        Return the gear after a button changed.
 
         :param reverse: whether reverse was selected before.
         :param button: the button that changed.
@@ -214,7 +214,7 @@ class ControlBindings:
 
     def layout(self, reported: Mapping[int, tuple[float, float]] | None = None) -> ControlLayout:
         """
-        Give the calibrated layout.
+        Return the calibrated layout.
 
         :param reported: minimum and maximum by axis code, as the device tells them.
         :raises InputError: if the map does not fit the device.
@@ -249,7 +249,7 @@ def reported(axes: Mapping[int, float], layout: ControlLayout,
 def joy_state(axes: Mapping[int, float], pressed: Iterable[int],
               limits: Mapping[int, tuple[float, float]], buttons: Iterable[int]) -> JoyState:
     """
-    Give what the `joy` node would publish for a device, without its deadzone.
+    Return what the `joy` node would publish for a device, without its deadzone.
 
     Axes stand in the order of their codes without the hats, turned so that left and up are
     positive; buttons in the order of their codes, those from BTN_JOYSTICK on first.

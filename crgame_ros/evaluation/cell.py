@@ -58,7 +58,7 @@ class Cell:
 
     @cached_property
     def text(self) -> str:
-        """Give all of it as JSON, the same for equal cells."""
+        """Return all of it as JSON, the same for equal cells."""
         return json.dumps({item.name: getattr(self, item.name) for item in fields(self)},
                           sort_keys=True, separators=(',', ':'), allow_nan=True)
 
@@ -74,7 +74,7 @@ class Cell:
 
     @property
     def factors(self) -> dict[str, Any]:
-        """Give what tells it apart."""
+        """Return what tells it apart."""
         return {name: getattr(self, name) for name in FACTORS}
 
     @property
@@ -86,6 +86,6 @@ class Cell:
 
 
 def cell_of(text: str) -> Cell:
-    """Give the cell of its JSON."""
+    """Return the cell of its JSON."""
     values = json.loads(text)
     return Cell(**values | {'code': tuple(values['code'])})

@@ -90,12 +90,12 @@ class CellGrid:
         return (planner.digest,) if planner.choice is not None else scene.digests
 
     def as_dict(self) -> dict[str, Any]:
-        """Say it as JSON has it."""
+        """Return it as JSON has it."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """Give what `as_dict` told."""
+        """Return what `as_dict` told."""
         return cls(**values | {
             'scenes': tuple(CellScene(**scene | {'digests': tuple(scene['digests'])})
                             for scene in values['scenes']),

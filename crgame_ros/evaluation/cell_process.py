@@ -183,7 +183,7 @@ def main() -> NoReturn:
 
 
 def _messages() -> Any:
-    """Give the texts of cells; when nobody is left who asks, the process ends at once."""
+    """Yield the texts of cells; when nobody is left who asks, the process ends at once."""
     waiting: list[str] = []
     there = threading.Semaphore(0)
 

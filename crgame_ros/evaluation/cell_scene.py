@@ -164,7 +164,7 @@ def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:
 
 
 def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
-    """Give a file, and what stands beside it that it names."""
+    """Yield a file, and what stands beside it that it names."""
     files = [file]
     if key == 'occupancy':
         image = read_map_file(file).image

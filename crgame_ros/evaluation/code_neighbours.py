@@ -30,7 +30,7 @@ def code_neighbours(file: Path) -> list[Path]:
 
 
 def _texts(file: Path) -> Iterator[str]:
-    """Give the texts in a Python file that can be the name of a file in the same folder."""
+    """Yield the texts in a Python file that can be the name of a file in the same folder."""
     if file.suffix != '.py':
         return
     try:

@@ -41,7 +41,7 @@ class Content(NamedTuple):
 
     @property
     def reference(self) -> str:
-        """Give the text that stands for the file in a game."""
+        """Return the text that stands for the file in a game."""
         return f'{PREFIX}{self.digest}/{self.name}'
 
 
@@ -93,7 +93,7 @@ class ContentStore:
 
     def packed(self, digest: str) -> dict[str, bytes]:
         """
-        Give what a content holds, file by file, compressed for its way to a worker.
+        Return what a content holds, file by file, compressed for its way to a worker.
 
         :raises InputError: if it is not there.
         """

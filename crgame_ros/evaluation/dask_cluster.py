@@ -77,7 +77,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
 
 
 def default_workers() -> int:
-    """Give a process for each processor that this one may use."""
+    """Return a process for each processor that this one may use."""
     return len(os.sched_getaffinity(0))
 
 

@@ -114,7 +114,7 @@ def _look(values: argparse.Namespace) -> int:
 
 
 def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
-    """Give the plan that the command line asks for, and the folder of its evaluation."""
+    """Return the plan that the command line asks for, and the folder of its evaluation."""
     from crgame_ros.evaluation.evaluation_folder import EvaluationFolder
     from crgame_ros.evaluation.evaluation_plan import parse_plan
     from crgame_ros.yaml_text import read_yaml
@@ -142,7 +142,7 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
 
 
 def _given(values: argparse.Namespace) -> dict[str, Any]:
-    """Give what of a plan the command line says."""
+    """Return what of a plan the command line says."""
     given: dict[str, Any] = {
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
         if getattr(values, name)}

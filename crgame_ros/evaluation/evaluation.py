@@ -208,7 +208,7 @@ class _Flight:
 
     def _rows(self, future: Any, rounds: int) -> dict[str, Any] | None:
         """
-        Give the rows of a task that has ended; None where it has to be sent again.
+        Return the rows of a task that has ended; None where it has to be sent again.
 
         :raises CrgameError: if nobody can compute any.
         """

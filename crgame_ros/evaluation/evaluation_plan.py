@@ -39,7 +39,7 @@ class PlannerChoice:
 
     @property
     def name(self) -> str:
-        """Give the label, or what stands for it."""
+        """Return the label, or what stands for it."""
         return self.label or self.planner.rpartition('/')[2]
 
 
@@ -89,7 +89,7 @@ class EvaluationPlan:
         self.seed_numbers()
 
     def seed_numbers(self) -> tuple[int, ...]:
-        """Give the seeds."""
+        """Return the seeds."""
         given = self.seeds
         if isinstance(given, int) and not isinstance(given, bool) and 1 <= given <= MOST_SEEDS:
             return tuple(range(given))
@@ -101,11 +101,11 @@ class EvaluationPlan:
                          'give seeds: 5, or seeds: [3, 7]')
 
     def perceptions(self) -> dict[str, PerceptionSpec | str | None]:
-        """Give each kind of perception by its label; OWN is the games' own, None is perfect."""
+        """Return each kind of perception by its label; OWN is the games' own, None is perfect."""
         return _choices(self.perception, PerceptionSpec, 'perception', self.base)
 
     def traffics(self) -> dict[str, TrafficSpec | str | None]:
-        """Give each kind of traffic by its label; OWN is the games' own, None is none."""
+        """Return each kind of traffic by its label; OWN is the games' own, None is none."""
         return _choices(self.traffic, TrafficSpec, 'traffic', self.base)
 
 

@@ -19,7 +19,7 @@ WITHOUT = ('cockpit', 'nodes', 'ros', 'launcher', 'evaluation/summary', 'analysi
 
 @cache
 def engine_digest() -> str:
-    """Give the SHA-256 over the version and the code that every cell runs, without planners'."""
+    """Return the SHA-256 over the version and the code that every cell runs, without planners'."""
     package = Path(crgame_ros.__file__).parent
     planners = {f'{target.partition(":")[0].rpartition(".")[2]}.py'
                 for target in BUILT_IN.values()}
@@ -35,7 +35,7 @@ def engine_digest() -> str:
 @cache
 def planner_digest(name: str) -> str:
     """
-    Give the SHA-256 over the code of the module that defines a planner.
+    Return the SHA-256 over the code of the module that defines a planner.
 
     :param name: as a game names it.
     :raises InputError: if there is no such planner.

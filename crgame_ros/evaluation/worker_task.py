@@ -38,7 +38,7 @@ class Limits(NamedTuple):
 
 
 def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
-    """Give a content: as a task, so that workers hand it on and lost ones come back."""
+    """Return a content: as a task, so that workers hand it on and lost ones come back."""
     return packed
 
 

@@ -100,11 +100,11 @@ class GameDocument:
         return (*self.humans, *self.avs)
 
     def human(self, vehicle_id: str) -> DrivenHuman | None:
-        """Give a human's vehicle, None if it takes no part."""
+        """Return a human's vehicle, None if it takes no part."""
         return next((item for item in self.humans if item.id == vehicle_id), None)
 
     def av(self, vehicle_id: str) -> DrivenAv | None:
-        """Give an AV, None if it takes no part."""
+        """Return an AV, None if it takes no part."""
         return next((item for item in self.avs if item.id == vehicle_id), None)
 
 

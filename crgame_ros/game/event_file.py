@@ -13,7 +13,7 @@ _COMMON = ('name', 'label', 'kind', 'when')
 
 
 def document_entry(event: EventSpec) -> dict[str, Any]:
-    """Give an event as `/scenario/game` has it: name, label, kind, when and its parameters."""
+    """Return an event as `/scenario/game` has it: name, label, kind, when and its parameters."""
     entry = write(event)
     parameters = entry.pop(event.kind)
     return {'name': None, 'label': None, 'kind': event.kind, 'when': None} | entry | parameters

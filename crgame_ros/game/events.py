@@ -307,12 +307,12 @@ class FiredEvent:
 
     @classmethod
     def contact(cls, vehicle_id: str, other_id: str, n: int, k: int) -> 'FiredEvent':
-        """Tell that a vehicle was stopped where it touched somebody."""
+        """Return that a vehicle was stopped where it touched somebody."""
         return cls(f'{_CONTACT}{vehicle_id}{_WITH}{other_id}', n, k, 'contact')
 
     @classmethod
     def put_back(cls, vehicle_id: str, n: int, k: int) -> 'FiredEvent':
-        """Tell that a vehicle stands on its lane at n, and was elsewhere before."""
+        """Return that a vehicle stands on its lane at n, and was elsewhere before."""
         return cls(f'{PUT_BACK} {vehicle_id}', n, k, 'driver')
 
     @property

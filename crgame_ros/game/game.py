@@ -174,7 +174,7 @@ class AvSpec:
 
     @property
     def localisation_steers(self) -> bool:
-        """Tell whether a tracking controller steers by the estimated pose."""
+        """Return whether a tracking controller steers by the estimated pose."""
         return self.execution == 'tracked' and self.tracker.pose == 'estimated'
 
 

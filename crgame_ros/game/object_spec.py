@@ -128,7 +128,7 @@ class Rows(Special):
                                                'maxItems': MAX_ROWS}]}
 
     def __str__(self) -> str:
-        """Say what is wanted."""
+        """Return what is wanted."""
         return 'a CSV file, or a list of rows [t, x, y, yaw]'
 
 
@@ -226,7 +226,7 @@ class ObjectSpec:
 
     @property
     def mover(self) -> MoverType:
-        """Tell what its type is like, with everything that the game says otherwise."""
+        """Return what its type is like, with everything that the game says otherwise."""
         base = MOVER_TYPES[self.type]
         own = {name: getattr(self, name) for name in
                ('speed', 'acceleration', 'deceleration', 'headway', 'distance')}

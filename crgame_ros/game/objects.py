@@ -22,7 +22,7 @@ class Role(Enum):
 
     @property
     def is_ego(self) -> bool:
-        """Tell whether the object is a driven vehicle (a human's or an AV)."""
+        """Return whether the object is a driven vehicle (a human's or an AV)."""
         return self in (Role.HUMAN, Role.AUTONOMOUS)
 
 

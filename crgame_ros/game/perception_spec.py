@@ -109,7 +109,7 @@ class SensorSpec:
 
     def mount(self, rear_to_center: float, length: float) -> tuple[float, float, float]:
         """
-        Give its x, y [m] and yaw [rad] on the rear axle of a vehicle.
+        Return its x, y [m] and yaw [rad] on the rear axle of a vehicle.
 
         :param rear_to_center: from the vehicle's rear axle to its centre [m]
         :param length: of the vehicle, for a place in its front bumper [m]

@@ -60,19 +60,19 @@ class ScenarioScheduler:
         return self.time_step_ns / self.steps_per_tick / NS_PER_S
 
     def stamp_ns(self, n: int) -> int:
-        """Give the simulation time of step n [ns]."""
+        """Return the simulation time of step n [ns]."""
         return self.clock_offset_ns + n * self.time_step_ns // self.steps_per_tick
 
     def k(self, n: int) -> int:
-        """Give the scenario time step that step n belongs to."""
+        """Return the scenario time step that step n belongs to."""
         return self.k0 + n // self.steps_per_tick
 
     def is_tick(self, n: int) -> bool:
-        """Tell whether the scenario time advances at step n."""
+        """Return whether the scenario time advances at step n."""
         return n % self.steps_per_tick == 0
 
     def since_tick_s(self, n: int) -> float:
-        """Give the time since the scenario time last advanced [s]."""
+        """Return the time since the scenario time last advanced [s]."""
         return (n % self.steps_per_tick) * self.dt_s
 
     def step_of_stamp(self, stamp_ns: int) -> int:

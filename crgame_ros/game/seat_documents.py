@@ -172,7 +172,7 @@ def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
 
 
 def is_short(text: object, length: int, least: int = 1) -> bool:
-    """Tell whether something is a text of one line that can be shown."""
+    """Return whether something is a text of one line that can be shown."""
     return isinstance(text, str) and least <= len(text) <= length and text.isprintable()
 
 

@@ -70,5 +70,5 @@ class TrafficSpec:
 
     @property
     def is_reactive(self) -> bool:
-        """Tell whether there can be any agent."""
+        """Return whether there can be any agent."""
         return self.recorded == 'reactive' or self.agents > 0 or self.flow > 0.0

@@ -55,23 +55,23 @@ class Curve:
 
     @cached_property
     def steps(self) -> FloatArray:
-        """Give the lengths of the segments, (n - 1) [m]."""
+        """Return the lengths of the segments, (n - 1) [m]."""
         return np.asarray(np.hypot(*np.diff(self.points, axis=0).T))
 
     @cached_property
     def directions(self) -> FloatArray:
-        """Give unit vectors along the segments, (n - 1, 2)."""
+        """Return unit vectors along the segments, (n - 1, 2)."""
         return np.asarray(np.diff(self.points, axis=0) / self.steps[:, None])
 
     @cached_property
     def _bends(self) -> FloatArray:
-        """Give the curvature of segments, and of the straight parts at both ends, (n + 1)."""
+        """Return the curvature of segments, and of the straight parts at both ends, (n + 1)."""
         return np.concatenate(([0.0], np.diff(self.heading) / np.diff(self.s), [0.0]))
 
     @cached_property
     def _spans(self) -> tuple[list[float], list[tuple[float, ...]], list[float]]:
         """
-        Give the arc lengths, the segments and `_bends` for what counts with numbers.
+        Return the arc lengths, the segments and `_bends` for what counts with numbers.
 
         A segment is the x and y where it begins, its direction's, the heading and its slope.
         """
@@ -81,7 +81,7 @@ class Curve:
 
     def place(self, s: float) -> tuple[float, float, float, float, float]:
         """
-        Give what `pose_at` does at one arc length [m], and the arc length itself.
+        Return what `pose_at` does at one arc length [m], and the arc length itself.
 
         :return: s, x [m], y [m], heading [rad] and curvature [1/m]
         """
@@ -97,12 +97,12 @@ class Curve:
         return s, x + beyond * along_x, y + beyond * along_y, heading, bends[after]
 
     def heading_at(self, s: FloatArray) -> FloatArray:
-        """Give the headings at arc lengths of any shape, not wrapped [rad]."""
+        """Return the headings at arc lengths of any shape, not wrapped [rad]."""
         return np.asarray(np.interp(s, self.s, self.heading), dtype=np.float64)
 
     def pose_at(self, s: FloatArray) -> FloatArray:
         """
-        Give x [m], y [m], heading [rad] and curvature [1/m] at arc lengths.
+        Return x [m], y [m], heading [rad] and curvature [1/m] at arc lengths.
 
         :param s: (...) [m]
         :return: (..., 4); the heading is not wrapped.
@@ -117,7 +117,7 @@ class Curve:
         return result
 
     def poses(self, s: FloatArray, d: FloatArray) -> FloatArray:
-        """Give the (..., 3) poses at arc lengths and offsets (...); yaw is not wrapped."""
+        """Return the (..., 3) poses at arc lengths and offsets (...); yaw is not wrapped."""
         return beside(self.pose_at(s), d)
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -198,7 +198,7 @@ class Curve:
         return np.array(s), np.array(aside)
 
     def _within(self, s: FloatArray) -> FloatArray:
-        """Give the arc lengths from which points beyond the ends are seen: their own."""
+        """Return the arc lengths from which points beyond the ends are seen: their own."""
         return s
 
 
@@ -209,7 +209,7 @@ def arc_length(points: FloatArray) -> FloatArray:
 
 
 def nearest(points: FloatArray, samples: FloatArray) -> NDArray[np.intp]:
-    """Give the row of the sample (M, 2) that is nearest to each of points (N, 2)."""
+    """Return the row of the sample (M, 2) that is nearest to each of points (N, 2)."""
     dx, dy = points[:, :1] - samples[:, 0], points[:, 1:] - samples[:, 1]
     # In place: fresh memory takes as long as the arithmetic.
     dx *= dx

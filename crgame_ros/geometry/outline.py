@@ -18,7 +18,7 @@ CIRCLE_CORNERS = 64
 def outline(shape: Shape, circle_corners: int = CIRCLE_CORNERS,
             encloses: bool = True) -> NDArray[np.float64]:
     """
-    Give the corners (C, 2) of a shape around its centre, in turn [m].
+    Return the corners (C, 2) of a shape around its centre, in turn [m].
 
     :param circle_corners: of the polygon that stands for a circle.
     :param encloses: whether that polygon lies around the circle, or its corners on it.
@@ -59,7 +59,7 @@ def placed_at(corners: NDArray[np.float64], x: float, y: float,
 def half_extents(lengths: NDArray[np.float64], widths: NDArray[np.float64],
                  turn: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """
-    Give half of what rectangles extend along and across a direction, each of the same shape [m].
+    Return half of what rectangles extend along and across a direction, each of the same shape [m].
 
     :param turn: from that direction to the rectangles' own [rad]
     """

@@ -88,14 +88,14 @@ class ReferencePath(Curve):
         return self.curvature.take(index) + self._bend_slopes.take(index) * share
 
     def _cells(self, s: Array) -> tuple[NDArray[np.intp], Array]:
-        """Give the samples before arc lengths, and the share of the way to the next ones."""
+        """Return the samples before arc lengths, and the share of the way to the next ones."""
         # fmax and fmin prefer a number to NaN.
         position = np.fmin(np.fmax(s / self.step, 0.0), self._last)
         index = position.astype(np.intp)
         return index, position - index
 
     def place(self, s: float) -> tuple[float, float, float, float, float]:
-        """Give what `pose_at` does at one arc length [m], and that arc length on the path."""
+        """Return what `pose_at` does at one arc length [m], and that arc length on the path."""
         # Comparisons take a third of the time of `min` and `max`.
         if s < 0.0:
             s = 0.0
@@ -115,7 +115,7 @@ class ReferencePath(Curve):
                 curvature + to_curvature * share)
 
     def rows(self, first: float, last: float, least: int = 1) -> slice:
-        """Give the samples between two arc lengths [m], `least` segments or more."""
+        """Return the samples between two arc lengths [m], `least` segments or more."""
         end = len(self._rows) - 1
         low = int(min(max(first / self.step, 0), end - least))
         return slice(low, int(min(max(last / self.step, low + least), end)) + 1)
@@ -139,7 +139,7 @@ class ReferencePath(Curve):
         return s.reshape(shape), d.reshape(shape)
 
     def _within(self, s: Array) -> Array:
-        """Give arc lengths on the path: points beyond it are seen from its ends."""
+        """Return arc lengths on the path: points beyond it are seen from its ends."""
         return np.minimum(np.maximum(s, 0.0), self.length)
 
     def locate(self, x: float, y: float, guess: float) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 def ahead(x: float, y: float, yaw: float, distance: float) -> tuple[float, float]:
     """
-    Give the point at a distance ahead of a pose.
+    Return the point at a distance ahead of a pose.
 
     :param distance: negative is behind it [m]
     :return: its x and y [m]
@@ -22,7 +22,7 @@ def ahead(x: float, y: float, yaw: float, distance: float) -> tuple[float, float
 
 def joined(*parts: Array) -> Array:
     """
-    Give numbers as columns (..., n), in half of the time that `numpy.stack` takes.
+    Return numbers as columns (..., n), in half of the time that `numpy.stack` takes.
 
     :param parts: of the first one's shape (...), or those that are the same for all of it.
     """
@@ -59,7 +59,7 @@ def beside(poses: Array, d: Array) -> Array:
 
 def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
     """
-    Give how far points are ahead of poses, and how far to their left.
+    Return how far points are ahead of poses, and how far to their left.
 
     :param poses: (..., 3 or more) x [m], y [m], yaw [rad]
     :param points: (..., 2) [m]
@@ -72,7 +72,7 @@ def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
 
 def shifted_velocities(yaw: Array, velocities: Array, distance: Array | float) -> Array:
     """
-    Give the velocities of points ahead of others on the same rigid bodies.
+    Return the velocities of points ahead of others on the same rigid bodies.
 
     :param yaw: (...) [rad]
     :param velocities: (..., 3) [m/s, m/s, rad/s]

@@ -46,7 +46,7 @@ class RigidTransform:
 
     @property
     def is_identity(self) -> bool:
-        """Tell whether the transform leaves every pose as it is."""
+        """Return whether the transform leaves every pose as it is."""
         return self.yaw_offset == 0.0 and self.offset_x == 0.0 and self.offset_y == 0.0
 
     def to_scenario(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:

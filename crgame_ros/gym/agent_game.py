@@ -120,7 +120,7 @@ class AgentGame:
 
     @property
     def seats(self) -> list[AgentSeat]:
-        """Give the agents' seats."""
+        """Return the agents' seats."""
         return self.game.seats
 
     def begin(self, seed: int) -> None:
@@ -134,7 +134,7 @@ class AgentGame:
         self.game.act(actions)
 
     def observed(self, number: int) -> Observed:
-        """Give what an agent sees, by part."""
+        """Return what an agent sees, by part."""
         seen = observe_together(self._observations[number], [self.seats[number]])
         return {part: values[0] for part, values in seen.items()}
 
@@ -168,7 +168,7 @@ class AgentGame:
 
 
 def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Observed:
-    """Give what the agents of several games see, (B, …) by part."""
+    """Return what the agents of several games see, (B, …) by part."""
     poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
     velocities = np.stack([seat.around.velocities for seat in seats])
     return observation.of([seat.state for seat in seats], [seat.place for seat in seats],

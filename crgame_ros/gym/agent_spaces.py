@@ -9,12 +9,12 @@ import numpy as np
 
 
 def observation_space(spec: ObservationSpec) -> spaces.Dict:
-    """Give the space of observations: a box of float32 for each part."""
+    """Return the space of observations: a box of float32 for each part."""
     return spaces.Dict({part: spaces.Box(low, high, dtype=np.float32)
                         for part, (low, high) in spec.bounds().items()})
 
 
 def action_space(kind: ActionKind) -> spaces.Box:
-    """Give the space of actions: a box of float32."""
+    """Return the space of actions: a box of float32."""
     low, high = action_bounds(kind)
     return spaces.Box(low, high, dtype=np.float32)

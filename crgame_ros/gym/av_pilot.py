@@ -50,7 +50,7 @@ class AvPilot:
 
     def look(self, result: StepResult, states: NDArray[np.float64]) -> Surrounded:
         """
-        Give what the agent is told of at a tick.
+        Return what the agent is told of at a tick.
 
         :param states: (V, 8) of all driven vehicles, rear axle, simulation coordinates
         """
@@ -80,5 +80,5 @@ class AvPilot:
 
 
 def stacked(states: list[VehicleState]) -> NDArray[np.float64]:
-    """Give the states (V, 8) of driven vehicles as an array."""
+    """Return the states (V, 8) of driven vehicles as an array."""
     return np.array(states, dtype=np.float64).reshape(-1, STATE_WIDTH)

@@ -37,7 +37,7 @@ class ContactSearch:
     def hits(self, row: int, centers: Array, since_s: Sequence[float], before: ObjectStates,
              after: ObjectStates) -> tuple[str, ...]:
         """
-        Give the ids of whom a vehicle has touched.
+        Return the ids of whom a vehicle has touched.
 
         :param row: of the vehicle among the driven ones.
         :param centers: (T, V, 3) of them at the steps after a tick, the last at the next tick
@@ -68,7 +68,7 @@ class ContactSearch:
 
     def _near(self, row: int, own: Array, centers: Array, since_s: Sequence[float],
               before: ObjectStates, after: ObjectStates) -> list[int]:
-        """Give the numbers of those whose circles could meet the vehicle's in the tick."""
+        """Return the numbers of those whose circles could meet the vehicle's in the tick."""
         reach = self._radii + (self._radii[row] + CIRCLE_SLACK)
         apart = centers[:, :, :2] - own[:, None, :2]
         near = (np.einsum('tvi,tvi->tv', apart, apart).min(axis=0) <= reach * reach)
@@ -89,7 +89,7 @@ class ContactSearch:
 
     def _way(self, number: int, centers: Array, since_s: Sequence[float], before: ObjectStates,
              after: ObjectStates) -> Array:
-        """Give the poses (T, 3) of somebody at the steps."""
+        """Return the poses (T, 3) of somebody at the steps."""
         if number < self._driven:
             return centers[:, number]
         index = number - self._driven

@@ -78,7 +78,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
                 outcome.info)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Give a picture (H, W, 3) in the mode `rgb_array`; the page shows itself."""
+        """Return a picture (H, W, 3) in the mode `rgb_array`; the page shows itself."""
         self._need_begun()
         if self.render_mode != 'rgb_array':
             return None
@@ -94,7 +94,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
 
     @property
     def page(self) -> str | None:
-        """Give the address of the page; None before the first reset and in other modes."""
+        """Return the address of the page; None before the first reset and in other modes."""
         return None if self._viewer is None else self._viewer.url
 
     def _show(self, begin: bool = False) -> None:

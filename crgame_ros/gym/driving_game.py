@@ -79,7 +79,7 @@ class AgentSeat:
 
     @property
     def state(self) -> VehicleState:
-        """Give its present state, rear axle, coordinates of the road."""
+        """Return its present state, rear axle, coordinates of the road."""
         return self.around.state
 
 

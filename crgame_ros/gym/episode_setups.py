@@ -58,7 +58,7 @@ class EpisodeSetups:
 
     def make(self, seed: int, guides: Mapping[str, RouteGuide]) -> Setup:
         """
-        Give the setup of an episode: the same for the same seed.
+        Return the setup of an episode: the same for the same seed.
 
         :param guides: routes of the vehicles whose start varies, by id.
         """
@@ -84,7 +84,7 @@ class EpisodeSetups:
 
     def _moved(self, state: VehicleState, guide: RouteGuide, transform: RigidTransform,
                speed_share: float, along_share: float) -> VehicleState:
-        """Give a start that is varied by shares in [-1, 1] of what it may."""
+        """Return a start that is varied by shares in [-1, 1] of what it may."""
         speed = max(0.0, state.speed + speed_share * self._vary.speed)
         if not self._vary.along:
             return state._replace(speed=speed)

@@ -61,7 +61,7 @@ def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
 
 
 def _file(game: Path | str) -> Path:
-    """Give the file of a game: a shipped one by its name alone."""
+    """Return the file of a game: a shipped one by its name alone."""
     shipped = scenarios_directory() / f'{game}.yaml'
     if isinstance(game, str) and '/' not in game and shipped.is_file():
         return shipped

@@ -97,7 +97,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         return self._seen(), rewards, terminated, truncated, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Give a picture of each game in the mode `rgb_array`."""
+        """Return a picture of each game in the mode `rgb_array`."""
         if self.render_mode is None:
             return None
         if self._painter is None:

@@ -40,7 +40,7 @@ class GoalWatch:
 
     def is_met(self, state: VehicleState, k: int) -> bool:
         """
-        Tell whether a state meets the goal.
+        Return whether a state meets the goal.
 
         :param state: of the rear axle, scenario coordinates.
         :param k: its scenario time step.

@@ -172,7 +172,7 @@ class PageViewer:
 
 
 def _plans(game: DrivingGame, place: tuple[int, int, int, float]) -> dict[str, bytes]:
-    """Give the frames of the plans that AVs follow."""
+    """Return the frames of the plans that AVs follow."""
     setup: Setup = game.setup
     made = {}
     for index, av in enumerate(game.simulation.avs):

@@ -59,11 +59,11 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         self._painter: ScenePainter | None = None
 
     def observation_space(self, agent: str) -> spaces.Dict:
-        """Give the space of an agent's observations."""
+        """Return the space of an agent's observations."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Box:
-        """Give the space of an agent's actions."""
+        """Return the space of an agent's actions."""
         return self.action_spaces[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -101,7 +101,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
                 {agent: item.info for agent, item in outcomes.items()})
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Give a picture (H, W, 3) around the first agent in the mode `rgb_array`."""
+        """Return a picture (H, W, 3) around the first agent in the mode `rgb_array`."""
         if self.render_mode is None:
             return None
         if self._painter is None:

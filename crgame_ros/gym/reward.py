@@ -38,12 +38,12 @@ class Decision(NamedTuple):
     measures: TickMeasures | None = None
 
     def shortage(self, measure: str, threshold: float) -> float:
-        """Give how far a measure is below a threshold: 0 if it is not, 1 where nothing is left."""
+        """Return how far a measure is below a threshold: 0 if it is not, 1 where nothing is left."""
         value = self.worst(measure)
         return max(0.0, 1.0 - value / threshold) if value == value else 0.0
 
     def worst(self, measure: str) -> float:
-        """Give the most critical value of a measure."""
+        """Return the most critical value of a measure."""
         assert self.measures is not None
         return float(self.measures.worst()[0][COLUMN[measure]])
 
@@ -135,6 +135,6 @@ class Reward:
         self.is_measured = any(TERMS[name].is_measured for name in weights)
 
     def of(self, decision: Decision) -> tuple[float, dict[str, float]]:
-        """Give the reward, and the value of each term before its weight."""
+        """Return the reward, and the value of each term before its weight."""
         values = {name: value(decision) for name, value, _ in self._terms}
         return sum(weight * values[name] for name, _, weight in self._terms), values

@@ -44,7 +44,7 @@ class ScenePainter:
         self._humans = len(setup.humans)
 
     def paint(self, game: DrivingGame) -> NDArray[np.uint8]:
-        """Give a picture (HEIGHT, WIDTH, 3) of the present state."""
+        """Return a picture (HEIGHT, WIDTH, 3) of the present state."""
         states = game.simulation.states
         seat = game.seats[0]
         middle = np.array(states[seat.row][:2])
@@ -76,6 +76,6 @@ class ScenePainter:
 
 
 def _pixels(points: Points, middle: Points) -> list[tuple[float, float]]:
-    """Give places in the picture; its rows count downwards."""
+    """Return places in the picture; its rows count downwards."""
     shown = (points - middle) * (SCALE, -SCALE) + (0.5 * WIDTH, 0.5 * HEIGHT)
     return [(x, y) for x, y in shown.tolist()]

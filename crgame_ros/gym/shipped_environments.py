@@ -19,7 +19,7 @@ def shipped_games() -> tuple[str, ...]:
 
 
 def environment_id(game: str) -> str:
-    """Give the id of a shipped game's environment, such as crgame/CutIn-v0."""
+    """Return the id of a shipped game's environment, such as crgame/CutIn-v0."""
     return f'{NAMESPACE}/{"".join(word.capitalize() for word in game.split("_"))}-v0'
 
 

@@ -182,7 +182,7 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
 
 
 def cockpit_host(request: RunRequest) -> str:
-    """Give the address on which the page is served."""
+    """Return the address on which the page is served."""
     return request.listen or ('0.0.0.0' if request.open_cockpit else '127.0.0.1')
 
 

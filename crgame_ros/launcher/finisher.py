@@ -109,6 +109,6 @@ class Finisher:
 
 
 def _is_closed(folder: Path) -> bool:
-    """Tell whether the recorder has closed a run's last recording."""
+    """Return whether the recorder has closed a run's last recording."""
     bags = bags_of(folder)
     return bool(bags) and (bags[-1] / METADATA_FILE).is_file()

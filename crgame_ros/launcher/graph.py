@@ -177,12 +177,12 @@ class Graph:
 
 
 def cause_of_death(code: int) -> str:
-    """Say how a process ended, from its exit code."""
+    """Return how a process ended, from its exit code."""
     return f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
 
 
 def restarted(spec: NodeSpec, count: int) -> NodeSpec:
-    """Give the spec of a node that is started again: a recorder continues in a new folder."""
+    """Return the spec of a node that is started again: a recorder continues in a new folder."""
     if spec.executable != 'recorder_node':
         return spec
     folder = Path(spec.parameters['directory'].strip('"'))

@@ -44,7 +44,7 @@ LAUNCH_ARGUMENTS = {
 
 def launch_words(values: Mapping[str, str]) -> list[str]:
     """
-    Give the command line of the launcher.
+    Return the command line of the launcher.
 
     :param values: of `LAUNCH_ARGUMENTS`; those left out have their defaults.
     :raises InputError: if an argument is unknown, or a flag is neither true nor false.

@@ -36,7 +36,7 @@ class NodeSpec:
         return f'crgame_ros.nodes.{self.executable}'
 
     def arguments(self, namespace: str = '/') -> list[str]:
-        """Give the arguments of the command line, for a graph in a namespace."""
+        """Return the arguments of the command line, for a graph in a namespace."""
         ros = ['--ros-args', '-r', f'__node:={self.name}', '-r', f'__ns:={namespace}']
         for key, value in self.parameters.items():
             ros += ['-p', f'{key}:={value}']
@@ -65,7 +65,7 @@ class NodeProcess:
         self._rest = b''
 
     def read_lines(self) -> list[str]:
-        """Give the complete lines that have come since the last call."""
+        """Return the complete lines that have come since the last call."""
         while True:
             try:
                 data = os.read(self.output.fileno(), 65536)
@@ -81,7 +81,7 @@ class NodeProcess:
         return [line.decode('utf-8', 'replace').rstrip() for line in lines]
 
     def exit_code(self) -> int | None:
-        """Give the exit code, negative for a signal; None while it runs."""
+        """Return the exit code, negative for a signal; None while it runs."""
         if self._code is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             self._code = os.waitstatus_to_exitcode(status) if pid else None

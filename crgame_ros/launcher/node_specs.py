@@ -63,7 +63,7 @@ def shared_modules(specs: Sequence[NodeSpec], plan: RunPlan) -> list[str]:
 
 
 def at_end(request: RunRequest) -> str:
-    """Say what follows the end of a run: who can begin another one wants to see how it went."""
+    """Return what follows the end of a run: who can begin another one wants to see how it went."""
     if request.headless:
         return EXIT
     return STAY if request.duration_s is None else STAY_IF_CHOSEN
@@ -133,7 +133,7 @@ class Roster:
         self._seen: tuple[int, int] | None = None
 
     def changed_specs(self) -> list[NodeSpec]:
-        """Give the nodes that the vehicles need, if the file has changed; else none."""
+        """Return the nodes that the vehicles need, if the file has changed; else none."""
         try:
             stat = self._path.stat()
         except OSError:

@@ -179,7 +179,7 @@ def naming(request: RunRequest) -> Iterator[None]:
 
 
 def _own_recording(request: RunRequest) -> Path | None:
-    """Give the recording whose own game is asked for, None if there is another game."""
+    """Return the recording whose own game is asked for, None if there is another game."""
     if request.driver is None or request.game is not None or request.scenario is not None:
         return None
     source = parse_source(request.driver)

@@ -19,7 +19,7 @@ _NS_PER_S = 1_000_000_000
 
 def header_stamp_ns(data: bytes) -> int:
     """
-    Give the stamp of a serialised message that begins with a std_msgs/Header [ns].
+    Return the stamp of a serialised message that begins with a std_msgs/Header [ns].
 
     :param data: CDR with its header.
     """
@@ -29,12 +29,12 @@ def header_stamp_ns(data: bytes) -> int:
 
 
 def stamp_of(message: Any) -> int:
-    """Give the stamp of a message that has been decoded, by whichever library [ns]."""
+    """Return the stamp of a message that has been decoded, by whichever library [ns]."""
     return int(message.header.stamp.sec) * _NS_PER_S + int(message.header.stamp.nanosec)
 
 
 def aligned(place: int, size: int) -> int:
-    """Give the next place in a serialised message that CDR aligns to so many bytes."""
+    """Return the next place in a serialised message that CDR aligns to so many bytes."""
     return place + (HEADER_BYTES - place) % size
 
 

@@ -58,16 +58,16 @@ class Topic:
 
     @property
     def available(self) -> bool:
-        """Tell whether it is there: only an optional one may not be."""
+        """Return whether it is there: only an optional one may not be."""
         return not self.optional or find_spec(self.type_name.partition('/')[0]) is not None
 
     @property
     def placeholder(self) -> str | None:
-        """Give the placeholder in the name, if any."""
+        """Return the placeholder in the name, if any."""
         return next((item for item in PLACEHOLDERS if item in self.name), None)
 
     def names(self, humans: Sequence[str], avs: Sequence[str]) -> tuple[str, ...]:
-        """Give the topic's names in a run with these vehicles."""
+        """Return the topic's names in a run with these vehicles."""
         groups = {'<hv>': humans, '<av>': avs, '<v>': (*humans, *avs)}
         if self.placeholder is None:
             return (self.name,)
@@ -75,7 +75,7 @@ class Topic:
                      for vehicle in groups[self.placeholder])
 
     def name_for(self, vehicle_id: str) -> str:
-        """Give the topic's name for one vehicle."""
+        """Return the topic's name for one vehicle."""
         return self.name if self.placeholder is None else self.name.replace(
             self.placeholder, vehicle_id)
 
@@ -93,7 +93,7 @@ class Service:
     what: str
 
     def names(self, avs: Sequence[str]) -> tuple[str, ...]:
-        """Give the service's names in a run with these AVs."""
+        """Return the service's names in a run with these AVs."""
         if '<av>' not in self.name:
             return (self.name,)
         return tuple(self.name.replace('<av>', av) for av in avs)

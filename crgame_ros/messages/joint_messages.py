@@ -70,7 +70,7 @@ class JointReader:
 
     def read(self, message: Any) -> FloatArray:
         """
-        Give (3, joints) positions, velocities and accelerations.
+        Return (3, joints) positions, velocities and accelerations.
 
         :raises InputError: if a joint is missing, or one of somebody else is there.
         """
@@ -86,7 +86,7 @@ class JointReader:
 
     def order(self, names: Sequence[str]) -> list[int]:
         """
-        Tell where the joints are among those of a message.
+        Return where the joints are among those of a message.
 
         :raises InputError: as `read`.
         """

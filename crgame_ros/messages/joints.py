@@ -75,7 +75,7 @@ def vehicle_to_joints(
     state: VehicleState,
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """
-    Give a vehicle's joint positions, velocities and accelerations (4 each).
+    Return a vehicle's joint positions, velocities and accelerations (4 each).
 
     The angular accelerations are no part of the model and stay NaN.
     """
@@ -92,7 +92,7 @@ def vehicles_from_joints(
     accelerations: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """
-    Give vehicle states from joints; the inverse of `vehicle_to_joints` up to rounding.
+    Return vehicle states from joints; the inverse of `vehicle_to_joints` up to rounding.
 
     :param positions: (..., 4) x, y, yaw, steering
     :param velocities: (..., 4)
@@ -113,7 +113,7 @@ def vehicles_from_joints(
 
 def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSeries:
     """
-    Give a plan as joints.
+    Return a plan as joints.
 
     :param vehicle_id: the AV it is for.
     :param time_step_ns: Delta t_c [ns]

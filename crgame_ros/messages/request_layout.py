@@ -53,7 +53,7 @@ class RequestLayout:
 
     def indices(self, index: Mapping[str, int]) -> Index:
         """
-        Give everybody's index (T).
+        Return everybody's index (T).
 
         :raises InputError: if somebody has none.
         """

@@ -49,7 +49,7 @@ class WorldMessages:
 
     def vehicle_joints(self, message: Any) -> FloatArray:
         """
-        Give (3, V, 4) positions, velocities and accelerations of the vehicles' joints.
+        Return (3, V, 4) positions, velocities and accelerations of the vehicles' joints.
 
         :raises InputError: if the message is another run's.
         """
@@ -57,7 +57,7 @@ class WorldMessages:
 
     def vehicle_states(self, message: Any) -> FloatArray:
         """
-        Give (V, 8) states, columns as in `StateColumn`.
+        Return (V, 8) states, columns as in `StateColumn`.
 
         :raises InputError: if the message is another run's.
         """
@@ -65,7 +65,7 @@ class WorldMessages:
 
     def object_states(self, message: Any) -> ObjectStates:
         """
-        Give the objects' states.
+        Return the objects' states.
 
         :raises InputError: if the message is another run's.
         """

@@ -133,7 +133,7 @@ class DriverNode(Node):
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
 
     def _policy_world(self) -> 'PolicyWorld':
-        """Give what a policy looks at; it is subscribed to once, and only where one drives."""
+        """Return what a policy looks at; it is subscribed to once, and only where one drives."""
         if self._world is None:
             from crgame_ros.ros.live_policy import PolicyWorld
             self._world = PolicyWorld(self._endpoints)

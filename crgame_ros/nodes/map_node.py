@@ -78,7 +78,7 @@ class MapNode(Node):
 
     def _near(self, occupancy: TiledOccupancy, points: NDArray[np.float64]
               ) -> OccupancyGrid | None:
-        """Give the neighbourhood of the vehicles, without the last ones if they are too far."""
+        """Return the neighbourhood of the vehicles, without the last ones if they are too far."""
         count = len(points)
         while count > 1 and not occupancy.fits(points[:count], self._reach):
             count -= 1

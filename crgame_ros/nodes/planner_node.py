@@ -202,7 +202,7 @@ class PlannerNode(Node):
 
 
 def _path(plan: Plan, transform: RigidTransform) -> Path:
-    """Give a plan for people: rear-axle poses in map, whatever frame its AV plans in."""
+    """Return a plan for people: rear-axle poses in map, whatever frame its AV plans in."""
     message = Path()
     message.header.frame_id = MAP
     message.header.stamp = to_time(plan.stamp_ns)

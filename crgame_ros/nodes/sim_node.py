@@ -101,7 +101,7 @@ class SimNode(Node):
             offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S
 
     def _all_sit(self, setup: Setup) -> bool:
-        """Tell whether somebody is in each seat that the game leaves to people at pages."""
+        """Return whether somebody is in each seat that the game leaves to people at pages."""
         tenants = self._control.seat_tenants
         return all(human.id in tenants and tenants[human.id].here
                    for human in setup.humans if human.driver == COCKPIT)

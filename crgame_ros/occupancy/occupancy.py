@@ -25,7 +25,7 @@ class OccupancyGrid:
 
     def occupied_at(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """
-        Tell which points are in occupied cells; outside the grid nothing is.
+        Return which points are in occupied cells; outside the grid nothing is.
 
         :param points: (..., 2) [m]
         :return: (...)
@@ -44,7 +44,7 @@ class OccupancyMap(Protocol):
 
     def near(self, points: NDArray[np.float64], reach_m: float) -> OccupancyGrid | None:
         """
-        Give at least everything within a reach of points.
+        Return at least everything within a reach of points.
 
         :param points: (N, 2), frame map [m]; NaN points are left out.
         :param reach_m: how far around the points [m]

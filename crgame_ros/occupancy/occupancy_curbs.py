@@ -66,7 +66,7 @@ def _without_gaps(surface: shapely.Geometry, min_island: float) -> shapely.Multi
 
 
 def _leads_on(lanelet: Lanelet, is_exit: bool, known: dict[int, Lanelet]) -> bool:
-    """Tell whether a lanelet, or one beside it, has another one behind this end."""
+    """Return whether a lanelet, or one beside it, has another one behind this end."""
     pending, seen = [(lanelet, is_exit)], {lanelet.lanelet_id}
     while pending:
         here, out = pending.pop()

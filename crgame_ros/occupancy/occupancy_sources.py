@@ -51,7 +51,7 @@ def open_tiles(path: Path) -> TileSource:
 
 
 def tile_name(row: int, column: int) -> str:
-    """Give the name of a tile's YAML file."""
+    """Return the name of a tile's YAML file."""
     return f'tile_{row}_{column}.yaml'
 
 

@@ -69,13 +69,13 @@ class TiledOccupancy:
         return x, y, x + self._source.columns * self._size, y + self._source.rows * self._size
 
     def fits(self, points: NDArray[np.float64], reach_m: float) -> bool:
-        """Tell whether `near` may be asked for this: whether it is small enough for memory."""
+        """Return whether `near` may be asked for this: whether it is small enough for memory."""
         tiles = self._range(points, reach_m)
         return tiles is None or _count(tiles) <= self.max_tiles
 
     def near(self, points: NDArray[np.float64], reach_m: float) -> OccupancyGrid | None:
         """
-        Give the tiles that a reach around points touches, as one rectangular grid.
+        Return the tiles that a reach around points touches, as one rectangular grid.
 
         Every cell of the grid is as in the map. The array is read-only.
 

@@ -130,7 +130,7 @@ def _fill(part: Path, raster: Raster, name: str, progress: Progress | None
 
 
 def _pixels(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Give the image of cells: the top row is the largest y."""
+    """Return the image of cells: the top row is the largest y."""
     return np.where(occupied[::-1], OCCUPIED, FREE).astype(np.uint8)
 
 

@@ -80,11 +80,11 @@ class SensedBodies:
 
     @property
     def poses(self) -> Array:
-        """Give the (M, 3) centre poses last given to `place`."""
+        """Return the (M, 3) centre poses last given to `place`."""
         return self._poses
 
     def near(self, x: float, y: float, reach: float) -> tuple[Edges, Discs]:
-        """Give what may be within `reach` of a point: the outlines of the bodies around it [m]."""
+        """Return what may be within `reach` of a point: the outlines of the bodies around it [m]."""
         distance = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
         # False where absent: a comparison with NaN.
         close = distance <= self.radii + reach

@@ -40,7 +40,7 @@ class BorderCells:
 
 
 def _border(grid: OccupancyGrid) -> Array:
-    """Give the lower left corners (C, 2) of all cells of a grid's occupied borders [m]."""
+    """Return the lower left corners (C, 2) of all cells of a grid's occupied borders [m]."""
     occupied = grid.occupied
     covered = np.zeros(occupied.shape, dtype=bool)
     covered[1:-1, 1:-1] = (occupied[:-2, 1:-1] & occupied[2:, 1:-1]

@@ -67,7 +67,7 @@ class Localisation:
     @property
     def estimate(self) -> VehicleState:
         """
-        Give the vehicle's state as the filter has it.
+        Return the vehicle's state as the filter has it.
 
         Its speed never has the wrong sign: the gear is known.
         """
@@ -83,7 +83,7 @@ class Localisation:
 
     @property
     def lost(self) -> bool:
-        """Tell whether the pose is not measured at present."""
+        """Return whether the pose is not measured at present."""
         return self._n < self._lost_until
 
     def step(self, n: int, truth: VehicleState) -> None:
@@ -143,7 +143,7 @@ class Localisation:
         self._covariance = 0.5 * (covariance + covariance.T)
 
     def _deviations(self, truth: VehicleState) -> Array:
-        """Give the standard deviations (4) of a measurement of x, y, yaw and speed."""
+        """Return the standard deviations (4) of a measurement of x, y, yaw and speed."""
         spec = self._spec
         speed = min(spec.speed_noise, ENCODER_REST) if abs(truth.speed) < ENCODER_REST \
             else spec.speed_noise

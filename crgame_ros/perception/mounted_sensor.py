@@ -63,11 +63,11 @@ class MountedSensor:
                                  _PER_THING * count + spec.rays, block=1)
 
     def fires(self, n: int) -> bool:
-        """Tell whether it scans at step n."""
+        """Return whether it scans at step n."""
         return n % self.period == 0
 
     def pose(self, carrier: VehicleState) -> Pose:
-        """Give its x, y [m] and yaw [rad] on a vehicle in some state."""
+        """Return its x, y [m] and yaw [rad] on a vehicle in some state."""
         x, y, yaw = self.mount
         cos, sin = math.cos(carrier.yaw), math.sin(carrier.yaw)
         return (carrier.x + cos * x - sin * y, carrier.y + sin * x + cos * y,

@@ -34,13 +34,13 @@ class KeyedNoise:
         self._uniform: Array = np.empty(0)
 
     def normal(self, n: int) -> Array:
-        """Give the standard normal numbers (width) of step n."""
+        """Return the standard normal numbers (width) of step n."""
         row = self._row(n)
         numbers: Array = self._normal[row]
         return numbers
 
     def uniform(self, n: int) -> float:
-        """Give the number of step n that is uniform in [0, 1)."""
+        """Return the number of step n that is uniform in [0, 1)."""
         row = self._row(n)
         return float(self._uniform[row])
 

@@ -108,7 +108,7 @@ class Perception:
 
     @property
     def scans(self) -> tuple[tuple[SensorSpec, int, Scan], ...]:
-        """Give the latest scan of each sensor and the step n that it was made at."""
+        """Return the latest scan of each sensor and the step n that it was made at."""
         return tuple(self._scans.values())
 
     @property

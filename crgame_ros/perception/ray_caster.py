@@ -112,6 +112,6 @@ class RayCaster(Sensor):
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Give the cross products (N) of plane vectors (N, 2)."""
+    """Return the cross products (N) of plane vectors (N, 2)."""
     product: Array = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return product

@@ -53,13 +53,13 @@ class Tracks:
         self._until_n[things] = np.maximum(self._until_n[things], until_n)
 
     def known(self, n: int) -> NDArray[np.bool_]:
-        """Tell which things (T) are seen or remembered at step n."""
+        """Return which things (T) are seen or remembered at step n."""
         found: NDArray[np.bool_] = n < self._until_n
         return found
 
     def predict(self, things: Index, n: int, times_s: Array) -> tuple[Array, Array]:
         """
-        Tell where known things are at step n and go from there.
+        Return where known things are at step n and go from there.
 
         :param things: (D) which things
         :param times_s: (P) from n on [s]

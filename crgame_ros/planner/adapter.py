@@ -137,5 +137,5 @@ def describe(error: Exception) -> str:
 
 
 def reason_kind(reason: str) -> str:
-    """Give a reason for braking with `#` for its numbers, so that like ones are counted."""
+    """Return a reason for braking with `#` for its numbers, so that like ones are counted."""
     return re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)

@@ -50,7 +50,7 @@ def braking_plan(request: PlanRequest, last_plan: Plan | None, vehicle: VehicleP
 
 def _steering_over_distance(request: PlanRequest, last_plan: Plan | None,
                             ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the last plan's steering angles over the distance from the ego, (n) and (n)."""
+    """Return the last plan's steering angles over the distance from the ego, (n) and (n)."""
     here = np.zeros(1), np.array([request.ego.steering_angle])
     if last_plan is None or len(last_plan.states) < 2:
         return here

@@ -40,7 +40,7 @@ class _Slice:
         self._whole = whole
 
     def collide(self, body: pycrcc.RectOBB) -> bool:
-        """Tell whether the ego there touches an obstacle or is off the road."""
+        """Return whether the ego there touches an obstacle or is off the road."""
         return self._checker.collide(body) or self._whole.is_off_road(body)
 
 
@@ -92,12 +92,12 @@ class CollisionSlices:
             self._slices.append(_Slice(checker, self))
 
     def is_off_road(self, body: pycrcc.RectOBB) -> bool:
-        """Tell whether a pose of the ego is off the road, further than now."""
+        """Return whether a pose of the ego is off the road, further than now."""
         x, y = body.center()
         return self._limit.is_beyond(float(x), float(y), body.orientation(), self.road_tolerance)
 
     def time_slice(self, k: int) -> '_Slice':
-        """Give the obstacles at scenario time step k, the last ones beyond the horizon."""
+        """Return the obstacles at scenario time step k, the last ones beyond the horizon."""
         return self._slices[min(max(k - self._k, 0), len(self._slices) - 1)]
 
     def _near(self, request: PlanRequest, poses: Array) -> NDArray[np.intp]:
@@ -119,7 +119,7 @@ class CollisionSlices:
         return None
 
     def _follows(self, ego: VehicleState, pose: Array, name: str) -> bool:
-        """Tell whether an obstacle drives behind the ego's rear in its lane, or into it."""
+        """Return whether an obstacle drives behind the ego's rear in its lane, or into it."""
         dx, dy = float(pose[0]) - ego.x, float(pose[1]) - ego.y
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         rear, width, shape = self._vehicle.rear, self._vehicle.width, self._described(name)

@@ -157,7 +157,7 @@ class IdmPlanner(PathPlanner):
     def speeds(self, request: PlanRequest, lane: SideLane = OWN_LANE, there: bool = False,
                alone: bool = False) -> Array:
         """
-        Give the model's speeds over the horizon, for planners that need a target.
+        Return the model's speeds over the horizon, for planners that need a target.
 
         :param lane: for which to ask.
         :param there: as if the ego were in that lane already.
@@ -178,7 +178,7 @@ class IdmPlanner(PathPlanner):
 
     def has_gap(self, request: PlanRequest, lane: SideLane, ahead_too: bool = True) -> bool:
         """
-        Tell whether the ego may change into a lane beside the path.
+        Return whether the ego may change into a lane beside the path.
 
         :param ahead_too: False to look at who is beside and behind only.
         """
@@ -242,7 +242,7 @@ class IdmPlanner(PathPlanner):
 
 def _needed(speed: float, gap: float, other: float) -> float:
     """
-    Give the deceleration that takes the speed down to another one's within a gap [m/s^2].
+    Return the deceleration that takes the speed down to another one's within a gap [m/s^2].
 
     Towards one that comes nearer (v' < 0) it is that to a stop, v^2 / 2 a - v' v / a = s.
     """
@@ -284,7 +284,7 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
 
 def _let_in(entry_s: float, overlap: float, speed: float) -> float:
     """
-    Give the acceleration with which somebody faster gets in ahead; infinity if none does.
+    Return the acceleration with which somebody faster gets in ahead; infinity if none does.
 
     Whoever is beside already is not helped by hard braking: lane and speed are held then.
 

@@ -52,7 +52,7 @@ class PlannerContext:
 
     @cached_property
     def road(self) -> 'RoadBoundary':
-        """Give the boundary of the scenario's road, made at first use: ask for it in `setup`."""
+        """Return the boundary of the scenario's road, made at first use: ask for it in `setup`."""
         from crgame_ros.roads.road_boundary import RoadBoundary
         return RoadBoundary(self.scenario.lanelet_network)
 

@@ -25,7 +25,7 @@ DECELERATION = 2.5
 def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequest, s: float,
             offset: float, vehicle: VehicleParameters, ahead_too: bool = True) -> bool:
     """
-    Tell whether the ego may change into the lane beside it.
+    Return whether the ego may change into the lane beside it.
 
     It may if nobody is beside it there, and if who is behind and who is in front are so far away
     that the one behind, reacting late and braking moderately, keeps `SHORTEST`.
@@ -59,6 +59,6 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
 
 
 def _closing(speed: float) -> float:
-    """Give the way that it takes to react and brake a closing speed down [m]."""
+    """Return the way that it takes to react and brake a closing speed down [m]."""
     faster = max(speed, 0.0)
     return REACTION_S * faster + faster ** 2 / (2.0 * DECELERATION)

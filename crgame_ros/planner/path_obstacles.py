@@ -55,7 +55,7 @@ class Corridor:
         return max(abs(self.d), abs(self.target))
 
     def bounds(self, path: ReferencePath, s: Array) -> tuple[Array, Array]:
-        """Give the least and the greatest offset that the ego covers at arc lengths s [m]."""
+        """Return the least and the greatest offset that the ego covers at arc lengths s [m]."""
         u = (s - self.front - self.s) / max(self.return_length, 1.0)
         u = np.minimum(np.maximum(u, 0.0), 1.0)
         offset = self.d + (self.target - self.d) * (u * u * (3.0 - 2.0 * u))
@@ -178,7 +178,7 @@ class ObstacleProjector:
 
 def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
     """
-    Give predicted poses and velocities (steps, M, 3).
+    Return predicted poses and velocities (steps, M, 3).
 
     Beyond the request's P points objects keep their last velocity.
     """

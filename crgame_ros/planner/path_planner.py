@@ -23,7 +23,7 @@ RESERVE = 300.0
 
 
 def initial_state(context: PlannerContext) -> VehicleState:
-    """Give the rear-axle state at which a planning problem starts; it declares the centre."""
+    """Return the rear-axle state at which a planning problem starts; it declares the centre."""
     start = context.planning_problem.initial_state
     (x, y), yaw = start.position[:2].tolist(), float(start.orientation)
     return VehicleState(*ahead(x, y, yaw, -context.vehicle.rear_to_center), yaw,
@@ -54,7 +54,7 @@ class PathPlanner(Planner):
 
     @property
     def driving(self) -> DrivingPath:
-        """Give the path that is followed now; `locate` may replace it."""
+        """Return the path that is followed now; `locate` may replace it."""
         return self._driving
 
     @abstractmethod

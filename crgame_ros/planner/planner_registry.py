@@ -93,7 +93,7 @@ class PlannerRegistry(ModelRegistry):
 
     def wants_lights(self, name: str) -> bool:
         """
-        Tell whether a planner asks for others' lights.
+        Return whether a planner asks for others' lights.
 
         One that cannot be found asks for nothing: who is to make it says why it cannot be.
         """

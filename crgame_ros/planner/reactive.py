@@ -149,7 +149,7 @@ class ReactivePlanner(Planner):
         yield from sorted(aim for aim in aims if aim is not None)
 
     def _look(self, request: PlanRequest, position: PathPosition) -> float:
-        """Give the arc length at which lanes are looked for [m]."""
+        """Return the arc length at which lanes are looked for [m]."""
         return position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
 
     def _aim(self, request: PlanRequest, position: PathPosition, lane: SideLane,
@@ -225,7 +225,7 @@ class ReactivePlanner(Planner):
 
     def _open_offsets(self, request: PlanRequest, position: PathPosition) -> set[float]:
         """
-        Give the outermost offsets among the lanes of the same direction that may be used.
+        Return the outermost offsets among the lanes of the same direction that may be used.
 
         Those are the lane that the ego is in, and the ones where nobody is beside it and whoever
         comes from behind has the room that a lane change leaves him.
@@ -262,7 +262,7 @@ class ReactivePlanner(Planner):
         return max(2, round(share * self._span_s / dt_s)) * dt_s
 
     def _within(self, bounds: Array, s: float, speed: float) -> tuple[float, float]:
-        """Give the offsets that stay within bounds as far as the vehicle can get."""
+        """Return the offsets that stay within bounds as far as the vehicle can get."""
         first = int(s / self._driving.path.step)
         last = first + int((speed + 5.0) * self._horizon / self._driving.path.step) + 1
         return float(bounds[first:last, 0].max()), float(bounds[first:last, 1].min())

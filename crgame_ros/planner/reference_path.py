@@ -164,7 +164,7 @@ def _before(roads: RoadNetwork, lanelet: int, line: Array) -> Array:
 
 
 def _direction(points: Array) -> Array:
-    """Give the unit vector from the first to the last of a few points."""
+    """Return the unit vector from the first to the last of a few points."""
     chord = points[-1] - points[0]
     return np.asarray(chord / max(float(np.hypot(*chord)), 1e-6))
 

@@ -54,7 +54,7 @@ class RoadLimit:
 
     def is_beyond(self, x: float, y: float, yaw: float, tolerance: float = 0.0) -> bool:
         """
-        Tell whether a pose is off the road, further than now.
+        Return whether a pose is off the road, further than now.
 
         :param x: of the vehicle's centre [m]
         :param y: likewise [m]

@@ -29,7 +29,7 @@ class Rollout:
 
     @property
     def states(self) -> NDArray[np.float64]:
-        """Give all states up to the last step (steps + 1, 8)."""
+        """Return all states up to the last step (steps + 1, 8)."""
         return np.array(self._rows, dtype=np.float64)
 
     def step(self, acceleration: float, steering_rate: float, moving_s: float) -> None:

@@ -61,7 +61,7 @@ class LaneChange:
         self._s = kept.start_s
 
     def judge(self, request: PlanRequest) -> Verdict:
-        """Tell what the change may do now."""
+        """Return what the change may do now."""
         ego = request.ego
         here = np.array([[ego.x, ego.y]])
         path = self.kept.path

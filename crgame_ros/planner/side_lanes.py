@@ -107,7 +107,7 @@ def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, reach: Reach) 
 
 
 def _widths(roads: RoadNetwork, lanelet: int, s: float, reach: Reach) -> Iterator[float]:
-    """Give the widths of a lanelet and of what may be used on its right and left [m]."""
+    """Yield the widths of a lanelet and of what may be used on its right and left [m]."""
     own = roads.lanelet_network.find_lanelet_by_id(lanelet)
     yield roads.width_at(lanelet, s)
     for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),

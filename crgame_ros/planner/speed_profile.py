@@ -36,7 +36,7 @@ def default_speed(problem: PlanningProblem) -> float:
 
 def desired_speeds(driving: DrivingPath, wanted: float | None, default: float) -> Array:
     """
-    Give the desired speed along a path.
+    Return the desired speed along a path.
 
     :param wanted: the planner's option v0; None takes the signs, or the default without any [m/s]
     :param default: `default_speed` [m/s]

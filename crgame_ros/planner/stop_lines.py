@@ -97,7 +97,7 @@ def _find(scenario: Scenario, driving: DrivingPath) -> tuple[StopLine, ...]:
 
 
 def _turn(driving: DrivingPath, index: int) -> str:
-    """Tell where the route turns behind the lanelet: left, right or straight."""
+    """Return where the route turns behind the lanelet: left, right or straight."""
     if index + 1 >= len(driving.lanelets):
         return 'straight'
     start, end = driving.path.pose_at(driving.lanelet_spans[index + 1])[:, 2]

@@ -47,7 +47,7 @@ class WantedMotion(NamedTuple):
 
 def action_bounds(kind: ActionKind) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """
-    Give the least and greatest values of an action.
+    Return the least and greatest values of an action.
 
     :return: (2) for `acceleration` and `pedals`; (10, 4) for `plan`: x and y [m] of the rear axle
         as seen from its present pose, yaw from the present one [rad] and speed [m/s]
@@ -76,7 +76,7 @@ def checked_action(kind: ActionKind, action: Any) -> Array:
 
 def wanted_motion(action: Array, speed: float, vehicle: VehicleParameters) -> WantedMotion:
     """
-    Give what an action `acceleration` asks for.
+    Return what an action `acceleration` asks for.
 
     :param action: (2) in [-1, 1]: 1 is 4 m/s^2, -1 is braking by 8 m/s^2; then the share of the
         curvature that the vehicle can drive at its speed, left positive
@@ -90,7 +90,7 @@ def wanted_motion(action: Array, speed: float, vehicle: VehicleParameters) -> Wa
 
 def pedals(action: Array) -> DriverCommand:
     """
-    Give the command of an action `pedals`.
+    Return the command of an action `pedals`.
 
     :param action: (2) in [-1, 1]: throttle, below 0 brake; steering wheel, left positive
     """
@@ -160,7 +160,7 @@ def _stated(points: Array, ego: VehicleState, vehicle: VehicleParameters, dt_s: 
 
 def _steering(states: Array, turn: Array, vehicle: VehicleParameters,
               dt_s: float) -> Sequence[float]:
-    """Give the angles (S - 1) that turn the heading so, as fast as the wheels follow."""
+    """Return the angles (S - 1) that turn the heading so, as fast as the wheels follow."""
     angle, angles = float(states[0, StateColumn.STEERING_ANGLE]), []
     speeds = states[:, StateColumn.SPEED]
     for mean, turned in zip((0.5 * (speeds[1:] + speeds[:-1])).tolist(), turn.tolist(),

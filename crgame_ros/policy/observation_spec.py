@@ -93,7 +93,7 @@ class ObservationSpec:
             raise InputError('"parts" names one twice')
 
     def bounds(self) -> dict[str, tuple[NDArray[np.float32], NDArray[np.float32]]]:
-        """Give the least and greatest values of each part, in the order of `parts`."""
+        """Return the least and greatest values of each part, in the order of `parts`."""
         return {part: self._bounds_of(part) for part in self.parts}
 
     def _bounds_of(self, part: Part) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -30,7 +30,7 @@ class PedalInverse:
 
     def command(self, wanted: WantedMotion, speed: float) -> DriverCommand:
         """
-        Give the command for a motion, forwards.
+        Return the command for a motion, forwards.
 
         :param speed: present one [m/s]
         """
@@ -49,7 +49,7 @@ class PedalInverse:
         return DriverCommand(throttle, brake, self._wheel(wanted.curvature, speed))
 
     def _wheel(self, curvature: float, speed: float) -> float:
-        """Give the normalised steering for a curvature."""
+        """Return the normalised steering for a curvature."""
         angle, full = math.atan(self._vehicle.wheelbase * curvature), \
             self._vehicle.max_steering_wheel_angle
         turned = 0.0
@@ -59,7 +59,7 @@ class PedalInverse:
 
 
 def _travel(share: float, shape: float) -> float:
-    """Give the pedal's travel in [0, 1] whose response (CRG 20) is a share."""
+    """Return the pedal's travel in [0, 1] whose response (CRG 20) is a share."""
     if share >= pedal_response(1.0, shape):
         return 1.0
     return -math.log(1.0 - max(share, 0.0)) / shape

@@ -48,7 +48,7 @@ class DrivenSeat:
 
     @property
     def id(self) -> str:  # noqa: A003
-        """Give the id of the vehicle."""
+        """Return the id of the vehicle."""
         return self.driven[self.row].id
 
 
@@ -96,7 +96,7 @@ class PolicyDriver(DriverSource):
         self._decided_speed = state.speed
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the command of the action in force; released before there is one."""
+        """Return the command of the action in force; released before there is one."""
         if self._action is None:
             return RELEASED
         if self._policy.action == 'pedals':

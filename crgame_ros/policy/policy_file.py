@@ -50,7 +50,7 @@ class Policy:
 
     @property
     def spec(self) -> ObservationSpec:
-        """Give what it is told."""
+        """Return what it is told."""
         return read(ObservationSpec, dict(self.observation), 'observation of the policy')
 
 

@@ -73,7 +73,7 @@ class RouteGuide:
         self._s = self._search(state)
 
     def follow(self, state: VehicleState) -> RoutePlace:
-        """Give where the vehicle is now, which it was near before."""
+        """Return where the vehicle is now, which it was near before."""
         path, before = self.driving.path, self._s
         s, d, heading = path.locate(state.x, state.y, before)
         if not (abs(d) < LOST and abs(s - before) < JUMP):
@@ -107,7 +107,7 @@ class RouteGuide:
 
 
 def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
-    """Give the arc length at which the route comes to its goal; inf without one."""
+    """Return the arc length at which the route comes to its goal; inf without one."""
     if problem is None or not driving.reaches_goal:
         return math.inf
     path = driving.path
@@ -126,5 +126,5 @@ def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
 
 
 def goal_area(position: Shape) -> shapely.Geometry:
-    """Give the area of a goal's position."""
+    """Return the area of a goal's position."""
     return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))

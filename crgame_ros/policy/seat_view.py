@@ -44,7 +44,7 @@ class RequestView:
         self._rows = {item.id: row for row, item in enumerate(self.things)}
 
     def of(self, request: PlanRequest) -> Surrounded:
-        """Give what is around the AV at the time of the request; the predictions stay unread."""
+        """Return what is around the AV at the time of the request; the predictions stay unread."""
         poses, velocities = np.full((2, len(self.things), 3), np.nan)
         rows = [self._rows[name] for name in request.obstacle_ids]
         poses[rows], velocities[rows] = request.obstacle_poses[0], request.obstacle_velocities[0]
@@ -70,7 +70,7 @@ class SeatView:
         self.things = (*(driven[i] for i in self._rows), *others)
 
     def own(self, states: Array) -> VehicleState:
-        """Give the vehicle's own state of all states (V, 8) in simulation coordinates."""
+        """Return the vehicle's own state of all states (V, 8) in simulation coordinates."""
         state = VehicleState(*states[self._row].tolist())
         if self._transform.is_identity:
             return state
@@ -79,7 +79,7 @@ class SeatView:
 
     def of(self, states: Array, objects: ObjectStates) -> Surrounded:
         """
-        Give what is around it.
+        Return what is around it.
 
         :param states: (V, 8) rear axles, simulation coordinates
         :param objects: (M) at the same time.
@@ -97,5 +97,5 @@ class SeatView:
         return Surrounded(self.own(states), poses, velocities)
 
     def in_simulation(self, poses: Array) -> Array:
-        """Give poses (..., 3) of the road's coordinates in those of the simulation."""
+        """Return poses (..., 3) of the road's coordinates in those of the simulation."""
         return poses if self._transform.is_identity else self._transform.to_simulation(poses)

@@ -44,47 +44,47 @@ class Run(ABC):
     @property
     @abstractmethod
     def log(self) -> RunLog:
-        """Tell how everybody moved, at the scenario's time steps."""
+        """Return how everybody moved, at the scenario's time steps."""
 
     @property
     @abstractmethod
     def record(self) -> RunRecord:
-        """Give the log, and what drivers did, and events."""
+        """Return the log, and what drivers did, and events."""
 
     @property
     @abstractmethod
     def outcome(self) -> Mapping[str, Any] | None:
-        """Give planners, violations and contacts, as `timing.json` has them; None: not known."""
+        """Return planners, violations and contacts, as `timing.json` has them; None: not known."""
 
     @property
     def answers(self) -> 'dict[str, PlanRecord]':
-        """Tell what planners answered, by AV, as far as it is known."""
+        """Return what planners answered, by AV, as far as it is known."""
         from crgame_ros.analysis.scores.plan_record import plans_of_report
         return plans_of_report(self.outcome)
 
     @property
     def contacts(self) -> list[dict[str, Any]] | None:
-        """Give the first contacts, as `timing.json` has them; None where nobody knows."""
+        """Return the first contacts, as `timing.json` has them; None where nobody knows."""
         return None if self.outcome is None else self.outcome['contacts']
 
     @property
     def violations(self) -> list[dict[str, Any]] | None:
-        """Give what was violated, as `timing.json` has it; None where nobody knows."""
+        """Return what was violated, as `timing.json` has it; None where nobody knows."""
         return None if self.outcome is None else self.outcome['drivability']['list']
 
     @property
     @abstractmethod
     def notices(self) -> tuple[str, ...]:
-        """Tell what is to be known of it, one line each."""
+        """Return what is to be known of it, one line each."""
 
     @property
     def state_hash(self) -> str | None:
-        """Give the SHA-256 over all states of an offline run; None of a recording."""
+        """Return the SHA-256 over all states of an offline run; None of a recording."""
         return None
 
     @property
     def timing(self) -> Mapping[str, Any] | None:
-        """Tell what `timing.json` says; None of an offline run, or without recorded cycles."""
+        """Return what `timing.json` says; None of an offline run, or without recorded cycles."""
         return None
 
     @property
@@ -94,28 +94,28 @@ class Run(ABC):
 
     @property
     def game(self) -> GameDocument:
-        """Give the game as it was run."""
+        """Return the game as it was run."""
         return self.log.game
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        """Give the ids of the driven vehicles: humans, then AVs."""
+        """Return the ids of the driven vehicles: humans, then AVs."""
         return tuple(item.id for item in self.log.vehicles)
 
     @property
     def duration_s(self) -> float:
-        """Tell how long it lasted, on the scenario's time line [s]."""
+        """Return how long it lasted, on the scenario's time line [s]."""
         return float((len(self.log.ks) - 1) * self.game.scheduler.time_step_s)
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Give the times of the scenario steps of the log since the run's start (K) [s]."""
+        """Return the times of the scenario steps of the log since the run's start (K) [s]."""
         scheduler = self.game.scheduler
         return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """
-        Give the rear-axle states (K, 8) of a driven vehicle, columns as in `StateColumn`.
+        Return the rear-axle states (K, 8) of a driven vehicle, columns as in `StateColumn`.
 
         :raises KeyError: if it takes no part.
         """
@@ -129,18 +129,18 @@ class Run(ABC):
 
     @abstractmethod
     def setup_against(self, planner: str) -> Setup:
-        """Give the same game with another planner, to drive its humans again."""
+        """Return the same game with another planner, to drive its humans again."""
 
     @abstractmethod
     def recorded_inputs(self) -> RecordedInputs | None:
-        """Give what its humans did; None where the setup names the recording that has it."""
+        """Return what its humans did; None where the setup names the recording that has it."""
 
     @abstractmethod
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
-        """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
+        """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
 
     def recorded_plans(self) -> 'Callable[[], Iterable[RecordedPlan]] | None':
-        """Give what reads the recorded plans one by one; None where nobody keeps them."""
+        """Return what reads the recorded plans one by one; None where nobody keeps them."""
         return None
 
     @cached_property
@@ -189,7 +189,7 @@ class Run(ABC):
 
     def tables(self, scores: bool = True) -> 'dict[str, pa.Table]':
         """
-        Give its tables by name: runs, vehicles, states, pairs and so on (docs/tables.md).
+        Return its tables by name: runs, vehicles, states, pairs and so on (docs/tables.md).
 
         :param scores: whether vehicles are scored, which takes most of the time.
         """
@@ -197,14 +197,14 @@ class Run(ABC):
         return tables_of([self.tabulated(scores)])
 
     def tabulated(self, scores: bool = True) -> 'TabulatedRun':
-        """Give it as tables want it."""
+        """Return it as tables want it."""
         from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
         return TabulatedRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
                             self.recorded_plans(), self._offline, scores)
 
     def reported(self, key: str = 'run1') -> 'ReportRun':
         """
-        Give it as reports want it.
+        Return it as reports want it.
 
         :param key: tells it from others of a report.
         """

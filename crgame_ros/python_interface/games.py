@@ -32,7 +32,7 @@ def load_game(path: FileName) -> Game:
 
 def as_game(game: Game | FileName | None) -> Game:
     """
-    Give a game, or that of a file; None is the cut-in.
+    Return a game, or that of a file; None is the cut-in.
 
     :raises InputError: as `load_game`.
     """
@@ -43,7 +43,7 @@ def as_game(game: Game | FileName | None) -> Game:
 
 def as_path(path: object, where: str) -> Path:
     """
-    Give a path.
+    Return a path.
 
     :param where: name of the argument.
     :raises InputError: if it is none.

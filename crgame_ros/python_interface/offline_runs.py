@@ -51,45 +51,45 @@ class OfflineRun(Run):
 
     @cached_property
     def record(self) -> RunRecord:
-        """Give the log, and what drivers did, and events."""
+        """Return the log, and what drivers did, and events."""
         return run_record_of(self.result)
 
     @property
     def log(self) -> RunLog:
-        """Tell how everybody moved, at the scenario's time steps."""
+        """Return how everybody moved, at the scenario's time steps."""
         return self.record.log
 
     @property
     def state_hash(self) -> str:
-        """Give the SHA-256 over all states: equal for equal inputs."""
+        """Return the SHA-256 over all states: equal for equal inputs."""
         return self.result.state_hash
 
     @cached_property
     def outcome(self) -> Mapping[str, Any]:
-        """Give planners, violations and contacts, as `timing.json` has them."""
+        """Return planners, violations and contacts, as `timing.json` has them."""
         return offline_outcome(self.result)
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Tell what is to be known of the game, one line each."""
+        """Return what is to be known of the game, one line each."""
         return self.result.setup.notices
 
     def summary(self) -> dict[str, Any]:
-        """Say what came of it, as `crgame offline` does."""
+        """Return what came of it, as `crgame offline` does."""
         return run_summary(self.result, self.wall_s)
 
     def setup_against(self, planner: str) -> Setup:
-        """Give the same game with another planner, and its events when they were."""
+        """Return the same game with another planner, and its events when they were."""
         setup = self.result.setup
         repeated = replace(setup, game=with_recorded_events(setup.game, self.result.fired))
         return with_planners(repeated, (planner,))
 
     def recorded_inputs(self) -> RecordedInputs:
-        """Give what its humans did."""
+        """Return what its humans did."""
         return inputs_of(self.result)
 
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
-        """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
+        """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return {name: self.result.states_of(name) for name in self.result.setup.vehicle_ids}
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:

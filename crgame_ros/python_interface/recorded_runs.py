@@ -45,17 +45,17 @@ class RecordedRun(Run):
 
     @property
     def log(self) -> RunLog:
-        """Tell how everybody moved, at the scenario's time steps."""
+        """Return how everybody moved, at the scenario's time steps."""
         return self._log
 
     @cached_property
     def record(self) -> RunRecord:
-        """Give the log, and what drivers did, and events."""
+        """Return the log, and what drivers did, and events."""
         return record_of_log(self._bag, self._log)
 
     @cached_property
     def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
-        """Tell what `timing.json` says, or why nothing does."""
+        """Return what `timing.json` says, or why nothing does."""
         try:
             return timing_report(self._bag, self.game.epoch, self._log), ()
         except CrgameError as error:
@@ -63,24 +63,24 @@ class RecordedRun(Run):
 
     @property
     def timing(self) -> Mapping[str, Any] | None:
-        """Tell what `timing.json` says; None of a recording without cycles."""
+        """Return what `timing.json` says; None of a recording without cycles."""
         return self._timed[0]
 
     @property
     def outcome(self) -> Mapping[str, Any] | None:
-        """Give planners, violations and contacts; None of a recording without cycles."""
+        """Return planners, violations and contacts; None of a recording without cycles."""
         return self.timing
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Tell what of the run is not in the recording, one line each."""
+        """Return what of the run is not in the recording, one line each."""
         timing, refusal = self._timed
         told = () if timing is None else timing['notices']
         return tuple(dict.fromkeys((*told, *self._log.notices, *refusal)))
 
     def setup_against(self, planner: str) -> Setup:
         """
-        Give the recorded game, driven by the recording, with another planner.
+        Return the recorded game, driven by the recording, with another planner.
 
         :raises InputError: if the recording lacks its game, or holds a later run.
         """
@@ -93,11 +93,11 @@ class RecordedRun(Run):
         """Give nothing: the setup names the recording."""
 
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
-        """Give the states (N, 8) of its vehicles at the simulation steps from 0 on."""
+        """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return recorded_states(self._bag, self.game.epoch)
 
     def recorded_plans(self) -> Callable[[], Iterable[RecordedPlan]]:
-        """Give what reads the recorded plans one by one."""
+        """Return what reads the recorded plans one by one."""
         return partial(read_plans, self._bag, self.game.epoch)
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
@@ -121,7 +121,7 @@ def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:
 
 def as_run(run: Run | FileName) -> Run:
     """
-    Give a run, or that in a folder.
+    Return a run, or that in a folder.
 
     :raises InputError: as `read_run`.
     """

@@ -10,7 +10,7 @@ from crgame_ros.simulation.offline import OfflineResult
 
 def run_summary(result: OfflineResult, wall_s: float) -> dict[str, Any]:
     """
-    Say what came of a run, as JSON has it.
+    Return what came of a run, as JSON has it.
 
     :param wall_s: how long it took [s]
     """

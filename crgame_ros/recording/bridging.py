@@ -70,7 +70,7 @@ def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioSchedul
 
 
 def farthest(scheduler: ScenarioScheduler) -> int:
-    """Give how many steps n two states may be apart that are joined."""
+    """Return how many steps n two states may be apart that are joined."""
     return scheduler.steps_for(LONGEST_GAP_S) + scheduler.steps_per_tick
 
 
@@ -80,14 +80,14 @@ def _ends(ns: IntArray, scheduler: ScenarioScheduler) -> IntArray:
 
 
 def piece_around(ns: IntArray, n: int, scheduler: ScenarioScheduler) -> IntArray:
-    """Give those of increasing steps that no gap parts from step n."""
+    """Return those of increasing steps that no gap parts from step n."""
     pieces = np.split(ns, _ends(ns, scheduler) + 1)
     return next(piece for piece in pieces if n <= piece[-1])
 
 
 def _told(gaps: Sequence[tuple[int, str]], first: int, last: int, last_seen: int,
           k0: int) -> list[str]:
-    """Say which scenario steps a stretch has, where that are not all."""
+    """Return which scenario steps a stretch has, where that are not all."""
     if gaps:
         texts = [text for _, text in sorted(gaps)]
         more = f' and {len(texts) - _TOLD} times more' if len(texts) > _TOLD else ''
@@ -106,7 +106,7 @@ def _told(gaps: Sequence[tuple[int, str]], first: int, last: int, last_seen: int
 def bridge_objects(ticks: IntArray, points: Mapping[int, FloatArray], dt_s: float,
                    joints: int) -> FloatArray:
     """
-    Give the points of all objects at ticks, those that were not recorded from those around them.
+    Return the points of all objects at ticks, those that were not recorded from those around them.
 
     Poses are cubic by the velocities at both ends, velocities linear. Whoever is absent, or is
     not the same any more, at one of both ends is absent in between.
@@ -148,7 +148,7 @@ def _between(first: FloatArray, second: FloatArray, time_s: float,
 def bridged_notice(topic: str, ticks: IntArray, recorded: IntArray,
                    scheduler: ScenarioScheduler) -> tuple[str, ...]:
     """
-    Say in one line, or none, which scenario steps a topic does not hold itself.
+    Return in one line, or none, which scenario steps a topic does not hold itself.
 
     :param ticks: (K) the run's steps n.
     :param recorded: increasing steps n that the topic holds.

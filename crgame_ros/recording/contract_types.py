@@ -12,7 +12,7 @@ _VEHICLE = re.compile(r'/(hv|av)\d{1,3}(/.+)')
 
 @functools.lru_cache(maxsize=4096)
 def contract_type(topic: str) -> str | None:
-    """Give package/msg/Type of a topic; None for a topic that is none of a run."""
+    """Return package/msg/Type of a topic; None for a topic that is none of a run."""
     topics = load_contract().topics
     names = [topic]
     vehicle = _VEHICLE.fullmatch(topic)
@@ -22,5 +22,5 @@ def contract_type(topic: str) -> str | None:
 
 
 def is_foreign(topic: str, type_name: str) -> bool:
-    """Tell whether a message cannot be one of a run: another type on a topic of the contract."""
+    """Return whether a message cannot be one of a run: another type on a topic of the contract."""
     return contract_type(topic) not in (None, type_name)

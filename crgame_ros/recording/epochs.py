@@ -54,7 +54,7 @@ class Epoch:
     until_log_ns: int | None
 
     def holds(self, stamp_ns: int, log_time_ns: int) -> bool:
-        """Tell whether a message belongs to this run."""
+        """Return whether a message belongs to this run."""
         return (stamp_ns >= self.game.scheduler.clock_offset_ns
                 and (self.from_log_ns is None or log_time_ns >= self.from_log_ns)
                 and (self.until_stamp_ns is None or stamp_ns < self.until_stamp_ns)
@@ -63,7 +63,7 @@ class Epoch:
 
 def epoch_numbers(reader: BagReader) -> tuple[int, ...]:
     """
-    Tell which epochs a recording holds, in the order in which they were run.
+    Return which epochs a recording holds, in the order in which they were run.
 
     :raises InputError: if a document is missing.
     """

@@ -171,7 +171,7 @@ def write_bytes(content: bytes, path: Path) -> None:
 
 def _header(log: RunLog, loaded: LoadedScenario, problems: int,
             notices: list[str]) -> dict[str, str]:
-    """Give the attributes of the file, as far as they follow from run and original."""
+    """Return the attributes of the file, as far as they follow from run and original."""
     original = guard.parse_hardened(log.xml_text, loaded.source)
     found: ScenarioID = loaded.scenario.scenario_id
     # The same map and configuration with one prediction; `C-` marks several planning problems.

@@ -87,11 +87,11 @@ class ObjectWriter:
                 self.vehicle_rows[:, column].tolist(), True, self._signals(column)))
 
     def text(self) -> str:
-        """Give what was written."""
+        """Return what was written."""
         return ''.join(part for group in _GROUPS for part in self._parts[group])
 
     def _signals(self, column: int) -> list[tuple[bool, ...]]:
-        """Give the signals of a vehicle at each step, if somebody drove it or it showed any."""
+        """Return the signals of a vehicle at each step, if somebody drove it or it showed any."""
         commands = self._log.commands
         if commands is None:
             return []
@@ -163,7 +163,7 @@ def _vehicle_rows(log: RunLog) -> FloatArray:
 
 
 def _signed_speeds(poses: FloatArray, velocities: FloatArray) -> FloatArray:
-    """Give the speeds (K) of the centre, negative where it moves backwards."""
+    """Return the speeds (K) of the centre, negative where it moves backwards."""
     along = velocities[:, 0] * np.cos(poses[:, 2]) + velocities[:, 1] * np.sin(poses[:, 2])
     speeds: FloatArray = np.copysign(np.hypot(velocities[:, 0], velocities[:, 1]), along)
     return np.nan_to_num(speeds)

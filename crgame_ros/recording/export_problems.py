@@ -63,7 +63,7 @@ class ProblemWriter:
 
     def text(self, rows: NDArray[np.float64]) -> str:
         """
-        Give the problems.
+        Return the problems.
 
         :param rows: (K, V, 7) of the driven vehicles, as of `ObjectWriter`.
         :raises InputError: if an AV drove a problem that the scenario does not have.
@@ -96,7 +96,7 @@ class ProblemWriter:
                         self._lanelets, self._notices)
 
     def _first_row(self, name: str) -> list[float]:
-        """Give pose, speed, acceleration and yaw rate of an object at the first step."""
+        """Return pose, speed, acceleration and yaw rate of an object at the first step."""
         column = [item.id for item in self._log.objects].index(name)
         x, y, yaw = self._log.object_poses[0, column].tolist()
         velocity = self._log.object_velocities[0, column, :2]

@@ -82,12 +82,12 @@ class McapIndex:
             self._sound = size > 0 and zlib.crc32(stream.read(size)) == found.summary_crc
 
     def channels(self, chunk: int) -> frozenset[int] | None:
-        """Give the channels with a message in a chunk, None where no index names them."""
+        """Return the channels with a message in a chunk, None where no index names them."""
         return frozenset(self._channels[chunk]) if chunk in self._channels else None
 
     def agrees(self, chunks: Mapping[int, Extent]) -> bool:
         """
-        Tell whether all that the file says of itself fits together.
+        Return whether all that the file says of itself fits together.
 
         :param chunks: by offset, as each says itself.
         """

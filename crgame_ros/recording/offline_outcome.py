@@ -10,7 +10,7 @@ from crgame_ros.simulation.offline import OfflineResult, PlannerRecord
 
 
 def offline_outcome(result: OfflineResult) -> dict[str, Any]:
-    """Give the entries `planners`, `drivability` and `contacts`, as `timing_report` does."""
+    """Return the entries `planners`, `drivability` and `contacts`, as `timing_report` does."""
     violations = _violations(result)
     return {'planners': planner_entries(result),
             'drivability': {'violations': len(violations), 'list': violations},
@@ -20,7 +20,7 @@ def offline_outcome(result: OfflineResult) -> dict[str, Any]:
 
 def planner_entries(result: OfflineResult) -> dict[str, dict[str, Any]]:
     """
-    Give the entry of each AV's planner.
+    Return the entry of each AV's planner.
 
     It answers after a stated number of steps: there is no latency to measure.
     """

@@ -160,7 +160,7 @@ class BagReader:
 
     def decode(self, message: BagMessage) -> DecodedMessage:
         """
-        Give a message with its content.
+        Return a message with its content.
 
         :raises InputError: if it does not fit its type.
         """

@@ -65,7 +65,7 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
 
 
 def inputs_of(result: OfflineResult) -> RecordedInputs:
-    """Give what the humans of an offline run did, and who took over its AVs."""
+    """Return what the humans of an offline run did, and who took over its AVs."""
     # Row 0 was consumed by no step.
     drivers = {human.id: ReplayDriver(result.commands[1:, place])
                for place, human in enumerate(result.setup.humans)}
@@ -146,5 +146,5 @@ def with_replayed_events(setup: Setup) -> Setup:
 
 
 def _bag(setup: Setup, source: SourceSpec) -> Path:
-    """Give the recording that a source names, relative to the game file."""
+    """Return the recording that a source names, relative to the game file."""
     return setup.game.base / Path(source.argument).expanduser()

@@ -60,7 +60,7 @@ class OpenRequests:
 
     def answered(self, av: str, stamp_ns: int, log_time_ns: int) -> int | None:
         """
-        Give the log time that an answer has taken [ns].
+        Return the log time that an answer has taken [ns].
 
         :return: None where no request with that stamp is open.
         """
@@ -113,7 +113,7 @@ def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[
 
 
 def _told(message: BagMessage, av: str) -> VehicleState | None:
-    """Give the state of the AV itself in a request; None if it does not say."""
+    """Return the state of the AV itself in a request; None if it does not say."""
     try:
         head = request_head(message.data, message.topic)
     except InputError:

@@ -105,7 +105,7 @@ def _recover_other(path: Path) -> RecoverReport:
 
 
 def _is_described(folder: Path, files: list[Path]) -> bool:
-    """Tell whether the metadata of SQLite files is there and can be read by."""
+    """Return whether the metadata of SQLite files is there and can be read by."""
     if not _has_metadata(folder, files, False):
         return False
     try:

@@ -23,7 +23,7 @@ IntArray = NDArray[np.int64]
 def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: float,
              wanted_ns: IntArray) -> FloatArray:
     """
-    Give the states of vehicles at the time n dt of their own motion: at the sum of its intervals.
+    Return the states of vehicles at the time n dt of their own motion: at the sum of its intervals.
 
     Where that sum is n dt exactly, so without any measured interval, it is the state n itself.
     Between two states positions and heading are cubic by their rates at both ends, all else is
@@ -54,7 +54,7 @@ def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: fl
 def moved_intervals(table: CycleTable, vehicles: Sequence[str], humans: Collection[str],
                     dt_s: float, last_n: int, lost_s: FloatArray | None = None) -> FloatArray:
     """
-    Give the intervals over which each vehicle was moved in each step, as `resample` takes them.
+    Return the intervals over which each vehicle was moved in each step, as `resample` takes them.
 
     A human is moved over Delta t_eff, and so is an AV while somebody drives it; an AV on its plan
     takes the nominal step.

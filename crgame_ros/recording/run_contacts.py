@@ -73,7 +73,7 @@ def _read_motions(reader: BagReader, run: Epoch) -> Motions:
 
 
 def _every_step(states: NDArray[np.float64], ns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Give states (n + 1, V, 8) at every step, those between messages by interpolation."""
+    """Return states (n + 1, V, 8) at every step, those between messages by interpolation."""
     if len(ns) == ns[-1] + 1:
         return states
     turned = states.copy()

@@ -81,7 +81,7 @@ def table_of(tables: Sequence[CycleTable], epoch: int | None, reader: BagReader)
 
 
 def _readable_tables(reader: BagReader) -> Iterator[CycleTable]:
-    """Give the cycles in blocks of one epoch, in the order in which they were recorded."""
+    """Yield the cycles in blocks of one epoch, in the order in which they were recorded."""
     refusal, found = None, False
     block: list[CycleTable] = []
     shape: _Shape | None = None
@@ -145,11 +145,11 @@ class _Shape(NamedTuple):
         return shape if right else None
 
     def fits(self, data: bytes) -> bool:
-        """Tell whether a message has this shape."""
+        """Return whether a message has this shape."""
         return data.startswith(self.head) and len(data) >= len(self.head) + 8 * self.size
 
     def rows(self, data: bytes) -> FloatArray:
-        """Give the rows of a message that has it."""
+        """Return the rows of a message that has it."""
         return np.frombuffer(data, '<f8', self.size, len(self.head)).reshape(
             -1, len(self.columns))
 

@@ -16,7 +16,7 @@ _LATER = re.compile(r'run_([1-9][0-9]*)')
 
 def run_folder(session: Path, epoch: int) -> Path:
     """
-    Give the folder of a run: that of the session for the first one, run_2, run_3, … in it later.
+    Return the folder of a run: that of the session for the first one, run_2, run_3, … in it later.
 
     :param epoch: counts resets.
     """
@@ -49,7 +49,7 @@ def bags_of(folder: Path) -> list[Path]:
 
 def parts_of(bag: Path) -> list[Path]:
     """
-    Give a recording and those in which it was continued: `bag`, `bag_part2` and so on.
+    Return a recording and those in which it was continued: `bag`, `bag_part2` and so on.
 
     :param bag: the first of them; any other is given alone.
     """

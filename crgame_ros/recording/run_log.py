@@ -90,7 +90,7 @@ class RunLog:
         return self.descriptions[self.vehicle_states.shape[1]:]
 
     def until(self, k: int) -> 'RunLog':
-        """Give the run up to a scenario step, the step itself included; without its cycles."""
+        """Return the run up to a scenario step, the step itself included; without its cycles."""
         count = int(np.searchsorted(self.ks, k, side='right'))
         return replace(
             self, ks=self.ks[:count], cycles=None, vehicle_states=self.vehicle_states[:count],
@@ -149,7 +149,7 @@ def read_run_log(path: Path, epoch: int | None = None,
 
 
 def _commands(table: CycleTable, vehicles: Sequence[str], ticks: IntArray) -> FloatArray:
-    """Give the commands (K, V, 5) of the steps that led to the ticks n; NaN where unknown."""
+    """Return the commands (K, V, 5) of the steps that led to the ticks n; NaN where unknown."""
     ns = table.column('n').astype(np.int64)
     places = np.minimum(np.searchsorted(ns, ticks), len(ns) - 1)
     found = table.commands_of(vehicles)[places]
@@ -158,7 +158,7 @@ def _commands(table: CycleTable, vehicles: Sequence[str], ticks: IntArray) -> Fl
 
 
 def _wanted(reader: BagReader, vehicles: list[str], objects: list[str]) -> dict[str, list[str]]:
-    """Say whose joints to read from which topics."""
+    """Return whose joints to read from which topics."""
     wanted = {VEHICLES_TOPIC: vehicles, TICK_STATES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects}
     for topic in wanted:
         found = reader.topics.get(topic)
@@ -192,7 +192,7 @@ def _check_begun(reader: BagReader, run: Epoch, points: Mapping[str, Mapping[int
 
 def _spare_states(points: Mapping[str, Mapping[int, FloatArray]], run: Epoch
                   ) -> dict[str, dict[int, FloatArray]]:
-    """Give what other topics tell of states that `VEHICLES_TOPIC` lacks, by topic and step."""
+    """Return what other topics tell of states that `VEHICLES_TOPIC` lacks, by topic and step."""
     states = points[VEHICLES_TOPIC]
     ticks = {n: point for n, point in points[TICK_STATES_TOPIC].items() if n not in states}
     begun = min((*states, *ticks), default=0)
@@ -239,7 +239,7 @@ def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatA
 def _vehicle_states(points: Mapping[int, FloatArray], ns: IntArray, vehicles: Sequence[str],
                     run: Epoch, table: CycleTable | None, ticks: IntArray,
                     notices: list[str]) -> tuple[FloatArray, IntArray]:
-    """Give the states at those of the ticks that every vehicle has reached; give them too."""
+    """Return the states at those of the ticks that every vehicle has reached; give them too."""
     scheduler = run.game.scheduler
     # Nothing behind a gap that cuts the run is used.
     ns = piece_around(ns, int(ticks[0]), scheduler)
@@ -251,7 +251,7 @@ def _vehicle_states(points: Mapping[int, FloatArray], ns: IntArray, vehicles: Se
 
 def _published(points: Mapping[int, FloatArray], ticks: IntArray,
                resampled: FloatArray) -> FloatArray:
-    """Give the states (K, V, 8) as they were published; the resampled ones where none is known."""
+    """Return the states (K, V, 8) as they were published; the resampled ones where none is known."""
     published = resampled.copy()
     for row, n in enumerate(ticks.tolist()):
         if (point := points.get(n)) is not None:
@@ -262,7 +262,7 @@ def _published(points: Mapping[int, FloatArray], ticks: IntArray,
 
 def _intervals(run: Epoch, table: CycleTable | None, vehicles: Sequence[str], last_n: int,
                notices: list[str]) -> FloatArray:
-    """Give the intervals over which each vehicle was moved, nominal where unknown (n + 1, V)."""
+    """Return the intervals over which each vehicle was moved, nominal where unknown (n + 1, V)."""
     dt_s = run.game.scheduler.dt_s
     if table is None:
         return np.full((last_n + 1, len(vehicles)), dt_s)
@@ -299,7 +299,7 @@ def _ks(scheduler: ScenarioScheduler, ticks: IntArray) -> NDArray[np.int64]:
 
 
 def run_log_of(result: OfflineResult) -> RunLog:
-    """Give the log of an offline run."""
+    """Return the log of an offline run."""
     setup = result.setup
     scheduler = setup.scheduler
     notices: list[str] = []

@@ -78,7 +78,7 @@ class PointReader:
 
     def read(self, message: BagMessage) -> FloatArray:
         """
-        Give the first point of a message: (3, joints) positions, velocities, accelerations.
+        Return the first point of a message: (3, joints) positions, velocities, accelerations.
 
         :raises InputError: if it is no such message, or a joint is missing.
         """
@@ -111,7 +111,7 @@ class PointReader:
             self._joints = -1
 
     def _fits(self, data: bytes) -> bool:
-        """Tell whether a message has the names and lengths that were learned."""
+        """Return whether a message has the names and lengths that were learned."""
         size = 8 * self._joints
         return (data[:2] == LITTLE_ENDIAN and data.startswith(self._head, _NAMES)
                 and len(data) >= self._rows[2] + size

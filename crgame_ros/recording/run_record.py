@@ -46,12 +46,12 @@ class RunRecord:
 
     @property
     def times_s(self) -> NDArray[np.float64]:
-        """Give the simulated time of the commands since the run's start (R) [s]."""
+        """Return the simulated time of the commands since the run's start (R) [s]."""
         return np.asarray(self.ns * self.log.game.scheduler.dt_s)
 
     @property
     def put_back(self) -> dict[str, tuple[int, ...]]:
-        """Give the last steps k before vehicles were put back on their lane, by vehicle."""
+        """Return the last steps k before vehicles were put back on their lane, by vehicle."""
         scheduler = self.log.game.scheduler
         found: dict[str, tuple[int, ...]] = {}
         for event in self.fired:
@@ -62,7 +62,7 @@ class RunRecord:
 
     def jumps(self, column: int) -> tuple[int, ...]:
         """
-        Give the log's rows at which a driven vehicle stands where it was put back.
+        Return the log's rows at which a driven vehicle stands where it was put back.
 
         :param column: of the vehicle among the driven ones.
         """
@@ -74,7 +74,7 @@ class RunRecord:
                      for row in np.searchsorted(log.ks, ks).tolist() if row < len(steps))
 
     def ways(self) -> NDArray[np.float64]:
-        """Give how far each driven vehicle has come (V) [m], but for where it was put back."""
+        """Return how far each driven vehicle has come (V) [m], but for where it was put back."""
         log = self.log
         steps = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[..., :2], axis=0), -1, 0))
         for vehicle, ks in self.put_back.items():
@@ -116,7 +116,7 @@ def record_of_log(path: Path, log: RunLog) -> RunRecord:
 
 
 def run_record_of(result: OfflineResult) -> RunRecord:
-    """Give the record of an offline run."""
+    """Return the record of an offline run."""
     commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
     return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
                      result.fired, tasks=result.tasks)

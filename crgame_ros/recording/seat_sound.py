@@ -32,7 +32,7 @@ class SeatSound:
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """
-        Give by seat: the share of the statuses that had it on, median volume then, and rumble.
+        Return by seat: the share of the statuses that had it on, median volume then, and rumble.
 
         :return: `on_share`, `volume` (null if it was never on) and `rumble`, each 0 to 1.
         """

@@ -109,7 +109,7 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
 
 def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability],
               fired: Sequence[FiredEvent]) -> tuple[list[dict[str, Any]] | None, tuple[str, ...]]:
-    """Give the entries of the contacts, or None and why they are not known."""
+    """Return the entries of the contacts, or None and why they are not known."""
     try:
         return [item.as_dict() for item in recorded_contacts(
             reader, run, verdicts, fired)], ()
@@ -246,7 +246,7 @@ def _count(values: dict[str, str], key: str) -> int | None:
 
 
 def spread_of(samples: Sequence[float] | NDArray[np.float64]) -> dict[str, float] | None:
-    """Give median, 99th percentile and maximum; None of nothing."""
+    """Return median, 99th percentile and maximum; None of nothing."""
     values = np.array(samples)
     if not len(values):
         return None

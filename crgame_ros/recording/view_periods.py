@@ -49,7 +49,7 @@ class ViewPeriods:
 
     def as_dict(self) -> dict[str, list[dict[str, Any]]]:
         """
-        Give by seat the periods in which one thing was shown in one way.
+        Return by seat the periods in which one thing was shown in one way.
 
         :return: of each period `from_s` and `to_s` (the run's clock; that of the next, or of the
             last word), what was chosen, and the medians of `ratio` and `rate_hz`.

@@ -40,7 +40,7 @@ def driven_lanes(roads: RoadNetwork, turns: Turns, poses: NDArray[np.float64],
 
 def _continued(turns: Turns, best: dict[int, tuple[float, tuple[int, ...]]], lanelet: int,
                cost: float) -> list[tuple[float, tuple[int, ...]]]:
-    """Give what it costs to have come to a lanelet, and the way to it, in each possible way."""
+    """Return what it costs to have come to a lanelet, and the way to it, in each possible way."""
     if not best:
         return [(cost, (lanelet,))]
     return [(before + cost + _step(turns, path[-1], lanelet),

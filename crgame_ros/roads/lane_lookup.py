@@ -40,7 +40,7 @@ class LaneLookup:
 
     def find(self, poses: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """
-        Give lane (-1: none), arc length and offset to the left of poses (N, 3).
+        Return lane (-1: none), arc length and offset to the left of poses (N, 3).
 
         Of the lanes whose direction fits, it is the one whose centre line is nearest.
         """

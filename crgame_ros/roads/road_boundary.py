@@ -54,7 +54,7 @@ class _Tile:
     boundary: pycrcc.ShapeGroup
 
     def covers(self, x: float, y: float, reach: float) -> bool:
-        """Tell whether a circle around (x, y) lies inside the tile."""
+        """Return whether a circle around (x, y) lies inside the tile."""
         return math.hypot(x - self.x, y - self.y) + reach < self.radius
 
 
@@ -95,7 +95,7 @@ class RoadBoundary:
 
     def is_off_road(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> bool:
         """
-        Tell whether any part of a footprint is off the road.
+        Return whether any part of a footprint is off the road.
 
         :param x_center: centre of the vehicle, not its rear axle [m]
         :param y_center: likewise [m]
@@ -111,7 +111,7 @@ class RoadBoundary:
 
     def contains(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> bool:
         """
-        Tell whether a footprint lies within the united lanelets: the second opinion.
+        Return whether a footprint lies within the united lanelets: the second opinion.
 
         Parameters as in `is_off_road`.
         """
@@ -166,7 +166,7 @@ class RoadBoundary:
 # Only what lanelets and place decide is shared: a check never depends on other runs.
 @lru_cache(_KEPT_SURFACES)
 def _united(polygons: tuple[bytes, ...]) -> tuple[NDArray[np.object_], shapely.Geometry]:
-    """Give the pieces of road, polygons (WKB) and what mends their seams, and their union."""
+    """Return the pieces of road, polygons (WKB) and what mends their seams, and their union."""
     lanelets = shapely.from_wkb(polygons).tolist() if polygons else []
     patches = seam_patches(shapely.union_all(lanelets))
     return np.array([*lanelets, *patches], dtype=object), road_surface(lanelets, patches)

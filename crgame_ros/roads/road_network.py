@@ -53,7 +53,7 @@ class RoadNetwork:
 
     def line(self, lanelet_id: int) -> Curve:
         """
-        Give the centre line of a lanelet.
+        Return the centre line of a lanelet.
 
         :raises InputError: if the lanelet does not exist.
         """
@@ -114,7 +114,7 @@ class RoadNetwork:
 
     def pose_on(self, lanelet_id: int, s: float, d: float = 0.0) -> tuple[float, float, float]:
         """
-        Give the pose at arc length s and offset d to the left of a centre line.
+        Return the pose at arc length s and offset d to the left of a centre line.
 
         :return: x [m], y [m], yaw in (-pi, pi] [rad]; straight on beyond the ends
         """
@@ -128,7 +128,7 @@ class RoadNetwork:
 
     def lane_path(self, lanelet_id: int, length: float) -> FloatArray:
         """
-        Give the centre line of a lanelet and its successors, the straightest first.
+        Return the centre line of a lanelet and its successors, the straightest first.
 
         :param length: how far to go beyond the end of the lanelet [m]
         :return: (n, 2) points [m]; shorter where the map ends
@@ -212,13 +212,13 @@ class RoadNetwork:
         return frozenset(found)
 
     def width_at(self, lanelet_id: int, s: float) -> float:
-        """Give the distance between the bounds at arc length s of the centre line [m]."""
+        """Return the distance between the bounds at arc length s of the centre line [m]."""
         lanelet = self._lanelet(lanelet_id)
         across = lanelet.left_vertices[:, :2] - lanelet.right_vertices[:, :2]
         return float(np.interp(s, lanelet.distance, np.hypot(*across.T)))
 
     def speed_limit(self, lanelet_id: int) -> float | None:
-        """Give the lowest speed limit of the lanelet's traffic signs [m/s], None without one."""
+        """Return the lowest speed limit of the lanelet's traffic signs [m/s], None without one."""
         limits = []
         for element in sign_elements(self._lanelet(lanelet_id), self.lanelet_network, False):
             if element.traffic_sign_element_id.name == MAX_SPEED:
@@ -226,12 +226,12 @@ class RoadNetwork:
         return min(limits, default=None)
 
     def is_for_cars(self, lanelet_id: int) -> bool:
-        """Tell whether cars drive here (no sidewalk, crossing, cycle lane, shoulder…)."""
+        """Return whether cars drive here (no sidewalk, crossing, cycle lane, shoulder…)."""
         self._lanelet(lanelet_id)
         return bool(self._drivable[self._index[lanelet_id]])
 
     def covers(self, footprint: shapely.Polygon) -> bool:
-        """Tell whether a footprint lies on lanelets entirely (1 cm tolerance)."""
+        """Return whether a footprint lies on lanelets entirely (1 cm tolerance)."""
         near = self._tree.query(footprint, predicate='intersects')
         if not len(near):
             return False
@@ -240,7 +240,7 @@ class RoadNetwork:
         return bool(shapely.covers(road, footprint))
 
     def road_area(self) -> shapely.Geometry:
-        """Give what vehicles may be on as one area; slits and small islands belong to it."""
+        """Return what vehicles may be on as one area; slits and small islands belong to it."""
         on = [not x.lanelet_type & _NO_ROAD for x in self._lanelets]
         road = shapely.buffer(shapely.buffer(shapely.union_all(self._areas[on]), _SLIT), -_SLIT)
         return shapely.union_all([
@@ -249,7 +249,7 @@ class RoadNetwork:
             for part in shapely.get_parts(road)])
 
     def area_of(self, lanelet_ids: Iterable[int]) -> shapely.Geometry:
-        """Give some lanelets as one area."""
+        """Return some lanelets as one area."""
         return shapely.union_all(self._areas[[self._index[i] for i in lanelet_ids]])
 
     def _lanelet(self, lanelet_id: int) -> Lanelet:

@@ -17,7 +17,7 @@ PATCH_OVERLAP = 1e-3
 
 
 def lanelet_ring(lanelet: Lanelet) -> NDArray[np.float64]:
-    """Give the bounds of a lanelet (n, 2), along the left and back along the right one [m]."""
+    """Return the bounds of a lanelet (n, 2), along the left and back along the right one [m]."""
     return np.concatenate((lanelet.left_vertices[:, :2], lanelet.right_vertices[::-1, :2]))
 
 

@@ -84,7 +84,7 @@ def find_route(roads: RoadNetwork, start: int, start_s: float, goals: frozenset[
 
 def in_lane(roads: RoadNetwork, route: Route, length: float) -> Route:
     """
-    Give the route without its lane changes: the first leg, prolonged.
+    Return the route without its lane changes: the first leg, prolonged.
 
     :param length: distance that the route shall go on [m]
     """

@@ -29,7 +29,7 @@ class LightCycle:
         self.offset = int(cycle.time_offset or 0) if cycle is not None else 0
 
     def at(self, k: int) -> tuple[str, int | None]:
-        """Give the state at k and the number of time steps until the next element begins."""
+        """Return the state at k and the number of time steps until the next element begins."""
         if not self.ends:
             return self.states[0], None
         phase = (k - self.offset) % self.ends[-1]
@@ -37,7 +37,7 @@ class LightCycle:
         return self.states[index], self.ends[index] - phase
 
     def states_over(self) -> NDArray[np.str_]:
-        """Give the states over one period from time step 0 on; one where nothing ever changes."""
+        """Return the states over one period from time step 0 on; one where nothing ever changes."""
         if not self.ends:
             return np.array(self.states)
         return np.roll(np.repeat(self.states, np.diff(self.ends, prepend=0)), self.offset)
@@ -59,7 +59,7 @@ class TrafficLights:
 
     def states_at(self, k: int) -> dict[int, str]:
         """
-        Give the state of each light in its XML spelling: red, yellow, redYellow, green, inactive.
+        Return the state of each light in its XML spelling: red, yellow, redYellow, green, inactive.
 
         While no light changes, the same dictionary object is returned: comparing it with `is`
         tells cheaply whether anything may have changed since the previous call.
@@ -77,7 +77,7 @@ class TrafficLights:
 
 def traffic_light_states(scenario: Scenario, k: int) -> dict[int, str]:
     """
-    Give the states of all traffic lights with a cycle at scenario time step k.
+    Return the states of all traffic lights with a cycle at scenario time step k.
 
     :return: by traffic-light id: red, yellow, redYellow, green or inactive
     """

@@ -35,7 +35,7 @@ def sign_names(lanelet: Lanelet, roads: LaneletNetwork) -> set[str]:
 
 
 def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
-    """Tell whether one has to halt at a lanelet's stop line because of a sign."""
+    """Return whether one has to halt at a lanelet's stop line because of a sign."""
     return lanelet.stop_line is not None and STOP in sign_names(lanelet, roads)
 
 
@@ -49,7 +49,7 @@ def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
 
 
 def has_arrow(light: TrafficLight) -> bool:
-    """Tell whether a light is only for who goes where it points."""
+    """Return whether a light is only for who goes where it points."""
     return light.direction not in (None, TrafficLightDirection.ALL)
 
 
@@ -65,7 +65,7 @@ def lights_for(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
 
 def stop_line_ends(lanelet: Lanelet) -> NDArray[np.float64]:
     """
-    Give the ends of a lanelet's stop line; the lane's end where the file does not say.
+    Return the ends of a lanelet's stop line; the lane's end where the file does not say.
 
     :param lanelet: one with a stop line.
     :return: (2, 2) left and right end as the file has them [m]
@@ -77,7 +77,7 @@ def stop_line_ends(lanelet: Lanelet) -> NDArray[np.float64]:
 
 
 def stop_line_middle(lanelet: Lanelet) -> NDArray[np.float64] | None:
-    """Give the middle (2) of a lanelet's stop line [m]; None where the file does not say."""
+    """Return the middle (2) of a lanelet's stop line [m]; None where the file does not say."""
     line = lanelet.stop_line
     if line is None or line.start is None or line.end is None:
         return None

@@ -48,7 +48,7 @@ class Turns:
 
     def turn_on(self, lanelet: int, before: int | None = None) -> Light | None:
         """
-        Tell to which side a lanelet turns off where one could go another way.
+        Return to which side a lanelet turns off where one could go another way.
 
         Who goes round a roundabout does not indicate, who leaves it does.
 
@@ -59,11 +59,11 @@ class Turns:
         return self._turns[lanelet, before]
 
     def is_only_way(self, before: int, lanelet: int) -> bool:
-        """Tell whether one cannot but go from a lanelet, or from beside it, to the next one."""
+        """Return whether one cannot but go from a lanelet, or from beside it, to the next one."""
         return not self._others(lanelet, (before,))
 
     def turned_at(self, lanelet: int) -> tuple[float, float]:
-        """Give the arc length [m] at which a turn ends on a lanelet, and the heading there."""
+        """Return the arc length [m] at which a turn ends on a lanelet, and the heading there."""
         line = self._roads.line(lanelet)
         end = min(line.length, OF_FORK)
         return end, float(line.heading_at(np.array(end)))
@@ -86,7 +86,7 @@ class Turns:
 
     def side_of(self, before: int, after: int) -> Light | None:
         """
-        Tell on which side of a lane another one, or what follows that, lies.
+        Return on which side of a lane another one, or what follows that, lies.
 
         The other one may be of the other direction; sides are those of who drives as the lane
         leads.
@@ -138,13 +138,13 @@ class Turns:
         return float(heading[-1] - heading[0])
 
     def _ring(self, lanelet: int) -> float:
-        """Give how far one turns on the ring that a lanelet is of [rad]; 0 if it is of none."""
+        """Return how far one turns on the ring that a lanelet is of [rad]; 0 if it is of none."""
         if lanelet not in self._rings:
             self._rings[lanelet] = self._find_ring(lanelet)
         return self._rings[lanelet]
 
     def _is_round(self, lanelet: int, turned: float) -> bool:
-        """Tell whether a lanelet may be a part of a roundabout, bending as those before it."""
+        """Return whether a lanelet may be a part of a roundabout, bending as those before it."""
         length, bend = self._roads.line(lanelet).length, self._bend(lanelet)
         return bend * turned >= 0.0 and (
             length <= LONGER or abs(bend) >= length / LARGEST_RADIUS)

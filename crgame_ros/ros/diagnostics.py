@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 
 
 def printable(text: str) -> str:
-    """Give a text as it may go out in a message: halves of characters cannot be encoded."""
+    """Return a text as it may go out in a message: halves of characters cannot be encoded."""
     return text.encode('utf-8', 'replace').decode('utf-8')
 
 

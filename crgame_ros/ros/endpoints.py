@@ -21,7 +21,7 @@ from rclpy.subscription import Subscription
 
 
 def qos_profile(qos: Qos) -> QoSProfile:
-    """Give the rclpy profile of a contract's QoS."""
+    """Return the rclpy profile of a contract's QoS."""
     return QoSProfile(
         depth=qos.depth,
         reliability=ReliabilityPolicy[qos.reliability.upper()],
@@ -190,7 +190,7 @@ class Endpoints:
 
 
 def relative(name: str) -> str:
-    """Give a name of the contract as one in the node's namespace, `/` if it has none."""
+    """Return a name of the contract as one in the node's namespace, `/` if it has none."""
     return name.removeprefix('/')
 
 

@@ -32,7 +32,7 @@ def loopback_profile() -> Path:
 
 
 def network_is_open() -> bool:
-    """Tell whether the user lets ROS traffic leave this machine."""
+    """Return whether the user lets ROS traffic leave this machine."""
     return os.environ.get(OPEN_NETWORK) == '1'
 
 

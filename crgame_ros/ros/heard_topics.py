@@ -28,7 +28,7 @@ class HeardTopics:
         self._names: set[str] = set()
 
     def missing(self, wanted: set[str]) -> set[str]:
-        """Give the topics of which the recorder has no message yet."""
+        """Return the topics of which the recorder has no message yet."""
         while (message := self._slot.take()) is not None:
             for status in message.status:
                 values = read_status(status).values

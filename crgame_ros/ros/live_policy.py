@@ -99,7 +99,7 @@ class LivePolicyDriver(DriverSource):
         return decided
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the command of the action in force."""
+        """Return the command of the action in force."""
         return RELEASED if self._driver is None else self._driver.command(n, dt_s)
 
     def _begin(self) -> None:

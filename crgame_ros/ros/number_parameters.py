@@ -41,7 +41,7 @@ def declare_number(node: Node, name: str, default: float, description: str,
 
 
 def _reason(value: Any, bounds: tuple[float, float]) -> str | None:
-    """Say why a value cannot be used, None if it can."""
+    """Return why a value cannot be used, None if it can."""
     if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
         return f'{str(value)[:40]!r} is no number'
     return None if bounds[0] <= value <= bounds[1] else f'{value:g} is out of its range'

@@ -53,7 +53,7 @@ class LocalizationMessage:
 
 
 def _at_least(known: Array, place: tuple[Any, ...], part: Array) -> Array:
-    """Give a covariance (36) with a part that the filter has, which may know it exactly, too."""
+    """Return a covariance (36) with a part that the filter has, which may know it exactly, too."""
     covariance = known.copy()
     covariance[place] = part
     np.fill_diagonal(covariance, np.maximum(covariance.diagonal(), known.diagonal()))

@@ -23,12 +23,12 @@ NS_PER_S = 1_000_000_000
 
 
 def to_time(stamp_ns: int) -> Time:
-    """Give a stamp [ns] as a message."""
+    """Return a stamp [ns] as a message."""
     return Time(sec=stamp_ns // NS_PER_S, nanosec=stamp_ns % NS_PER_S)
 
 
 def from_time(stamp: Time) -> int:
-    """Give a message's stamp in nanoseconds."""
+    """Return a message's stamp in nanoseconds."""
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
@@ -100,7 +100,7 @@ class SeriesMessage:
 
     @classmethod
     def for_series(cls, series: JointSeries, before: 'SeriesMessage | None') -> 'SeriesMessage':
-        """Give the message from before, unless the series has other joints or points."""
+        """Return the message from before, unless the series has other joints or points."""
         if before is not None and before._names == series.names \
                 and len(before._views) == len(series.times_ns):
             return before
@@ -118,7 +118,7 @@ class SeriesMessage:
 
 def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
     """
-    Give a driver's command as a message (contract: /<v>/driver_command).
+    Return a driver's command as a message (contract: /<v>/driver_command).
 
     :param source: who speaks, as /seats names it.
     """

@@ -69,7 +69,7 @@ class DocumentCollector:
 
     def complete(self) -> ScenarioSet | None:
         """
-        Give the set, once, when the documents belong together and one of them is new.
+        Return the set, once, when the documents belong together and one of them is new.
 
         :raises CrgameError: if a document cannot be read.
         """
@@ -102,7 +102,7 @@ class ScenarioDocuments:
 
     def poll(self) -> ScenarioSet | None:
         """
-        Give a new complete set; None while there is nothing new.
+        Return a new complete set; None while there is nothing new.
 
         A game or list of objects that cannot be read is refused and counted.
 

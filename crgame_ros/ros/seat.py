@@ -134,11 +134,11 @@ class Seat:
         return self.recording is not None and self.source == self.home
 
     def repeats(self, n: int) -> bool:
-        """Tell whether cycle n is driven as in the recording."""
+        """Return whether cycle n is driven as in the recording."""
         return self.recording is not None and self.repeats_recording and self.recording.drives(n)
 
     def awaits_driver(self, now_ns: int) -> bool:
-        """Tell whether the seat is the cockpit's by the game, and no hands are on its controls."""
+        """Return whether the seat is the cockpit's by the game, and no hands are on its controls."""
         if self.home != COCKPIT or self.source != COCKPIT:
             return False
         self.listen(now_ns)
@@ -146,7 +146,7 @@ class Seat:
 
     def command(self, now_ns: int, dt_s: float, speed: float, n: int = 0) -> DriverCommand | None:
         """
-        Give the command for this cycle; released, then gentle braking, after a loss.
+        Return the command for this cycle; released, then gentle braking, after a loss.
 
         :param n: the cycle, which only a recording needs to know.
         :return: None for an AV that nobody has taken over.

@@ -84,12 +84,12 @@ class Seats:
                 seat.listen(now_ns)
 
     def interval_s(self, n: int) -> float | None:
-        """Give the interval of cycle n as recorded [s]; None where no human repeats it."""
+        """Return the interval of cycle n as recorded [s]; None where no human repeats it."""
         return self._intervals_s[n] if any(seat.repeats(n) for seat in self.humans) else None
 
     def commands(self, now_ns: int, dt_s: float,
                  simulation: 'Simulation') -> list[DriverCommand | None]:
-        """Give the command of every seat for this cycle; None for AVs that follow their plan."""
+        """Return the command of every seat for this cycle; None for AVs that follow their plan."""
         n = simulation.n
         return [
             *(seat.command(now_ns, dt_s, human.state.speed, n)
@@ -103,7 +103,7 @@ class Seats:
 
     @property
     def of_cockpits(self) -> list[Seat]:
-        """Give the seats that the game leaves to people at pages, and that nobody else has."""
+        """Return the seats that the game leaves to people at pages, and that nobody else has."""
         return [seat for seat in self.humans if seat.home == seat.source == COCKPIT]
 
     def document(self) -> str:
@@ -112,7 +112,7 @@ class Seats:
                            for seat in self.all})
 
     def driven(self) -> Iterator[Driven]:
-        """Give what each seat is driven by, but for AVs that follow their plans."""
+        """Yield what each seat is driven by, but for AVs that follow their plans."""
         for seat in self.all:
             if seat.told_source != PLANNER:
                 person = None if seat.tenant is None or not seat.tenant.here \
@@ -120,7 +120,7 @@ class Seats:
                 yield seat.id, seat.told_source, seat.driver, person
 
     def repetition_changed(self) -> bool:
-        """Tell whether a recorded take-over of an AV has begun or ended since the last call."""
+        """Return whether a recorded take-over of an AV has begun or ended since the last call."""
         before = self._taken_over_again
         self._taken_over_again = [seat.taken_over_again for seat in self.avs]
         return self._taken_over_again != before and any((*before, *self._taken_over_again))
@@ -204,5 +204,5 @@ class Seats:
 
 
 def _home(driver: str) -> str:
-    """Give the source by which the driver that the game names speaks."""
+    """Return the source by which the driver that the game names speaks."""
     return COCKPIT if parse_source(driver).kind == COCKPIT else GAME

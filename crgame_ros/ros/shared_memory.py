@@ -85,12 +85,12 @@ def remove_stale(folder: Path = SHARED_MEMORY, *, ports: bool = False) -> tuple[
 
 
 def _locks_of(path: Path) -> tuple[Path, Path]:
-    """Give the files by which readers hold a segment or port, alone or together."""
+    """Return the files by which readers hold a segment or port, alone or together."""
     return path.with_name(f'{path.name}_el'), path.with_name(f'{path.name}_sl')
 
 
 def _is_left(path: Path) -> bool:
-    """Tell whether a file is this user's, not young, and nobody holds its locks."""
+    """Return whether a file is this user's, not young, and nobody holds its locks."""
     try:
         found = path.stat()
         return found.st_uid == os.getuid() and time.time() - found.st_mtime >= YOUNG_S \
@@ -115,7 +115,7 @@ def _mapped(folder: Path) -> set[str]:
 
 
 def _is_free(lock: Path) -> bool:
-    """Tell whether nobody holds a lock file, which a file need not have."""
+    """Return whether nobody holds a lock file, which a file need not have."""
     try:
         descriptor = os.open(lock, os.O_RDONLY | os.O_CLOEXEC)
     except FileNotFoundError:

@@ -15,7 +15,7 @@ from geometry_msgs.msg import TransformStamped
 
 def transform(parent: str, child: str, pose: Iterable[float], stamp_ns: int) -> TransformStamped:
     """
-    Give the pose of a frame in another one.
+    Return the pose of a frame in another one.
 
     :param pose: x, y [m] and yaw [rad] of `child` in `parent`
     """

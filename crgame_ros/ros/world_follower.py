@@ -84,7 +84,7 @@ class WorldFollower:
         self._waiting.clear()
 
     def steps(self) -> Iterator[WorldStep]:
-        """Give every step that is complete, once."""
+        """Yield every step that is complete, once."""
         self._take_states()
         if self._scenario is None:
             return
@@ -124,7 +124,7 @@ class WorldFollower:
                 del self._objects_by_n[max(self._objects_by_n)]
 
     def _complete(self, scenario: ScenarioSet, message: JointTrajectory) -> WorldStep | None:
-        """Give a step, None if its objects are still on their way; n < 0: of another run."""
+        """Return a step, None if its objects are still on their way; n < 0: of another run."""
         scheduler = scenario.game.scheduler
         n = scheduler.step_of_stamp(from_time(message.header.stamp))
         nothing = np.empty((0, 4))

@@ -22,10 +22,10 @@ class ObjectCourse(ABC):
 
     @abstractmethod
     def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
-        """Give pose and velocity (3) at a time step; NaN where absent."""
+        """Return pose and velocity (3) at a time step; NaN where absent."""
 
     def path_from(self, k: int) -> FloatArray:
-        """Give the poses (n, 3) from time step k on, as far as they are known."""
+        """Return the poses (n, 3) from time step k on, as far as they are known."""
         return self.state_at(k)[0][None, :]
 
 
@@ -42,14 +42,14 @@ class Released(ObjectCourse):
         self._poses, self._velocities = track
 
     def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
-        """Give the state of the recording as long as it lasts."""
+        """Return the state of the recording as long as it lasts."""
         row = k - self._k
         if not 0 <= row < len(self._poses):
             return _ABSENT, _ABSENT
         return self._poses[row], self._velocities[row]
 
     def path_from(self, k: int) -> FloatArray:
-        """Give the rest of the recording."""
+        """Return the rest of the recording."""
         return self._poses[k - self._k:]
 
 
@@ -96,7 +96,7 @@ class Braking(ObjectCourse):
         return pose
 
     def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
-        """Give the state at a time step; its velocity leads to the next pose."""
+        """Return the state at a time step; its velocity leads to the next pose."""
         pose = self._pose(self._distance(k))
         following = self._pose(self._distance(k + 1))
         if np.isnan(following[0]):
@@ -105,7 +105,7 @@ class Braking(ObjectCourse):
         return np.array((pose[0], pose[1], wrap_pi(float(pose[2])))), velocity
 
     def path_from(self, k: int) -> FloatArray:
-        """Give the rest of the path."""
+        """Return the rest of the path."""
         distance = self._distance(k)
         rest = self._path[self._s > distance]
         path = np.concatenate((self._pose(distance)[None, :], rest))
@@ -125,7 +125,7 @@ class Standing(ObjectCourse):
         self._velocity = np.zeros(3)
 
     def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
-        """Give the pose."""
+        """Return the pose."""
         return self._pose, self._velocity
 
 
@@ -146,7 +146,7 @@ class ObstacleCourses:
         return sorted(self._courses)
 
     def states_at(self, k: int) -> ObjectStates:
-        """Give all states at a time step, as far as events have happened; do not write to them."""
+        """Return all states at a time step, as far as events have happened; do not write to them."""
         states = self._obstacles.states_at(k)
         if not self._courses:
             return states
@@ -156,11 +156,11 @@ class ObstacleCourses:
         return ObjectStates(poses, velocities)
 
     def is_present(self, column: int, k: int) -> bool:
-        """Tell whether an obstacle is there at a time step."""
+        """Return whether an obstacle is there at a time step."""
         return bool(np.isfinite(self.states_at(k).poses[column, 0]))
 
     def is_held(self, column: int) -> bool:
-        """Tell whether an obstacle stands until somebody lets it go."""
+        """Return whether an obstacle stands until somebody lets it go."""
         return column in self._obstacles.held and column not in self._courses
 
     def release(self, column: int, k: int) -> None:

@@ -183,7 +183,7 @@ def _commonroad_shape(shape: CommonRoadShape) -> str:
 
 
 def interval_bounds(value: Any) -> tuple[float, float]:
-    """Give the bounds of an interval, or of the single value that it is."""
+    """Return the bounds of an interval, or of the single value that it is."""
     if isinstance(value, Interval):
         return float(value.start), float(value.end)
     return float(value), float(value)

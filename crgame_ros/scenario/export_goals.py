@@ -40,7 +40,7 @@ def goal_where_it_ended(centers: NDArray[np.float64], shape: Shape) -> str:
 def goals_of(problem: PlanningProblem, vehicle_id: str, shift: int, last: int,
              lanelets: Mapping[int, int], notices: list[str]) -> list[str]:
     """
-    Give the goals of a planning problem on the time steps of the run.
+    Return the goals of a planning problem on the time steps of the run.
 
     A problem without a goal gets one that every state of the run meets.
 

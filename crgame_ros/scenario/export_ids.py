@@ -23,7 +23,7 @@ class IdPool:
         self._notices = notices
 
     def keep(self, number: int, name: str) -> int:
-        """Give something the id that it had in the original, or a new one if that is taken."""
+        """Return something the id that it had in the original, or a new one if that is taken."""
         if number > 0 and number not in self._taken:
             self._taken.add(number)
             return number
@@ -33,7 +33,7 @@ class IdPool:
         return fresh
 
     def fresh(self) -> int:
-        """Give an id that nothing has."""
+        """Return an id that nothing has."""
         number = max(self._taken, default=0) + 1
         self._taken.add(number)
         return number
@@ -42,7 +42,7 @@ class IdPool:
 def renumber(elements: Iterable[etree._Element], taken: set[int], notices: list[str],
              reserved: Collection[int] = ()) -> dict[int, int]:
     """
-    Give a new id to every part of the roads whose own is not positive or belongs to another.
+    Return a new id to every part of the roads whose own is not positive or belongs to another.
 
     References follow. Incomings are known within their intersection only, as references to them
     are.

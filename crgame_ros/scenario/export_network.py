@@ -81,7 +81,7 @@ class WrittenRoads:
 
 def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> WrittenRoads:
     """
-    Give location, tags, lanelets, traffic signs, traffic lights and intersections.
+    Return location, tags, lanelets, traffic signs, traffic lights and intersections.
 
     They are copied from the file as they are, or, where that breaks the schema (a third of the
     published files do), written anew from what was read, without what the schema still refuses.
@@ -114,7 +114,7 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
 
 
 def used_ids(elements: list[etree._Element]) -> set[int]:
-    """Give every id that the elements take."""
+    """Return every id that the elements take."""
     return {int(node.get('id')) for element in elements for node in element.iter()
             if node.get('id') is not None}
 

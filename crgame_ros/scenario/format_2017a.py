@@ -112,7 +112,7 @@ def _place(shape: etree._Element, time: etree._Element) -> None:
 
 
 def _make_goal(state: etree._Element, problem: str) -> list[str]:
-    """Say what a goal asks for as 2018b does, in intervals and areas; tell what it cannot."""
+    """Return what a goal asks for as 2018b does, in intervals and areas; tell what it cannot."""
     notices = []
     for field in list(state):
         if field.tag not in _GOAL_FIELDS:

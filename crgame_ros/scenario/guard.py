@@ -126,7 +126,7 @@ def where(element: etree._Element, source: str) -> str:
 
 
 def has_finite_numbers(elements: Iterable[etree._Element]) -> bool:
-    """Tell whether every leaf among the elements holds a finite number."""
+    """Return whether every leaf among the elements holds a finite number."""
     try:
         return all(math.isfinite(float(e.text or '')) for e in elements if not len(e))
     except ValueError:
@@ -144,7 +144,7 @@ def _has_doctype(source: str) -> InputError:
 
 
 def encode(text: str) -> bytes:
-    """Give the content of a file that `read_text` reads as this text."""
+    """Return the content of a file that `read_text` reads as this text."""
     declared = _ENCODING.match(text[:200].encode('utf-8'))
     return text.encode(declared.group(1).decode('ascii') if declared else 'utf-8')
 

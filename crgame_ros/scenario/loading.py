@@ -130,14 +130,14 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
 
 
 def _is_tangled(lanelet: Lanelet) -> bool:
-    """Tell whether bounds of many points cross: those of a few are mended by their users."""
+    """Return whether bounds of many points cross: those of a few are mended by their users."""
     if len(lanelet.left_vertices) <= _MOST_TANGLED:
         return False
     return not shapely.Polygon(lanelet_ring(lanelet)).is_valid
 
 
 def scenario_digest(xml_text: str) -> str:
-    """Give the SHA-256 by which a game names its scenario's text."""
+    """Return the SHA-256 by which a game names its scenario's text."""
     return hashlib.sha256(xml_text.encode('utf-8')).hexdigest()
 
 

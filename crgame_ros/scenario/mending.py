@@ -139,12 +139,12 @@ def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
 
 
 def _links(lanelet: etree._Element) -> list[etree._Element]:
-    """Give what leads from a lanelet to others."""
+    """Return what leads from a lanelet to others."""
     return [link for tag in LINKS for link in lanelet.findall(tag)]
 
 
 def _middle(lanelet: etree._Element, index: int) -> tuple[float, float]:
-    """Give the middle between the first, or last, points of both bounds."""
+    """Return the middle between the first, or last, points of both bounds."""
     points = [lanelet.findall(f'{name}/point')[index] for name in ('leftBound', 'rightBound')]
     x, y = (sum(float(point.find(axis).text) for point in points) / 2 for axis in 'xy')
     return x, y

@@ -85,7 +85,7 @@ class ScenarioObstacles:
 
     @property
     def poses(self) -> FloatArray:
-        """Give all (last_k - first_k + 1, M, 3) poses from `first_k` on; NaN where absent."""
+        """Return all (last_k - first_k + 1, M, 3) poses from `first_k` on; NaN where absent."""
         return self._poses
 
     @property
@@ -95,7 +95,7 @@ class ScenarioObstacles:
 
     def states_at(self, k: int) -> ObjectStates:
         """
-        Give the poses and velocities of all obstacles at a time step.
+        Return the poses and velocities of all obstacles at a time step.
 
         A velocity leads to the pose at k + 1: pose + velocity * Delta t_c; at an obstacle's last
         step it is the one before. The arrays are read-only.
@@ -110,7 +110,7 @@ class ScenarioObstacles:
     def with_living(self, agents: Collection[int],
                     more: Sequence[ObjectDescription]) -> 'ScenarioObstacles':
         """
-        Give these obstacles with some, and more, that live: the run itself moves them.
+        Return these obstacles with some, and more, that live: the run itself moves them.
 
         They are absent in all states here.
 
@@ -140,14 +140,14 @@ class ScenarioObstacles:
 
     def track(self, column: int) -> tuple[FloatArray, FloatArray]:
         """
-        Give the recorded course of an obstacle, of a held one as well.
+        Return the recorded course of an obstacle, of a held one as well.
 
         :return: poses and velocities (n, 3) from its first time step on
         """
         return self._held[column] if column in self._held else self._recorded(column)
 
     def first_step(self, column: int) -> int:
-        """Give the first time step of an obstacle's recorded course."""
+        """Return the first time step of an obstacle's recorded course."""
         return self.first_k + int(np.argmax(np.isfinite(self._poses[:, column, 0])))
 
     def _recorded(self, column: int) -> tuple[FloatArray, FloatArray]:

@@ -71,13 +71,13 @@ class KnownCourses(Protocol):
     """Whatever knows where all objects are at a scenario time step."""
 
     def states_at(self, k: int) -> ObjectStates:
-        """Give the poses and velocities of all objects at a time step."""
+        """Return the poses and velocities of all objects at a time step."""
 
 
 def recorded_future(obstacles: KnownCourses, k: int,
                     steps: int) -> tuple[FloatArray, FloatArray]:
     """
-    Give the true future of all obstacles (`prediction: recorded`, which leaks).
+    Return the true future of all obstacles (`prediction: recorded`, which leaks).
 
     :return: poses and velocities, both (steps + 1, M, 3); NaN where absent
     """
@@ -213,7 +213,7 @@ class LanePrediction:
 
     def _place(self, poses: FloatArray, max_angles: FloatArray | float = _MAX_LANE_ANGLE,
                ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Give the number among the used lanes, or -1, and s and d of poses (N, 3)."""
+        """Return the number among the used lanes, or -1, and s and d of poses (N, 3)."""
         found = self._network.lanelets_at(poses)
         limits = np.broadcast_to(max_angles, len(poses))
         lanes = np.full(len(poses), _NO_LANE, dtype=np.int64)

@@ -53,7 +53,7 @@ def read_human_note(source: str) -> dict[int, int]:
 
 def plays_its_humans(path: Path) -> bool:
     """
-    Tell whether a file is an exported run whose humans play back while its AVs drive.
+    Return whether a file is an exported run whose humans play back while its AVs drive.
 
     :raises InputError: if it cannot be read.
     """

@@ -41,7 +41,7 @@ _MIN_STEERING_SPEED = 0.5
 def problem_pose(problem: PlanningProblem, rear_to_center: float,
                  wheelbase: float | None = None) -> VehicleState:
     """
-    Give the initial state of a planning problem as a rear-axle state.
+    Return the initial state of a planning problem as a rear-axle state.
 
     The position of a CommonRoad state is the centre of the vehicle (so documented by the state
     classes of the KS model, and read so by the reactive planner, which shifts it to the rear
@@ -67,7 +67,7 @@ def problem_pose(problem: PlanningProblem, rear_to_center: float,
 
 def lanelet_pose(network: RoadNetwork, state: VehicleState) -> VehicleState:
     """
-    Give the simulator-side initial pose of an AV from lanelet geometry (CRG III-A1).
+    Return the simulator-side initial pose of an AV from lanelet geometry (CRG III-A1).
 
     :param network: the road network
     :param state: the planner-side state of the rear axle
@@ -272,7 +272,7 @@ def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scen
 
 
 def _safe_speed(gap: float, leader_speed: float) -> float:
-    """Give the speed from which a driver can stop behind a braking leader (Krauss' model)."""
+    """Return the speed from which a driver can stop behind a braking leader (Krauss' model)."""
     reaction = _BRAKING * _REACTION_S
     root = math.sqrt(reaction ** 2 + max(leader_speed, 0.0) ** 2
                      + 2.0 * _BRAKING * max(float(gap), 0.0))

@@ -90,7 +90,7 @@ class Key:
 
     @property
     def required(self) -> bool:
-        """Tell whether it has to be given."""
+        """Return whether it has to be given."""
         return self.default is MISSING
 
     def mark(self, kind: type[T]) -> T | None:
@@ -107,7 +107,7 @@ def mark_of(marks: tuple[Any, ...], kind: type[T]) -> T | None:
 
 
 def form_of(kind: type[Any]) -> Form:
-    """Give how a dataclass stands in a file."""
+    """Return how a dataclass stands in a file."""
     form: Form = getattr(kind, 'FORM', _PLAIN)
     return form
 
@@ -118,7 +118,7 @@ _KEYS: dict[Any, tuple[Key, ...]] = {}
 
 
 def keys_of(kind: Any) -> tuple[Key, ...]:
-    """Give the fields of a dataclass in their order."""
+    """Return the fields of a dataclass in their order."""
     if kind not in _KEYS:
         _KEYS[kind] = _keys(kind)
     return _KEYS[kind]
@@ -153,7 +153,7 @@ def known_keys(kind: type[Any]) -> tuple[str, ...]:
 
 
 def sentences_of(kind: type[Any]) -> dict[str, str]:
-    """Give what the docstring of a class says of each of its fields, in one line each."""
+    """Return what the docstring of a class says of each of its fields, in one line each."""
     text = inspect.cleandoc(kind.__doc__ or '')
     return {name: ' '.join(words.split()).rstrip('.') for name, words in _PARAM.findall(text)}
 
@@ -173,18 +173,18 @@ def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def choices_of(hint: Any) -> tuple[Any, ...]:
-    """Give the members of a union; another type alone."""
+    """Return the members of a union; another type alone."""
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 
 def is_composite(hint: Any) -> bool:
-    """Tell whether a value has places of its own: a mapping, a list of lists or of mappings."""
+    """Return whether a value has places of its own: a mapping, a list of lists or of mappings."""
     plain, _ = split(hint)
     return any(is_dataclass(choice) or get_origin(choice) is tuple for choice in choices_of(plain))
 
 
 def wanted(hint: Any, marks: tuple[Any, ...] = ()) -> str:
-    """Say what kind of value is meant, to stand behind "give"."""
+    """Return what kind of value is meant, to stand behind "give"."""
     hint, own = split(hint)
     marks = (*marks, *own)
     special = mark_of(marks, Special)
@@ -230,7 +230,7 @@ def _plural(hint: Any, marks: tuple[Any, ...]) -> str:
 
 
 def advice(hint: Any, marks: tuple[Any, ...]) -> str:
-    """Say what to do about a wrong value."""
+    """Return what to do about a wrong value."""
     given = mark_of(marks, Advice)
     if given is not None:
         return given.remedy

@@ -23,16 +23,16 @@ class FileKind(NamedTuple):
 
     @property
     def declared(self) -> type[Any]:
-        """Give the class that declares it."""
+        """Return the class that declares it."""
         kind: type[Any] = getattr(importlib.import_module(self.module), self.name)
         return kind
 
     def schema(self) -> dict[str, Any]:
-        """Give its JSON Schema."""
+        """Return its JSON Schema."""
         return json_schema(self.declared, self.title)
 
     def keys(self) -> frozenset[str]:
-        """Give the keys that a file of it may begin with."""
+        """Return the keys that a file of it may begin with."""
         schema = self.schema()
         root = schema['$defs'][schema['$ref'].rpartition('/')[2]]
         return frozenset(root.get('properties', ()))

@@ -158,7 +158,7 @@ def _number(kind: type[Any], within: Within) -> Schema:
 
 
 def _conditions(kind: Any) -> list[Schema]:
-    """Say which keys and values go together."""
+    """Return which keys and values go together."""
     form = form_of(kind)
     found: list[Schema] = []
     for by, places in form.one_of.items():

@@ -30,7 +30,7 @@ class Within:
     endless: bool = False
 
     def holds(self, value: float) -> bool:
-        """Tell whether a number, not NaN, is allowed."""
+        """Return whether a number, not NaN, is allowed."""
         if self.or_zero and value == 0:
             return True
         if math.isinf(value) and not self.endless:
@@ -38,7 +38,7 @@ class Within:
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
     def __str__(self) -> str:
-        """Say which numbers are meant, to stand behind the noun."""
+        """Return which numbers are meant, to stand behind the noun."""
         if self.low == -math.inf and self.high == math.inf:
             return ''
         zero = ', or 0' if self.or_zero else ''
@@ -61,7 +61,7 @@ class Wording:
     remedy: str
 
     def fits(self, text: str) -> bool:
-        """Tell whether a text is of this form."""
+        """Return whether a text is of this form."""
         return re.fullmatch(self.pattern, text) is not None
 
 
@@ -169,7 +169,7 @@ class Special:
         raise NotImplementedError
 
     def __str__(self) -> str:
-        """Say what is wanted, to stand behind "give"."""
+        """Return what is wanted, to stand behind "give"."""
         raise NotImplementedError
 
 
@@ -177,11 +177,11 @@ class Named:
     """A name that may be a file's: `FILE.yaml` and `FILE.py:Class` are relative to the file."""
 
     def resolved(self, name: str, base: Path) -> str:
-        """Give the name as the program has it."""
+        """Return the name as the program has it."""
         return named_file(name, base)
 
     def written(self, name: str, base: Path) -> str:
-        """Give the name as it can be read from anywhere."""
+        """Return the name as it can be read from anywhere."""
         return named_file(name, Path.cwd())
 
 

@@ -68,7 +68,7 @@ def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
 
 
 def faults_of(kind: type[Any], values: Any, where: str, base: Path) -> tuple[InputError, ...]:
-    """Give everything that `read` would refuse, each by itself."""
+    """Return everything that `read` would refuse, each by itself."""
     try:
         _Reader(base).value(kind, (), values, '', where)
     except InputError as error:
@@ -331,6 +331,6 @@ def _refuse(given: Any, key: str, where: str, remedy: str) -> NoReturn:
 
 
 def _as_yaml(given: Any) -> str:
-    """Say how YAML writes a number that it has taken for a text."""
+    """Return how YAML writes a number that it has taken for a text."""
     number = isinstance(given, str) and _EXPONENT.fullmatch(given)
     return ' (YAML: 1.0e-3, not 1e-3)' if number else ''

@@ -15,7 +15,7 @@ _HERE = Path()
 
 def write(value: Any, base: Path = _HERE) -> Any:
     """
-    Give the YAML values from which `read` makes the same again, from any folder.
+    Return the YAML values from which `read` makes the same again, from any folder.
 
     :param value: a dataclass that `read` gave, or could have given.
     :param base: directory against which its relative file names were meant.

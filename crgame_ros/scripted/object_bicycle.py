@@ -35,7 +35,7 @@ _START = 0.2
 def follow(model: IdmParameters, speed: float, desired: float, gap: float,
            leader_speed: float) -> float:
     """
-    Give the acceleration behind a leader that may brake its hardest at any moment [m/s^2].
+    Return the acceleration behind a leader that may brake its hardest at any moment [m/s^2].
 
     The same as `idm` of traffic has, to the last bit.
 
@@ -104,7 +104,7 @@ class BicycleMotion(Integrated):
         self._following = follow(self._model, self._speed, wanted, gap, speed)
 
     def _leader(self, others: ObjectSurroundings) -> tuple[float, float]:
-        """Give gap and speed along the path of the nearest one ahead; infinite without one."""
+        """Return gap and speed along the path of the nearest one ahead; infinite without one."""
         shape = self._type.shape
         front = self._s + 0.5 * shape.length
         look = self._speed**2 / (2.0 * self._type.deceleration) + _LOOK
@@ -137,7 +137,7 @@ class BicycleMotion(Integrated):
             self._s, self._speed = min(self._s, end), 0.0
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Give the centre, ahead of the rear axle."""
+        """Return the centre, ahead of the rear axle."""
         if self._gone:
             return ABSENT, ABSENT
         ahead = self._type.rear_to_center

@@ -72,7 +72,7 @@ class Crossing:
 
     def stop(self, s: float, speed: float, others: ObjectSurroundings) -> float:
         """
-        Give the arc length [m] at which he must stop, infinite where he may walk on.
+        Return the arc length [m] at which he must stop, infinite where he may walk on.
 
         :param s: his present arc length [m]
         :param speed: his present speed [m/s]
@@ -110,7 +110,7 @@ class Crossing:
         return way.arrival < max(enters + self._walker.headway, leaves + CLEARANCE_S)
 
     def _time_to(self, distance: float, speed: float) -> float:
-        """Give the time for a distance when he speeds up to his own speed [s]."""
+        """Return the time for a distance when he speeds up to his own speed [s]."""
         distance = max(distance, 0.0)
         a, v = self._walker.acceleration, max(self._walker.speed, speed)
         run_up = (v**2 - speed**2) / (2.0 * a)

@@ -33,7 +33,7 @@ class ObjectMotion(ABC):
 
     @abstractmethod
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Give the centre's pose (3) and its derivatives (3); NaN while absent."""
+        """Return the centre's pose (3) and its derivatives (3); NaN while absent."""
 
 
 class Integrated(ObjectMotion):
@@ -78,7 +78,7 @@ class Standstill(ObjectMotion):
         """Stay."""
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Give the pose."""
+        """Return the pose."""
         return self._pose, (0.0, 0.0, 0.0)
 
 
@@ -112,7 +112,7 @@ class Predetermined(ObjectMotion):
         self._time_s = time_s + duration_s
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Give the state of the present time."""
+        """Return the state of the present time."""
         now, first, last = self._time_s, float(self._times[0]), float(self._times[-1])
         if now < first - ROUNDING or now > last + ROUNDING and not self._stays:
             return ABSENT, ABSENT

@@ -89,7 +89,7 @@ class ParticleMotion(Integrated):
         self._gone = self._spec.end == 'vanish' and self._s >= self._goal - _ARRIVED
 
     def _point(self, s: float) -> tuple[float, float]:
-        """Give the point of the path at an arc length; straight on where it vanishes."""
+        """Return the point of the path at an arc length; straight on where it vanishes."""
         if self._spec.end == 'stay':
             s = min(s, self._goal)
         segment = min(int(np.searchsorted(self._corners, s, side='right')) - 1,
@@ -115,7 +115,7 @@ class ParticleMotion(Integrated):
         self._s = max(self._s, best)
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Give position and velocity; its yaw rate counts as 0, for it turns at once."""
+        """Return position and velocity; its yaw rate counts as 0, for it turns at once."""
         if self._gone:
             return ABSENT, ABSENT
         return (*self._position, self._yaw), (*self._velocity, 0.0)

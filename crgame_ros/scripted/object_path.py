@@ -57,7 +57,7 @@ class ObjectPath:
         self.points: FloatArray = self._poses[:, :2]
 
     def _speeds(self, u: FloatArray) -> FloatArray:
-        """Give |X'| at stations of any shape."""
+        """Return |X'| at stations of any shape."""
         first = self._lane.tangents(u.reshape(-1))
         return np.hypot(first[:, 0], first[:, 1]).reshape(u.shape)
 
@@ -67,11 +67,11 @@ class ObjectPath:
         return float(self.s[-1])
 
     def arc_lengths(self, stations: FloatArray) -> FloatArray:
-        """Give the arc lengths [m] of stations of the lane [m]."""
+        """Return the arc lengths [m] of stations of the lane [m]."""
         return np.interp(stations, self._u, self.s)
 
     def pose(self, s: float) -> tuple[float, float, float, float]:
-        """Give x [m], y [m], yaw [rad] and curvature [1/m] at an arc length [m]."""
+        """Return x [m], y [m], yaw [rad] and curvature [1/m] at an arc length [m]."""
         here = self._lane.at(np.interp([s], self.s, self._u))
         x, y, yaw, curvature = (float(column[0]) for column in here[:4])
         beyond = s - min(max(s, 0.0), self.length)

@@ -27,7 +27,7 @@ class ObjectSurroundings:
     widths: FloatArray
 
     def chosen(self, rows: NDArray[np.bool_]) -> 'ObjectSurroundings':
-        """Give some of them."""
+        """Return some of them."""
         return ObjectSurroundings(self.poses[rows], self.velocities[rows], self.lengths[rows],
                                   self.widths[rows])
 

@@ -94,17 +94,17 @@ class AutonomousVehicle:
 
     @property
     def driven(self) -> bool:
-        """Tell whether a person has taken the vehicle over."""
+        """Return whether a person has taken the vehicle over."""
         return self._driven is not None
 
     @property
     def busy(self) -> bool:
-        """Tell whether a request is out that has not been answered."""
+        """Return whether a request is out that has not been answered."""
         return self._busy_since is not None
 
     @property
     def uses_no_plan(self) -> bool:
-        """Tell whether the vehicle brakes because its plan is used up or never came."""
+        """Return whether the vehicle brakes because its plan is used up or never came."""
         return self._without_plan
 
     def plan_age_steps(self, n: int) -> int | None:
@@ -225,7 +225,7 @@ class AutonomousVehicle:
     def _in_simulation(self, states: NDArray[np.float64], true: VehicleState,
                        told: VehicleState) -> NDArray[np.float64]:
         """
-        Give planned states where the vehicle is to drive them.
+        Return planned states where the vehicle is to drive them.
 
         A plan that starts where the AV wrongly believes to be is driven from where it is, unless
         a tracker steers by that same belief.
@@ -240,7 +240,7 @@ class AutonomousVehicle:
         return mapped
 
     def planned_state(self, n: int) -> VehicleState | None:
-        """Give the followed plan's state at step n; None beyond its end or without one."""
+        """Return the followed plan's state at step n; None beyond its end or without one."""
         return self._tracker.sample(n)
 
     def drive(self, command: DriverCommand, dt_s: float) -> VehicleState:

@@ -106,7 +106,7 @@ def make_perception(av_id: str, spec: PerceptionSpec, descriptions: Sequence[Obj
 
 def published_states(states: Sequence[VehicleState]) -> NDArray[np.float64]:
     """
-    Give states (V, 8) of driven vehicles as `/vehicles/state` carries them.
+    Return states (V, 8) of driven vehicles as `/vehicles/state` carries them.
 
     Both runners let perception see these bits.
     """
@@ -116,13 +116,13 @@ def published_states(states: Sequence[VehicleState]) -> NDArray[np.float64]:
 
 
 def published(state: VehicleState) -> VehicleState:
-    """Give one vehicle's state as `/vehicles/state` carries it."""
+    """Return one vehicle's state as `/vehicles/state` carries it."""
     return VehicleState(*published_states([state])[0].tolist())
 
 
 def ego_of(request: JointSeries) -> VehicleState:
     """
-    Give the state of the AV that a plan request is for, in its scenario coordinates.
+    Return the state of the AV that a plan request is for, in its scenario coordinates.
 
     :param request: or its head: the AV's joints come first.
     """

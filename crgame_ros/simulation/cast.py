@@ -25,7 +25,7 @@ NAMED = 8
 
 def cast_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
     """
-    Give each AV of a game its planning problem.
+    Return each AV of a game its planning problem.
 
     An AV for which the game names none takes the next one that nobody drives. Problems that
     start on one spot are alternatives: of these the first is taken. The problem of a recorded
@@ -103,7 +103,7 @@ def _free_problems(named: list[Part],
 
 
 def _on_one_spot(first: PlanningProblem, second: PlanningProblem) -> bool:
-    """Tell whether two vehicles touch at the start, or so soon that nobody could prevent it."""
+    """Return whether two vehicles touch at the start, or so soon that nobody could prevent it."""
     if first.initial_state.time_step != second.initial_state.time_step:
         return False
     return any(shapely.intersects(_placed(first, time_s), _placed(second, time_s))

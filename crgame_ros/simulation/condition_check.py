@@ -33,7 +33,7 @@ class ConditionCheck:
         self._objects = objects
 
     def holds(self, condition: Condition) -> bool:
-        """Tell whether a condition holds; NaN, somebody who is absent, makes it false."""
+        """Return whether a condition holds; NaN, somebody who is absent, makes it false."""
         if isinstance(condition, AtStep):
             return self._k >= condition.step
         if isinstance(condition, AtTime):

@@ -69,6 +69,6 @@ class ContactStop:
 
 
 def at_rest(before: VehicleState, after: VehicleState) -> VehicleState:
-    """Give the state of a vehicle that was stopped where it was; its front wheels have turned."""
+    """Return the state of a vehicle that was stopped where it was; its front wheels have turned."""
     return before._replace(speed=0.0, steering_angle=after.steering_angle, acceleration=0.0,
                            yaw_rate=0.0, steering_rate=after.steering_rate)

@@ -52,7 +52,7 @@ class Contact:
 
     @property
     def verdict(self) -> str:
-        """Say who could have avoided it."""
+        """Return who could have avoided it."""
         if self.n == 0:
             return 'nobody: they touch from the start'
         able = ' or '.join(self.avoidable_by) or 'nobody by braking'
@@ -61,7 +61,7 @@ class Contact:
         return able
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it (`docs/planners.md`)."""
+        """Return it as JSON has it (`docs/planners.md`)."""
         return {'vehicle': self.vehicle_id, 'with': self.other_id, 'n': self.n,
                 'side': self.side, 'kind': self.kind, 'speed': round(self.speed, 2),
                 'other_speed': round(self.other_speed, 2), 'avoidable_by': self.verdict}
@@ -90,7 +90,7 @@ class Motions:
     object_velocities: NDArray[np.float64]
 
     def course(self, column: int) -> Course:
-        """Give how one moved, by its column among the descriptions."""
+        """Return how one moved, by its column among the descriptions."""
         item = self.descriptions[column]
         dt_s, driven = self.scheduler.dt_s, self.vehicle_states.shape[1]
         if column < driven:
@@ -177,7 +177,7 @@ def _contact(motions: Motions, touch: _Touch) -> Contact:
 
 
 def _unstopped(course: Course, n: int, dt_s: float) -> Course:
-    """Give the course of who was stopped at a step, as if it had gone on into what it touched."""
+    """Return the course of who was stopped at a step, as if it had gone on into what it touched."""
     before = max(n - 1, 0)
     poses, speeds = course.poses.copy(), course.speeds.copy()
     yaw = float(poses[before, 2])

@@ -144,7 +144,7 @@ class Simulation:
                 for bits, command in zip(self.lights, self.commands, strict=True)]
 
     def begin(self) -> StepResult:
-        """Give the requests and objects of step 0, before anything has moved."""
+        """Return the requests and objects of step 0, before anything has moved."""
         self._localise()
         self._add_to_hash()
         return self._result()
@@ -321,7 +321,7 @@ class Simulation:
                           np.array(self.objects.poses, dtype=np.float64).tobytes())
 
     def state_hash(self) -> str:
-        """Give the SHA-256 over every driven vehicle's state at every step, or all objects'."""
+        """Return the SHA-256 over every driven vehicle's state at every step, or all objects'."""
         return self._hash.hexdigest()
 
 

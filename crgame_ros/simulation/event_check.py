@@ -30,7 +30,7 @@ MAX_LISTED = 12
 
 
 def held_obstacles(game: Game) -> frozenset[int]:
-    """Give the ids of the obstacles that wait for an event to release them."""
+    """Return the ids of the obstacles that wait for an event to release them."""
     return frozenset(event.action.object for event in game.events
                      if isinstance(event.action, Release))
 

@@ -72,7 +72,7 @@ class ObservedRun:
 
     @property
     def road_transforms(self) -> tuple[RigidTransform, ...]:
-        """Give through which transform each driven vehicle is seen on the road (CRG 28)."""
+        """Return through which transform each driven vehicle is seen on the road (CRG 28)."""
         humans = sum(item.role is Role.HUMAN for item in self.vehicles)
         return road_transforms(humans, self.av_transforms)
 
@@ -81,7 +81,7 @@ def documented_run(game: GameDocument, loaded: LoadedScenario,
                    descriptions: Sequence[ObjectDescription],
                    occupancy: OccupancyMap | None = None) -> ObservedRun:
     """
-    Give what an observer knows of a run from its documents, live or recorded.
+    Return what an observer knows of a run from its documents, live or recorded.
 
     :param descriptions: of everything that can appear.
     """

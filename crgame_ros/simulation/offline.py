@@ -96,7 +96,7 @@ class OfflineResult:
     tasks: tuple[TaskEntry, ...] = ()
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
-        """Give the states (n + 1, 8) of one driven vehicle."""
+        """Return the states (n + 1, 8) of one driven vehicle."""
         return self.vehicle_states[:, self.setup.vehicle_ids.index(vehicle_id)]
 
 
@@ -219,7 +219,7 @@ def run_offline(
 
 
 def observed_run(setup: Setup) -> ObservedRun:
-    """Give what observers know of a run before it begins."""
+    """Return what observers know of a run before it begins."""
     return ObservedRun(
         setup.vehicle_descriptions, setup.obstacles.descriptions, setup.loaded, setup.scheduler,
         setup.game.drivability, setup.open_occupancy(), tuple(av.transform for av in setup.avs),
@@ -280,7 +280,7 @@ class _Trace:
 
     @property
     def stop(self) -> VehicleDrivability | None:
-        """Give the violation that ends the run, once there is one."""
+        """Return the violation that ends the run, once there is one."""
         return None if self._drivability is None else self._drivability.stop
 
     def result(self, simulation: Simulation,

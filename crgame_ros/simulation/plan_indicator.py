@@ -106,7 +106,7 @@ class PlanIndicator:
 
     def _aside(self, lanelets: Sequence[int], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Give how far poses are to the left of their lane's middle, as the vehicle sees it [m].
+        Return how far poses are to the left of their lane's middle, as the vehicle sees it [m].
 
         :return: (M) M <= N, of the vehicle now, and of the poses up to where the plan leaves it.
         """
@@ -122,14 +122,14 @@ class PlanIndicator:
         return -d[here] if self._against(lanelets[0], poses[0]) else d[here]
 
     def _against(self, lanelet: int, pose: NDArray[np.float64]) -> bool:
-        """Tell whether somebody drives against a lanelet's direction, as who overtakes does."""
+        """Return whether somebody drives against a lanelet's direction, as who overtakes does."""
         x, y, yaw = pose.tolist()
         line = self._roads.line(lanelet)
         heading = line.heading_at(np.array(self._roads.locate(lanelet, x, y)[0]))
         return math.cos(float(heading) - yaw) < 0.0
 
     def _ahead(self, lanelets: Sequence[int], pose: NDArray[np.float64]) -> Light | None:
-        """Give what the plan does first."""
+        """Return what the plan does first."""
         here, before_here = lanelets[0], self._before
         x, y, yaw = pose.tolist()
         turn = self._turns.turn_on(here, before_here)
@@ -154,7 +154,7 @@ class PlanIndicator:
         return None
 
     def _at_fork(self, lanelets: Sequence[int], pose: NDArray[np.float64]) -> Light | None:
-        """Give where the route turns after the plan's end, if that is near."""
+        """Return where the route turns after the plan's end, if that is near."""
         here = lanelets[-1]
         left = BEFORE_FORK - math.dist(self._roads.line(here).points[-1], pose[:2])
         while left >= 0.0 and (following := self._onward.get(here)) is not None:
@@ -210,7 +210,7 @@ class PlanIndicators:
             self.shown[place] = indicator.shown
 
     def _turn(self, n: int) -> int | None:
-        """Give the place of the AV whose turn it is: one at most, so that no step takes long."""
+        """Return the place of the AV whose turn it is: one at most, so that no step takes long."""
         ticks, rest = divmod(n, self._scheduler.steps_per_tick)
         if self._scheduler.steps_per_tick > 1 and not rest:
             return None
@@ -218,7 +218,7 @@ class PlanIndicators:
             (ticks * self._steps_in_tick + max(0, rest - 1)) % self._period)
 
     def _coming(self, n: int, av: AutonomousVehicle) -> NDArray[np.float64]:
-        """Give where an AV is, and where its plan leads from now on, in the roads' coordinates."""
+        """Return where an AV is, and where its plan leads from now on, in the roads' coordinates."""
         poses = [av.state[:3]]
         for step in range(n + self._apart, n + round(LOOK_AHEAD_S / self._scheduler.dt_s) + 1,
                           self._apart):

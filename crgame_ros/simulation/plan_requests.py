@@ -160,7 +160,7 @@ class PlanRequests:
 
 
 def _is_told_lights(setup: Setup, av: AvSetup) -> bool:
-    """Tell whether an AV's planner, or one that an event brings in, asks for others' lights."""
+    """Return whether an AV's planner, or one that an event brings in, asks for others' lights."""
     if av.spec.lights is not None:
         return av.spec.lights
     swaps = [event.action for event in setup.game.events if isinstance(event.action, PlannerSwap)]

@@ -86,7 +86,7 @@ class PutBack:
         return avs[0].transform if avs else RigidTransform()
 
     def _places(self, index: int, now: VehicleState) -> Iterator[Place]:
-        """Give poses of the rear axle on the lane, in simulation coordinates, best first."""
+        """Yield poses of the rear axle on the lane, in simulation coordinates, best first."""
         network, transform = self._setup.network, self._transform(index)
         x, y, yaw = transform.to_scenario(np.array(now[:3])).tolist()
         lane = self._lane(x, y, yaw)

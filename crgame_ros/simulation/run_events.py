@@ -67,7 +67,7 @@ class RunEvents:
         return reason
 
     def actions(self, fired: Sequence[FiredEvent]) -> list[Action]:
-        """Give what events do, in their order."""
+        """Return what events do, in their order."""
         return [self._actions[event.name] for event in fired]
 
     def at_tick(self, n: int, k: int, states: Sequence[VehicleState],
@@ -100,7 +100,7 @@ class RunEvents:
         return tuple(fired)
 
     def _hindrance(self, event: EventSpec, k: int) -> str | None:
-        """Say why an event cannot take effect now, if it cannot."""
+        """Return why an event cannot take effect now, if it cannot."""
         action = event.action
         if isinstance(action, TrafficChange):
             return self._absence(action.agent)
@@ -116,7 +116,7 @@ class RunEvents:
         return None if present else f'{object_id} is not there'
 
     def _absence(self, agent: str) -> str | None:
-        """Say that an agent is not on the road, if so."""
+        """Return that an agent is not on the road, if so."""
         if agent == ALL_AGENTS or self._objects is None:
             return None
         present = math.isfinite(self._objects.poses[self._columns[agent], 0])

@@ -78,7 +78,7 @@ class RunTasks:
         self._n = 0
 
     def _begins(self, spec: TaskSpec) -> TaskCondition | None:
-        """Give when a task begins by itself: a request also by the time of its event."""
+        """Return when a task begins by itself: a request also by the time of its event."""
         if spec.when is not None or not isinstance(spec.task, TakeOverPrompt):
             return spec.when
         about = next((event.when for event in self._setup.game.events

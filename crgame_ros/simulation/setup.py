@@ -92,7 +92,7 @@ class AvSetup:
 
     @property
     def id(self) -> str:  # noqa: A003
-        """Give the id of the vehicle, such as av0."""
+        """Return the id of the vehicle, such as av0."""
         return self.spec.id
 
     @property
@@ -159,13 +159,13 @@ class Setup:
 
     @cached_property
     def road(self) -> 'RoadBoundary':
-        """Give the road's boundary, made at first use (3 to 50 ms): ask for it before a run."""
+        """Return the road's boundary, made at first use (3 to 50 ms): ask for it before a run."""
         from crgame_ros.roads.road_boundary import RoadBoundary
         return RoadBoundary(self.loaded.scenario.lanelet_network)
 
     @property
     def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
-        """Give the driven vehicles: humans, then AVs."""
+        """Return the driven vehicles: humans, then AVs."""
         return (*self.humans, *self.avs)
 
     @property
@@ -245,7 +245,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
 
 
 def _from_anywhere(driver: str, base: Path) -> str:
-    """Give a policy's file so that it is found from any folder; other drivers stay."""
+    """Return a policy's file so that it is found from any folder; other drivers stay."""
     if not driver.startswith(POLICY):
         return driver
     return POLICY + str((base / Path(driver.removeprefix(POLICY)).expanduser()).resolve())

@@ -37,7 +37,7 @@ class StoppedDrivers:
         self.events: tuple[FiredEvent, ...] = ()
 
     def events_at(self, n: int) -> tuple[FiredEvent, ...]:
-        """Give what it did in a step."""
+        """Return what it did in a step."""
         return tuple(event for event in self.events if event.n == n)
 
     def act(self, n: int, before: Sequence[VehicleState],
@@ -82,6 +82,6 @@ class StoppedDrivers:
 
 
 def _has_driver(driven: Driven) -> TypeGuard[HumanVehicle | AutonomousVehicle]:
-    """Tell whether a person drives a vehicle now; traces go on, and so do plans."""
+    """Return whether a person drives a vehicle now; traces go on, and so do plans."""
     return isinstance(driven, HumanVehicle) or (
         isinstance(driven, AutonomousVehicle) and driven.driven)

@@ -50,11 +50,11 @@ class Surroundings:
         self._objects = objects
 
     def of_agents(self, k: int) -> 'WorldView':
-        """Give what agents react to at tick k."""
+        """Return what agents react to at tick k."""
         return self._reader.view(k, *self._joints, self._objects)
 
     def of_scripted(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Give poses and velocities (O, 3), lengths and widths (O) that objects react to."""
+        """Return poses and velocities (O, 3), lengths and widths (O) that objects react to."""
         poses, rates = driven_centers(*self._joints, self._ahead)
         return (np.concatenate((poses, self._objects.poses[self._columns])),
                 np.concatenate((rates, self._objects.velocities[self._columns])),

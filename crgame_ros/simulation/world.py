@@ -26,7 +26,7 @@ class TrafficFeed(Protocol):
     """
 
     def states_for(self, k: int) -> tuple[ObjectStates, int]:
-        """Give the agents at tick k, and the tick whose states could be used for that."""
+        """Return the agents at tick k, and the tick whose states could be used for that."""
 
     def tell(self, view: 'WorldView') -> None:
         """Tell what the agents react to."""
@@ -123,7 +123,7 @@ class World:
 
     def settle(self, states: Sequence[VehicleState]) -> ObjectStates:
         """
-        Give all objects at this tick once events have happened, and let what lives see them.
+        Return all objects at this tick once events have happened, and let what lives see them.
 
         :param states: of the driven vehicles at this tick.
         """

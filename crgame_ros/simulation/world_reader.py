@@ -27,7 +27,7 @@ Joints = Sequence[Sequence[float]] | FloatArray
 def driven_centers(positions: Joints, velocities: Joints,
                    rear_to_center: Sequence[float]) -> tuple[FloatArray, FloatArray]:
     """
-    Give the centres of driven vehicles.
+    Return the centres of driven vehicles.
 
     :param positions: (V, 4) joints of the rear axles
     :param velocities: (V, 4) their derivatives
@@ -61,7 +61,7 @@ class WorldReader:
     def view(self, k: int, positions: Joints, velocities: Joints,
              objects: ObjectStates) -> 'WorldView':
         """
-        Give what agents react to at tick k.
+        Return what agents react to at tick k.
 
         :param positions: (V, 4) joints of the driven vehicles
         :param velocities: (V, 4)
@@ -76,6 +76,6 @@ class WorldReader:
 
 
 def joints_of(states: Sequence[VehicleState]) -> tuple[Joints, Joints]:
-    """Give the joint positions and velocities of driven vehicles, (V, 4) each."""
+    """Return the joint positions and velocities of driven vehicles, (V, 4) each."""
     joints = [vehicle_to_joints(state) for state in states]
     return [item[0] for item in joints], [item[1] for item in joints]

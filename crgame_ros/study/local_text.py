@@ -40,16 +40,16 @@ class LocalText:
                          'give a text, or texts by language: {en: ..., de: ...}')
 
     def __bool__(self) -> bool:
-        """Tell whether there is anything to read."""
+        """Return whether there is anything to read."""
         return any(text for _, text in self.by_language)
 
     def in_language(self, language: str) -> str:
-        """Give it in a language, else in that for all, else in the first that there is."""
+        """Return it in a language, else in that for all, else in the first that there is."""
         texts = dict(self.by_language)
         return texts.get(language, texts.get('', next(iter(texts.values()), '')))
 
     def lacks(self, language: str) -> bool:
-        """Tell whether people of a language get it in another one."""
+        """Return whether people of a language get it in another one."""
         return bool(self.by_language) and not {language, ''} & {
             code for code, _ in self.by_language}
 
@@ -70,7 +70,7 @@ class _LocalTextMark(Special):
             'type': 'object', 'additionalProperties': {'type': 'string'}, 'minProperties': 1}]}
 
     def __str__(self) -> str:
-        """Say what is wanted."""
+        """Return what is wanted."""
         return 'a text, or texts by language: {en: ..., de: ...}'
 
 

@@ -92,7 +92,7 @@ class ParticipantSession:
 
     @property
     def next_item(self) -> SessionItem | None:
-        """Give what is to be done now; None at the end, or once somebody has ended it."""
+        """Return what is to be done now; None at the end, or once somebody has ended it."""
         if any(entry['entry'] == SessionEvent.ENDED for entry in self.journal.entries):
             return None
         done = self.done
@@ -100,7 +100,7 @@ class ParticipantSession:
 
     @property
     def language(self) -> str | None:
-        """Give the language that the participant has chosen last; None before."""
+        """Return the language that the participant has chosen last; None before."""
         return next((entry['language'] for entry in reversed(self.journal.entries)
                      if entry['entry'] == SessionEvent.LANGUAGE), None)
 
@@ -134,7 +134,7 @@ class ParticipantSession:
 
     def start(self, run: str = '') -> int:
         """
-        Say that the next item begins.
+        Return that the next item begins.
 
         :param run: name of the recording's folder, of a drive.
         :return: which attempt it is, from 1 on; a trial that did not finish is another attempt's.
@@ -145,7 +145,7 @@ class ParticipantSession:
         return attempt
 
     def questions(self, item: SessionItem) -> tuple[Question, ...]:
-        """Give what is asked in an item; empty where nothing is."""
+        """Return what is asked in an item; empty where nothing is."""
         if isinstance(item.what, Fields):
             return self.study.fields
         if isinstance(item.what, Questions):
@@ -154,7 +154,7 @@ class ParticipantSession:
 
     def finish(self, answers: Mapping[str, Any] | None = None, **told: Any) -> SessionItem:
         """
-        Say that the next item is done: nothing of it is asked again.
+        Return that the next item is done: nothing of it is asked again.
 
         :param answers: to its questions, as the participant gave them.
         :param told: what else is known of it: a drive's outcome.

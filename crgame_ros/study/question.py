@@ -43,7 +43,7 @@ class LikertQuestion:
                              'give one for each point')
 
     def refusal(self, answer: Any) -> str:
-        """Say why an answer is none of this question, empty if it is one."""
+        """Return why an answer is none of this question, empty if it is one."""
         whole = isinstance(answer, int | float) and not isinstance(answer, bool) \
             and answer == int(answer) if _finite(answer) else False
         return '' if whole and 1 <= answer <= self.points else f'give 1 to {self.points}'
@@ -75,7 +75,7 @@ class SliderQuestion:
             raise InputError(f'"high" is not above "low", {self.low:g}', '', 'give a higher one')
 
     def refusal(self, answer: Any) -> str:
-        """Say why an answer is none of this question, empty if it is one."""
+        """Return why an answer is none of this question, empty if it is one."""
         fits = _finite(answer) and self.low <= answer <= self.high
         return '' if fits else f'give {self.low:g} to {self.high:g}'
 
@@ -103,11 +103,11 @@ class ChoiceQuestion:
 
     @property
     def texts(self) -> dict[str, LocalText]:
-        """Give what people read, by the answer's name."""
+        """Return what people read, by the answer's name."""
         return {str(name): LocalText.of(text) for name, text in self.choices.items()}
 
     def refusal(self, answer: Any) -> str:
-        """Say why an answer is none of this question, empty if it is one."""
+        """Return why an answer is none of this question, empty if it is one."""
         known = set(map(str, self.choices))
         if self.several:
             fits = isinstance(answer, list) and all(isinstance(item, str) for item in answer) \
@@ -136,7 +136,7 @@ class NumberQuestion:
     unit: Annotated[str, Wording(r'[\s\S]{0,20}', 'give 20 characters at most')] = ''
 
     def refusal(self, answer: Any) -> str:
-        """Say why an answer is none of this question, empty if it is one."""
+        """Return why an answer is none of this question, empty if it is one."""
         fits = _finite(answer) and self.low <= answer <= self.high \
             and (not self.whole or answer == int(answer))
         kind = 'a whole number' if self.whole else 'a number'
@@ -156,7 +156,7 @@ class TextQuestion:
     longest: Annotated[int, Within(1, MOST_CHARACTERS)] = 10_000
 
     def refusal(self, answer: Any) -> str:
-        """Say why an answer is none of this question, empty if it is one."""
+        """Return why an answer is none of this question, empty if it is one."""
         fits = isinstance(answer, str) and len(answer) <= self.longest
         return '' if fits else f'give {self.longest} characters at most'
 
@@ -186,7 +186,7 @@ class Question:
     required: bool = True
 
     def refusal(self, answer: Any) -> str:
-        """Say why an answer cannot be taken, empty if it can; None is no answer."""
+        """Return why an answer cannot be taken, empty if it can; None is no answer."""
         if answer is None:
             return 'give an answer' if self.required else ''
         if self.required and answer in ('', []):

@@ -178,6 +178,6 @@ def _unbalanced(study: StudyFile, block: Block, conditions: int,
 
 
 def _within(order: list[str], conditions: int) -> Iterable[tuple[str, str]]:
-    """Give what follows what within each repetition."""
+    """Yield what follows what within each repetition."""
     for start in range(0, len(order), conditions):
         yield from pairwise(order[start:start + conditions])

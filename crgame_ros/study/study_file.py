@@ -208,11 +208,11 @@ class StudyFile:
 
     @property
     def all_languages(self) -> tuple[str, ...]:
-        """Give the languages among which participants choose, that of the study first."""
+        """Return the languages among which participants choose, that of the study first."""
         return tuple(dict.fromkeys((self.language, *self.languages)))
 
     def factors_of(self, block: Block) -> tuple[Factor, ...]:
-        """Give the factors that are crossed in a block, in the order of the file."""
+        """Return the factors that are crossed in a block, in the order of the file."""
         return tuple(factor for factor in self.factors
                      if block.factors is None or factor.name in block.factors)
 

@@ -47,11 +47,11 @@ class StudyFolder:
         return [name for _, name in sorted(found)]
 
     def participant(self, name: str) -> Path:
-        """Give the folder of a participant, which may not be there yet."""
+        """Return the folder of a participant, which may not be there yet."""
         return self.root / 'participants' / name
 
     def place_of(self, name: str) -> int:
-        """Give a participant's place among all: the one they began with, or the next free one."""
+        """Return a participant's place among all: the one they began with, or the next free one."""
         own = _places(self.participant(name))
         if own:
             return own[0]

@@ -64,7 +64,7 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
 
 
 def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
-    """Give the participant's vehicle its driver; there is nobody else to drive."""
+    """Return the participant's vehicle its driver; there is nobody else to drive."""
     seat = seat_of(settings, game)
     for human in game.humans:
         if human.id != seat and human.driver == COCKPIT:
@@ -75,7 +75,7 @@ def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
 
 
 def _written_game(settings: TrialSettings) -> Game:
-    """Give the game as files have it: a game's, a scenario's, or one in the other's road."""
+    """Return the game as files have it: a game's, a scenario's, or one in the other's road."""
     scenario = settings.scenario
     if settings.game is not None:
         game = load_game(Path(settings.game))

@@ -12,7 +12,7 @@ ORDERS: tuple[OrderKind, ...] = ('williams', 'random', 'given')
 
 def williams_rows(count: int) -> list[list[int]]:
     """
-    Give the sequences of a Latin square that is balanced for carry-over.
+    Return the sequences of a Latin square that is balanced for carry-over.
 
     Each condition stands equally often at each place, and each follows each other equally often.
     An even number of conditions needs as many sequences, an odd number twice as many (Williams,

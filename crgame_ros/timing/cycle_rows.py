@@ -24,7 +24,7 @@ _LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
 
 
 def lights_alone(lights: int) -> tuple[float, ...]:
-    """Give the row of an AV that follows its plan: nobody drives, but others see its lights."""
+    """Return the row of an AV that follows its plan: nobody drives, but others see its lights."""
     return tuple(float(lights) if name == 'lights' else math.nan for name in COMMAND_COLUMNS)
 
 
@@ -46,7 +46,7 @@ class CycleRows:
 
     @property
     def full(self) -> bool:
-        """Tell whether the rows have to be taken before another is added."""
+        """Return whether the rows have to be taken before another is added."""
         return self.count == self.capacity
 
     def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
@@ -114,23 +114,23 @@ class CycleTable:
         return int(self.column('epoch')[0])
 
     def column(self, name: str) -> NDArray[np.float64]:
-        """Give a column by its name."""
+        """Return a column by its name."""
         return self.rows[:, self._place[name]]
 
     def timing_rows(self) -> NDArray[np.float64]:
-        """Give (R, 4) rows as `TimingMetrics.add_rows` takes them."""
+        """Return (R, 4) rows as `TimingMetrics.add_rows` takes them."""
         return self.rows[:, [self._place[name] for name in
                              ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')]]
 
     def late_rows(self) -> NDArray[np.float64] | None:
-        """Give (R, 9) causes of lateness and phase of each row; None where none are told."""
+        """Return (R, 9) causes of lateness and phase of each row; None where none are told."""
         if any(name not in self._place for name in LATE_COLUMNS):
             return None
         return self.rows[:, [self._place[name] for name in LATE_COLUMNS]]
 
     def commands(self, vehicle_id: str) -> NDArray[np.float64]:
         """
-        Give (R, 6) consumed throttle, brake, steering, reverse, lights, put_back of a vehicle.
+        Return (R, 6) consumed throttle, brake, steering, reverse, lights, put_back of a vehicle.
 
         Rows are NaN but for the lights where nobody drove it: those of an AV that followed its
         plan. What earlier versions did not record was off.
@@ -147,7 +147,7 @@ class CycleTable:
         return np.column_stack((found, *[off] * (len(names) - len(recorded))))
 
     def commands_of(self, vehicle_ids: Sequence[str]) -> NDArray[np.float64]:
-        """Give (R, V, 6) what was consumed of several; NaN of those that took no part."""
+        """Return (R, V, 6) what was consumed of several; NaN of those that took no part."""
         values = np.full((len(self.rows), len(vehicle_ids), len(COMMAND_COLUMNS)), np.nan)
         for place, vehicle in enumerate(vehicle_ids):
             if f'{vehicle}/{COMMAND_COLUMNS[0]}' in self._place:
@@ -155,7 +155,7 @@ class CycleTable:
         return values
 
     def drove(self, vehicle_id: str) -> NDArray[np.bool_]:
-        """Tell for each row (R) whether somebody drove a vehicle, which may have taken no part."""
+        """Return for each row (R) whether somebody drove a vehicle, which may have taken no part."""
         place = self._place.get(f'{vehicle_id}/{COMMAND_COLUMNS[0]}')
         return np.zeros(len(self.rows), dtype=bool) if place is None \
             else np.isfinite(self.rows[:, place])

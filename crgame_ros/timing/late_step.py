@@ -159,5 +159,5 @@ def _working(use: PhaseUse, around: StepConditions) -> dict[str, float]:
 
 
 def longest_phase(uses: Sequence[PhaseUse]) -> Phase:
-    """Give the phase in which most time was lost."""
+    """Return the phase in which most time was lost."""
     return max(uses, key=lambda use: use.lasted_ns).phase

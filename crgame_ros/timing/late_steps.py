@@ -52,7 +52,7 @@ class LateStep:
 
     @property
     def split_s(self) -> Mapping[str, float]:
-        """Give the time by cause, with what is unexplained; together they are the lateness [s]."""
+        """Return the time by cause, with what is unexplained; together they are the lateness [s]."""
         return {**self.causes._asdict(), UNEXPLAINED: max(0.0, self.late_s - sum(self.causes))}
 
     @property
@@ -63,7 +63,7 @@ class LateStep:
 
     @property
     def why(self) -> str:
-        """Say in words what it is made of, the greatest first."""
+        """Return in words what it is made of, the greatest first."""
         parts = sorted(self.split_s.items(), key=lambda item: -item[1])
         return ', '.join(f'{_MS * time_s:.1f} ms {CAUSE_WORDS[cause]}' for cause, time_s in parts
                          if time_s > _WORTH_A_WORD * self.late_s)
@@ -76,7 +76,7 @@ class LateStep:
                 f'{self.why}{moved}')
 
     def as_dict(self) -> dict[str, Any]:
-        """Give an entry of `timing.json`."""
+        """Return an entry of `timing.json`."""
         return {'n': self.n, 'at_s': self.at_s, 'late_ms': _MS * self.late_s,
                 'cause': self.main_cause,
                 'during': None if self.during is None else self.during.name.lower(),
@@ -106,7 +106,7 @@ class LateSteps:
 
     @property
     def worst(self) -> list[LateStep]:
-        """Give the worst of them, the latest first."""
+        """Return the worst of them, the latest first."""
         return [step for _, _, step in sorted(self._worst, reverse=True)]
 
     def add_table(self, table: CycleTable) -> None:
@@ -140,7 +140,7 @@ class LateSteps:
             heapq.heappop(self._worst)
 
     def as_dict(self) -> dict[str, Any] | None:
-        """Give `late_steps` of `timing.json`; None where the cycles do not tell."""
+        """Return `late_steps` of `timing.json`; None where the cycles do not tell."""
         if not self._told:
             return None
         resets = self._resets_by_cause

@@ -65,11 +65,11 @@ class ProgressTracker:
         return True
 
     def progress(self, n: int) -> float:
-        """Give sigma at simulation step n [plan states]."""
+        """Return sigma at simulation step n [plan states]."""
         return self._offset + (n - self._zero_n) / self._steps_per_tick
 
     def sample(self, n: int) -> VehicleState | None:
-        """Give the planned state at simulation step n; None when the plan is used up."""
+        """Return the planned state at simulation step n; None when the plan is used up."""
         ticks, rest = divmod(n - self._zero_n, self._steps_per_tick)
         if self._offset:
             progress = self.progress(n)

@@ -10,7 +10,7 @@ PUBLISHING_RATE = 100.0
 
 def steps_between_messages(rate: float) -> int:
     """
-    Give how many steps of the simulation lie between two published states.
+    Return how many steps of the simulation lie between two published states.
 
     :param rate: simulation rate f [Hz]
     """

@@ -97,7 +97,7 @@ def _opened(path: str) -> int | None:
 
 def stolen_between(before: bytes, after: bytes) -> int:
     """
-    Tell what a machine's host certainly took of any one processor between two looks [ns].
+    Return what a machine's host certainly took of any one processor between two looks [ns].
 
     It is counted in ticks of 10 ms, of which one may have been due before.
 

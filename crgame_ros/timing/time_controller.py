@@ -64,12 +64,12 @@ class TimeController:
 
     @property
     def real_time_factor(self) -> float:
-        """Give the simulated seconds per wall second."""
+        """Return the simulated seconds per wall second."""
         return self._factor
 
     @property
     def serves_orders_now(self) -> bool:
-        """Tell whether so many steps in a row were late that orders must not wait longer."""
+        """Return whether so many steps in a row were late that orders must not wait longer."""
         late = self._late_in_a_row
         return late > 0 and late % self._spec.max_catch_up_steps == 0
 
@@ -97,7 +97,7 @@ class TimeController:
         self._start_ns = now_ns
 
     def deadline_ns(self) -> int:
-        """Give the wall time at which the next cycle is due (CRG 11) [ns]."""
+        """Return the wall time at which the next cycle is due (CRG 11) [ns]."""
         step_ns = self._dt_s / self._factor / NS
         if not self._spec.pacing:
             # The naive loop waits for its step to pass, whatever the schedule says.

@@ -79,7 +79,7 @@ class TimingSummary:
     busy_p99_ms: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Give the keys of `timing.json`: those of table I first, in its order."""
+        """Return the keys of `timing.json`: those of table I first, in its order."""
         values: dict[str, Any] = dict(vars(self))
         values['real_time_ratio'] = dict(vars(self.real_time_ratio))
         return values

@@ -36,7 +36,7 @@ class Adopted:
 
 def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNetwork) -> bool:
     """
-    Tell whether a recorded obstacle can become an agent.
+    Return whether a recorded obstacle can become an agent.
 
     Vehicles and cyclists that move and at some time drive along a lane for cars can;
     pedestrians, parked and static ones cannot.
@@ -54,7 +54,7 @@ def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNe
 
 
 def fits(network: RoadNetwork, lane: int, pose: FloatArray) -> bool:
-    """Tell whether a pose is that of somebody who drives along a lane for cars."""
+    """Return whether a pose is that of somebody who drives along a lane for cars."""
     lanelet = network.lanelet_ids[lane]
     if not network.is_for_cars(lanelet):
         return False

@@ -115,7 +115,7 @@ def empty_table(count: int) -> AgentTable:
 
 @compiled
 def centers_of(agents: AgentTable, slots: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Give the poses (N, 3) and velocities (N, 3) of the centres of agents (N)."""
+    """Return the poses (N, 3) and velocities (N, 3) of the centres of agents (N)."""
     poses, velocities = np.empty((len(slots), 3)), np.empty((len(slots), 3))
     write_centers(agents, slots, poses, velocities)
     return poses, velocities
@@ -138,7 +138,7 @@ def write_centers(agents: AgentTable, slots: IntArray, poses: FloatArray,
 
 @compiled
 def states_of(agents: AgentTable) -> tuple[FloatArray, FloatArray]:
-    """Give poses (A, 3) in (-pi, pi] and velocities (A, 3) of all; see `Agents.states`."""
+    """Return poses (A, 3) in (-pi, pi] and velocities (A, 3) of all; see `Agents.states`."""
     poses, velocities = centers_of(agents, np.arange(len(agents.x)))
     for i in range(len(poses)):
         # As `wrap_pi_array` does.
@@ -178,15 +178,15 @@ class Agents(AgentTable):
         self.leader[:] = self.blocker[:] = FREE
 
     def centers(self) -> FloatArray:
-        """Give the poses (A, 3) of the centres [m, rad]."""
+        """Return the poses (A, 3) of the centres [m, rad]."""
         return centers_of(self.table, np.arange(self.count))[0]
 
     def velocities(self) -> FloatArray:
-        """Give the (A, 3) velocities of the centres [m/s, rad/s]."""
+        """Return the (A, 3) velocities of the centres [m/s, rad/s]."""
         return centers_of(self.table, np.arange(self.count))[1]
 
     def states(self) -> tuple[FloatArray, FloatArray]:
-        """Give poses, their angles wrapped, and velocities of the centres; NaN where absent."""
+        """Return poses, their angles wrapped, and velocities of the centres; NaN where absent."""
         return states_of(self.table)
 
     def put(self, slot: int, lane: int, s: float, d: float, pose: tuple[float, float, float],

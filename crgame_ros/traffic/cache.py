@@ -35,7 +35,7 @@ def cache_root() -> Path:
 
 @cache
 def digest(module: str) -> str:
-    """Give a short digest of a module here and of all modules that it builds upon."""
+    """Return a short digest of a module here and of all modules that it builds upon."""
     pending, seen = [f'traffic.{module}'], dict[str, bytes]()
     while pending:
         name = pending.pop()
@@ -49,7 +49,7 @@ def digest(module: str) -> str:
 
 
 def marker() -> Path:
-    """Tell which file says that everything is compiled."""
+    """Return which file says that everything is compiled."""
     return cache_root() / f'compiled-{digest("warm_up")}.done'
 
 

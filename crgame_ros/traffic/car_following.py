@@ -35,7 +35,7 @@ PATIENT = 3.5
 
 @compiled
 def _spared_of(relief: float, desired_gap: float, gap: float, standstill_gap: float) -> float:
-    """Give what of a relief counts: nearer than the gap at standstill nobody is patient [m]."""
+    """Return what of a relief counts: nearer than the gap at standstill nobody is patient [m]."""
     patience = min(max(2.0 * gap / standstill_gap - 1.0, 0.0), 1.0)
     return min(relief, max(desired_gap - gap, 0.0)) * patience
 
@@ -49,7 +49,7 @@ def _spared(relief: float, desired_gap: float, gap: float, standstill_gap: float
 def _guard_of(speed: float, gap: float, lead_speed: float, standstill_gap: float,
               hardest: float) -> float:
     """
-    Give the braking without which it would soon be too late, whatever the law wants [m/s^2].
+    Return the braking without which it would soon be too late, whatever the law wants [m/s^2].
 
     Behind a leader that brakes its hardest, b_max, to a stop, constant braking with
     v^2 / (2 (gap - s0 / 2 + v_leader^2 / (2 b_max))) just avoids contact, as in Gipps (1981).
@@ -64,7 +64,7 @@ def _guard_of(speed: float, gap: float, lead_speed: float, standstill_gap: float
 def needed_deceleration(speed: float, room: float, lead_speed: float,
                         lead_acceleration: float) -> float:
     """
-    Give the constant braking that just avoids contact, if the leader goes on as it does.
+    Return the constant braking that just avoids contact, if the leader goes on as it does.
 
     :param room: that may be used up [m]
     :param lead_acceleration: where it brakes, it may do so to a stop [m/s^2]
@@ -126,20 +126,20 @@ class CarFollowing(ABC):
     @abstractmethod
     def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
         """
-        Give the acceleration of the law, without limits; arguments as in `acceleration`.
+        Return the acceleration of the law, without limits; arguments as in `acceleration`.
 
         :param gap: may be inf, and 0 or negative once vehicles overlap [m]
         """
 
     @abstractmethod
     def desired_gap(self, speed: Array) -> Array:
-        """Give the steady gap behind a leader of the same speed, (A,) [m]."""
+        """Return the steady gap behind a leader of the same speed, (A,) [m]."""
 
     def acceleration(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array,
                      relief: Array | float = 0.0,
                      lead_acceleration: Array | float = -np.inf) -> Array:
         """
-        Give the acceleration for the next decision interval.
+        Return the acceleration for the next decision interval.
 
         A mover integrates it with v = max(0, v + a dt): a standing agent that should wait is held
         by a negative value.
@@ -163,7 +163,7 @@ class CarFollowing(ABC):
 
     def patience(self, speed: Array, gap: Array) -> Array:
         """
-        Give how hard the law may brake where physics asks for less [m/s^2].
+        Return how hard the law may brake where physics asks for less [m/s^2].
 
         :param gap: to a leader that is known not to brake hard [m]
         """
@@ -256,7 +256,7 @@ class AdaptiveCruise(CarFollowing):
         self._speed_time = speed_time
 
     def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
-        """Give FS 3 with timely braking, or the approach to the desired speed if that is less."""
+        """Return FS 3 with timely braking, or the approach to the desired speed if that is less."""
         return np.asarray(_cruise(
             speed, desired_speed, gap, lead_speed, self.time_gap, self.h, self.gain,
             self.standstill_gap, self._comfortable_deceleration, self._speed_time))
@@ -264,7 +264,7 @@ class AdaptiveCruise(CarFollowing):
     def acceleration(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array,
                      relief: Array | float = 0.0,
                      lead_acceleration: Array | float = -np.inf) -> Array:
-        """Give the acceleration for the next decision interval."""
+        """Return the acceleration for the next decision interval."""
         if type(self) is not AdaptiveCruise:
             return super().acceleration(speed, desired_speed, gap, lead_speed, relief,
                                         lead_acceleration)
@@ -275,7 +275,7 @@ class AdaptiveCruise(CarFollowing):
 
     def patience(self, speed: Array, gap: Array) -> Array:
         """
-        Give what the missing distance alone asks for.
+        Return what the missing distance alone asks for.
 
         The difference of speeds, v / h in FS 3, makes nobody brake harder than it takes.
         """
@@ -283,7 +283,7 @@ class AdaptiveCruise(CarFollowing):
         return np.asarray(np.maximum(PATIENT, self.gain * missing / self.h))
 
     def desired_gap(self, speed: Array) -> Array:
-        """Give s0 + T v."""
+        """Return s0 + T v."""
         return self.standstill_gap + self.time_gap * speed
 
 
@@ -314,13 +314,13 @@ class IntelligentDriver(CarFollowing):
                                     comfortable_deceleration, max_deceleration)
 
     def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
-        """Give a (1 - (v / v0)^4 - (s* / s)^2)."""
+        """Return a (1 - (v / v0)^4 - (s* / s)^2)."""
         desired = np.maximum(desired_speed, STANDING)
         return (free_acceleration(speed, desired, self._model, np.maximum)
                 + interaction(speed, gap, lead_speed, self._model, np.maximum))
 
     def desired_gap(self, speed: Array) -> Array:
-        """Give s0 + T v, where the interaction term equals a."""
+        """Return s0 + T v, where the interaction term equals a."""
         return self._model.s0 + self._model.time_headway * speed
 
 

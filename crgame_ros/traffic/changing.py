@@ -152,7 +152,7 @@ class LaneChanges:
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
                acceleration: FloatArray, limit: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """Tell whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
+        """Return whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
         followers, beside = self._followers, wish.beside
         speed = agents.speed[wish.slots]
         there = followers.of(wish.slots).acceleration(
@@ -288,7 +288,7 @@ def _finish(agents: AgentTable, give_up: int) -> IntArray:
 
 
 def _blocked(wish: Wish, standing: BoolArray) -> BoolArray:
-    """Tell whose way in the lane beside is blocked by something that stands there."""
+    """Return whose way in the lane beside is blocked by something that stands there."""
     leader = wish.beside.leader
     blocked = np.zeros(len(leader), dtype=bool)
     known = leader >= 0

@@ -74,7 +74,7 @@ class ConflictTable(NamedTuple):
 
 @compiled
 def touch(conflicts: ConflictTable, row: int, width: float, other_width: float) -> bool:
-    """Tell whether vehicles of two widths are in each other's way in a conflict."""
+    """Return whether vehicles of two widths are in each other's way in a conflict."""
     between = 0.5 * (width + other_width) + conflicts.margin[row]
     return bool(conflicts.distance[row] < between)
 
@@ -142,7 +142,7 @@ class Conflicts:
         return len(self.lane)
 
     def tapers(self) -> NDArray[np.bool_]:
-        """Tell which lanes (L) end in a merge in which others go first, without a turn."""
+        """Return which lanes (L) end in a merge in which others go first, without a turn."""
         graph = self._graph
         start = graph.yaw[graph.first[self.lane]] - graph.yaw[graph.first[self.lane[self.other]]]
         result = np.zeros(len(graph), dtype=bool)
@@ -164,7 +164,7 @@ def _candidates(graph: LaneGraph) -> list[tuple[int, int]]:
 
 
 def _same_way(graph: LaneGraph, i: int, j: int) -> bool:
-    """Tell whether two lanes are neighbours of one direction."""
+    """Return whether two lanes are neighbours of one direction."""
     return j in (graph.left[i], graph.right[i]) or i in (graph.left[j], graph.right[j])
 
 
@@ -209,7 +209,7 @@ def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
 
 
 def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch) -> bool:
-    """Tell whether two lanes only part: they begin together, or one ends where other begins."""
+    """Return whether two lanes only part: they begin together, or one ends where other begins."""
     here, there = (first.start[0], first.end[0]), (second.start[0], second.end[0])
     a, b = int(graph.first[i]), int(graph.first[j])
     between = float(np.hypot(graph.x[a] - graph.x[b], graph.y[a] - graph.y[b]))
@@ -221,7 +221,7 @@ def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch
 
 
 def _rank(graph: LaneGraph, lane: int) -> int:
-    """Give what signs before a lane say: 2 priority, 0 yield, 1 nothing."""
+    """Return what signs before a lane say: 2 priority, 0 yield, 1 nothing."""
     roads = graph.network.lanelet_network
     current, distance, seen = lane, 0.0, {lane}
     while True:
@@ -240,7 +240,7 @@ def _rank(graph: LaneGraph, lane: int) -> int:
 
 
 def roundabouts(graph: LaneGraph) -> NDArray[np.bool_]:
-    """Tell which lanes (L) go around in a small circle."""
+    """Return which lanes (L) go around in a small circle."""
     result = np.zeros(len(graph), dtype=bool)
     for lane in range(len(graph)):
         way = () if result[lane] else _way_around(graph, lane)
@@ -255,7 +255,7 @@ def roundabouts(graph: LaneGraph) -> NDArray[np.bool_]:
 
 
 def _way_around(graph: LaneGraph, lane: int) -> tuple[int, ...]:
-    """Give the lanes of the shortest way from a lane back to it; none if that is long."""
+    """Return the lanes of the shortest way from a lane back to it; none if that is long."""
     heap: list[tuple[float, tuple[int, ...]]] = [(float(graph.length[lane]), (lane,))]
     seen = {lane}
     while heap:
@@ -296,7 +296,7 @@ def _priority(movements: Movements, side: DrivingSide, rank: IntArray, ring: NDA
 
 
 def _turns_across(movements: Movements, side: DrivingSide, lane: int) -> bool:
-    """Tell whether a lane belongs to a turn over the lanes of oncoming traffic."""
+    """Return whether a lane belongs to a turn over the lanes of oncoming traffic."""
     if movements.turn[lane] == UNDECIDED:
         angle = float(movements.angle[lane])
         return (-angle if side.keeps_left else angle) > TURN

@@ -42,7 +42,7 @@ class CourtesyRules:
     def deceleration_limit(self, urgency: Array | float,
                            aggressivity: Array | float) -> Array | float:
         """
-        Give the hardest braking that a driver does for another.
+        Return the hardest braking that a driver does for another.
 
         :param urgency: (A,) of the other, 0 to 1
         :param aggressivity: (A,) of the driver, 0 to 1; 1 does nothing
@@ -56,7 +56,7 @@ class CourtesyRules:
                               aggressivity: Array | float = 0.5,
                               ) -> tuple[Array, NDArray[np.bool_]]:
         """
-        Give the constant deceleration b that opens a gap within D_t.
+        Return the constant deceleration b that opens a gap within D_t.
 
         gap(D_t) = gap - (v_f D_t - b D_t^2 / 2) + v D_t, solved for b. It holds for the follower
         in the target lane, who lets somebody in, and for that one, who falls back behind the new
@@ -85,7 +85,7 @@ class CourtesyRules:
 @compiled
 def relief_at_change(gap: float, desired_gap: float) -> float:
     """
-    Give how much shorter than usual a gap may be right after a lane change.
+    Return how much shorter than usual a gap may be right after a lane change.
 
     Hidas (2005) wants this gap opened gradually; how is ours, with Keane and Gao (2021): it fits
     any car-following model.
@@ -103,7 +103,7 @@ def relief_at_change(gap: float, desired_gap: float) -> float:
 
 def fading(dt_s: float, opening_time: float = 10.0) -> float:
     """
-    Give the share of a relief that is left after some time.
+    Return the share of a relief that is left after some time.
 
     :param opening_time: time constant of what Laval and Leclercq (2008) call relaxation; the
         value is ours [s]

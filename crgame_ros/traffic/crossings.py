@@ -129,7 +129,7 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
 
 @compiled
 def _is_near(speed: float, hold: float) -> bool:
-    """Tell whether a junction is so near that one asks to be let in."""
+    """Return whether a junction is so near that one asks to be let in."""
     return hold < 10.0 + 1.5 * speed + speed * speed / (2.0 * MERCY)
 
 
@@ -163,7 +163,7 @@ def _look(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Pa
 
 @compiled
 def _heeds(agents: AgentTable, slot: int) -> bool:
-    """Tell whether an agent yields to whom it has to: late ones do not before they see it."""
+    """Return whether an agent yields to whom it has to: late ones do not before they see it."""
     return bool(agents.sees[slot] or not agents.late[slot])
 
 
@@ -179,7 +179,7 @@ def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
 @compiled
 def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, i: int) -> bool:
-    """Tell whether an agent gives up its right to enter, while that is easy, or late."""
+    """Return whether an agent gives up its right to enter, while that is easy, or late."""
     slot = at.slots[i]
     speed, hold = agents.speed[slot], agents.grant_hold[slot]
     easy = speed**2 <= 2.0 * rules.withdrawal * hold
@@ -198,7 +198,7 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, stopped: BoolArray,
                full: BoolArray, i: int) -> bool:
-    """Tell whether an agent is let in now; note for whom it waits otherwise."""
+    """Return whether an agent is let in now; note for whom it waits otherwise."""
     slot = at.slots[i]
     speed = agents.speed[slot]
     if not _is_near(speed, passage.hold[i]):
@@ -223,7 +223,7 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 @compiled
 def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
-    """Tell whether an agent lets somebody go first who has waited very long."""
+    """Return whether an agent lets somebody go first who has waited very long."""
     who = meeting.who[n]
     if who < 0 or meeting.apart[n] or agents.insists_until[at.slots[i]] > k:
         return False
@@ -234,7 +234,7 @@ def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, a
 @compiled
 def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
             at: Situation, i: int, n: int) -> bool:
-    """Tell whether an agent lets the other of a meeting go first."""
+    """Return whether an agent lets the other of a meeting go first."""
     if meeting.apart[n]:
         return False
     slot, who = at.slots[i], meeting.who[n]
@@ -258,7 +258,7 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
 @compiled
 def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
                  at: Situation, i: int) -> float:
-    """Give the distance at which who was let in halts before a conflict that is taken."""
+    """Return the distance at which who was let in halts before a conflict that is taken."""
     slot = at.slots[i]
     result = math.inf
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
@@ -284,7 +284,7 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
 @compiled
 def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
-    """Tell whether the other of a meeting, who was let in, goes before an agent that was."""
+    """Return whether the other of a meeting, who was let in, goes before an agent that was."""
     who = meeting.who[n]
     slot, them = at.slots[i], at.slots[who]
     grant = _let_in_at(agents, slot, passage, i, meeting.step[n])
@@ -299,6 +299,6 @@ def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
 
 @compiled
 def _let_in_at(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> int:
-    """Give the tick at which an agent was let into the junction at a step of its way."""
+    """Return the tick at which an agent was let into the junction at a step of its way."""
     in_first = agents.before[slot] >= 0 and step <= passage.before[i]
     return int(agents.before[slot] if in_first else agents.grant[slot])

@@ -64,7 +64,7 @@ class Drivers:
             self._followers.change(slots, change.options)
 
     def do(self, k: int, agents: Agents, slots: IntArray, wanted: FloatArray) -> FloatArray:
-        """Give the accelerations (A) that come of those that are wanted (A) [m/s^2]."""
+        """Return the accelerations (A) that come of those that are wanted (A) [m/s^2]."""
         if self._imperfection.any():
             failure = self._imperfection[slots] * self._followers.max_acceleration[slots]
             wanted = wanted - failure * self._random.random(len(slots)) * (

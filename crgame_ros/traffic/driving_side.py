@@ -38,7 +38,7 @@ RIGHT_HAND = DrivingSide()
 
 def driving_side(scenario: Scenario) -> DrivingSide:
     """
-    Tell on which side traffic keeps: as the neighbours of its lanes do, or else its country.
+    Return on which side traffic keeps: as the neighbours of its lanes do, or else its country.
 
     Own maps, and published ones that were mirrored, may drive on another side than their country.
     """
@@ -50,7 +50,7 @@ def driving_side(scenario: Scenario) -> DrivingSide:
 
 
 def _by_neighbours(roads: LaneletNetwork) -> bool | None:
-    """Tell on which side oncoming lanes are; None where there are none, or as many on either."""
+    """Return on which side oncoming lanes are; None where there are none, or as many on either."""
     left = sum(lane.adj_left is not None and lane.adj_left_same_direction is False
                for lane in roads.lanelets)
     right = sum(lane.adj_right is not None and lane.adj_right_same_direction is False

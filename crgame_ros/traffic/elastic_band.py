@@ -46,7 +46,7 @@ class Bands(NamedTuple):
     blocked_s: Array
 
     def blocked_from(self) -> Array:
-        """Give the first blockage of each lane, (L,); inf where it is free [m]."""
+        """Return the first blockage of each lane, (L,); inf where it is free [m]."""
         result = np.full(len(self.d), np.inf)
         np.minimum.at(result, self.blocked_lane, self.blocked_s)
         return result
@@ -141,7 +141,7 @@ class ElasticBand:
 
     def _relax_lane(self, left: Array, right: Array, speed: float, obstacles: Obstacles,
                     for_wide: bool = True) -> tuple[Array, list[float]]:
-        """Give the offsets of one lane and where it is blocked."""
+        """Return the offsets of one lane and where it is blocked."""
         passages: list[Passage] = []
         blocked: list[float] = []
         end = self.step * (len(left) - 1)
@@ -168,7 +168,7 @@ class ElasticBand:
 
     def _solve(self, left: Array, right: Array, length: float,
                passages: list[Passage]) -> tuple[Array, int | None]:
-        """Give the offsets, and the node where the band cannot be bent as wanted, if any."""
+        """Return the offsets, and the node where the band cannot be bent as wanted, if any."""
         d = np.zeros(len(left))
         high = np.maximum(left - self._rules.half_width, 0.0)
         low = -np.maximum(right - self._rules.half_width, 0.0)

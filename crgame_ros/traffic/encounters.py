@@ -114,7 +114,7 @@ def brush(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntA
 @bare
 def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
              other: int) -> float:
-    """Give the acceleration with which an agent does not touch another, inf for any [m/s^2]."""
+    """Return the acceleration with which an agent does not touch another, inf for any [m/s^2]."""
     east, north = agents.x[other] - agents.x[slot], agents.y[other] - agents.y[slot]
     mine = east * math.cos(agents.yaw[slot]) + north * math.sin(agents.yaw[slot])
     theirs = -east * math.cos(agents.yaw[other]) - north * math.sin(agents.yaw[other])
@@ -136,7 +136,7 @@ def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: in
 def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                   slot: int) -> bool:
     """
-    Tell whether somebody cannot help touching an agent that has just appeared on its own way.
+    Return whether somebody cannot help touching an agent that has just appeared on its own way.
 
     :param slots: (A) of the agents on the road.
     """
@@ -156,7 +156,7 @@ def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slo
 @bare
 def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap: float,
                    low: float, high: float) -> bool:
-    """Tell whether an agent has passed when somebody beside its way gets there."""
+    """Return whether an agent has passed when somebody beside its way gets there."""
     aside, drift = entries.aside[n], entries.drift[n]
     if aside > 0.1:
         rest = low - SPARE_ROOM - (entries.high[n] - max(drift, 0.0))
@@ -172,7 +172,7 @@ def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap:
 @bare
 def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                    other: int) -> float:
-    """Give the gentlest braking with which two agents miss each other, -inf if none is needed."""
+    """Return the gentlest braking with which two agents miss each other, -inf if none is needed."""
     speed = agents.speed[slot]
     soon = _touch(lanes, following, agents, slot, speed, other, 0.0, FORESEEN, BESIDE)
     if soon == math.inf:
@@ -187,7 +187,7 @@ def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, sl
 @bare
 def _gentlest(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, speed: float,
               other: int, foreseen: float, beside: float) -> float:
-    """Give the gentlest of `TRIED` with which two agents don't touch, or inf; see `_touch`."""
+    """Return the gentlest of `TRIED` with which two agents don't touch, or inf; see `_touch`."""
     for braking in TRIED:
         if _touch(lanes, following, agents, slot, speed, other, braking, foreseen,
                   beside) == math.inf:
@@ -199,7 +199,7 @@ def _gentlest(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: i
 def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, speed: float,
            other: int, braking: float, foreseen: float, beside: float) -> float:
     """
-    Give when two agents touch if one brakes and the other goes on as it does, or inf [s].
+    Return when two agents touch if one brakes and the other goes on as it does, or inf [s].
 
     :param speed: of the one [m/s]
     :param foreseen: how far ahead it is looked [s]; 0 tells whether they touch now.
@@ -224,7 +224,7 @@ def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
 
 @inlined
 def _rolled(speed: float, braking: float, time: float) -> float:
-    """Give the way within a time when braking [m]."""
+    """Return the way within a time when braking [m]."""
     if braking > 0.0:
         time = min(time, speed / braking)
     return speed * time - 0.5 * braking * time * time
@@ -232,7 +232,7 @@ def _rolled(speed: float, braking: float, time: float) -> float:
 
 @inlined
 def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
-    """Give where the rear axle is in the lane, besides where it steers for, and how it turns."""
+    """Return where the rear axle is in the lane, besides where it steers for, and how it turns."""
     lane = agents.lane[slot]
     s, d, yaw = project_on(lanes, lane, agents.x[slot], agents.y[slot],
                            agents.s[slot] - agents.rear_to_center[slot], 2)
@@ -241,7 +241,7 @@ def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, floa
 
 @inlined
 def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float) -> float:
-    """Give how far to the left of a bend's middle the rear axle runs [m]."""
+    """Return how far to the left of a bend's middle the rear axle runs [m]."""
     front = agents.rear_to_center[slot] + 0.5 * agents.length[slot]
     at = lanes.line[nearest_row(lanes, lane, s)]
     return curve_shift(at.curvature, front) + swing_out(at.swing, at.swing_long, front)
@@ -265,7 +265,7 @@ def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
 @bare
 def _overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
              width: float, other_length: float, other_width: float) -> bool:
-    """Tell whether two rectangles, given by half their sizes, overlap: no axis parts them."""
+    """Return whether two rectangles, given by half their sizes, overlap: no axis parts them."""
     cos, sin = abs(math.cos(other_yaw - yaw)), abs(math.sin(other_yaw - yaw))
     for turn, along, aside, their_along, their_aside in (
             (yaw, length, width, other_length, other_width),

@@ -76,7 +76,7 @@ def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, passag
 @compiled
 def is_full(rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int, way: Ways,
             passage: Passages, at: Situation, i: int) -> bool:
-    """Tell whether there is no room for an agent behind its next junction."""
+    """Return whether there is no room for an agent behind its next junction."""
     step = passage.last[i]
     # Whoever goes there through the same lane is ahead, and was counted there.
     taken = 0.0

@@ -31,7 +31,7 @@ class Followers:
         self.max_acceleration: FloatArray = np.full(count, self.usual.max_acceleration)
 
     def of(self, slots: IntArray) -> 'CarFollowing | _Several':
-        """Give the model of agents (N), to be asked about just these; of slot -1 the usual one."""
+        """Return the model of agents (N), to be asked about just these; of slot -1 the usual one."""
         if len(self._models) == 1:
             return self.usual
         return _Several(self._models, self._number[slots])
@@ -66,14 +66,14 @@ class _Several:
         self._count = len(number)
 
     def acceleration(self, *values: Array | float) -> Array:
-        """Give `CarFollowing.acceleration`, of each agent by its own model."""
+        """Return `CarFollowing.acceleration`, of each agent by its own model."""
         result = np.empty(self._count)
         for model, rows in self._parts:
             result[rows] = model.acceleration(*(_rows(value, rows) for value in values))
         return result
 
     def desired_gap(self, speed: Array) -> Array:
-        """Give `CarFollowing.desired_gap`, of each agent by its own model."""
+        """Return `CarFollowing.desired_gap`, of each agent by its own model."""
         result = np.empty(self._count)
         for model, rows in self._parts:
             result[rows] = model.desired_gap(speed[rows])

@@ -123,7 +123,7 @@ class HaltingLines:
     def halts(self, way: Ways, speed: FloatArray, length: FloatArray,
               stops: NDArray[np.bool_]) -> FloatArray:
         """
-        Give the distance (A) of each agent's front from the first line with a light to heed [m].
+        Return the distance (A) of each agent's front from the first line with a light to heed [m].
 
         Red holds unless braking hard would not suffice, yellow if gentle braking does.
 
@@ -160,7 +160,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
 
 @compiled
 def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
-    """Give the movement of a way at the lights of its lane: what is decided first counts."""
+    """Return the movement of a way at the lights of its lane: what is decided first counts."""
     row = lights.number[way.lane[i, step]]
     for onward in range(step, way.depth[i]):
         movement = lights.movement[row, way.lane[i, onward]]
@@ -170,7 +170,7 @@ def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
 
 
 def _governing(lights: list[TrafficLight], arrow: str) -> tuple[int, ...]:
-    """Give the ids of the lights that are for a movement."""
+    """Return the ids of the lights that are for a movement."""
     chosen = lights_for(lights, arrow)
     arrows = [light for light in chosen if has_arrow(light)]
     if 0 < len(arrows) < len(chosen) and _is_never_free(chosen):
@@ -179,12 +179,12 @@ def _governing(lights: list[TrafficLight], arrow: str) -> tuple[int, ...]:
 
 
 def _is_never_free(lights: list[TrafficLight]) -> bool:
-    """Tell whether at any time one of some lights is red."""
+    """Return whether at any time one of some lights is red."""
     red = [_red_steps(light) for light in lights]
     step = np.arange(min(math.lcm(*(len(x) for x in red)), LONGEST_CYCLE))
     return bool(np.any([x[step % len(x)] for x in red], axis=0).all())
 
 
 def _red_steps(light: TrafficLight) -> NDArray[np.bool_]:
-    """Tell for the time steps of a light's cycle whether it is red."""
+    """Return for the time steps of a light's cycle whether it is red."""
     return np.isin(LightCycle(light).states_over(), RED_STATES)

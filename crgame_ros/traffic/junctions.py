@@ -118,13 +118,13 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
 
 @compiled
 def hold_before(entry: float) -> float:
-    """Give the arc length on a lane at which fronts wait before its first conflict [m]."""
+    """Return the arc length on a lane at which fronts wait before its first conflict [m]."""
     return entry - 1.0 if entry > WAITING_ROOM else min(0.0, entry - 0.5)
 
 
 @compiled
 def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int) -> float:
-    """Give the distance from an agent's centre to where its front waits before a junction [m]."""
+    """Return the distance from an agent's centre to where its front waits before a junction [m]."""
     hold = hold_before(entry) + way.offset[i, step]
     if step > 0:
         line = lines[way.lane[i, step - 1]]
@@ -256,7 +256,7 @@ def _by_conflict(found: Arrivals, used: int, conflicts: int) -> Arrivals:
 
 @compiled
 def time_to(distance: float, speed: float, acceleration: float, top: float) -> float:
-    """Give the time to cover a distance when accelerating up to a top speed [s]; 0 if behind."""
+    """Return the time to cover a distance when accelerating up to a top speed [s]; 0 if behind."""
     distance, top = max(distance, 0.0), max(top, speed, 0.5)
     gain = (top**2 - speed**2) / (2.0 * acceleration)
     if distance < gain:

@@ -45,7 +45,7 @@ class CellTable(NamedTuple):
 
 @bare
 def cell_of(cells: CellTable, x: float, y: float) -> int:
-    """Give the row of the cell around a point, or -1 where no lane is near."""
+    """Return the row of the cell around a point, or -1 where no lane is near."""
     row, column = math.floor((x - cells.origin_x) / CELL), math.floor(
         (y - cells.origin_y) / CELL)
     if not (0 <= row < cells.rows and 0 <= column < cells.columns):
@@ -93,7 +93,7 @@ class LaneCells:
             np.maximum.reduceat(graph.half_width, graph.first))
 
     def _turning(self, lane: int) -> float:
-        """Give the greatest angle between headings or chords of a lane [rad]."""
+        """Return the greatest angle between headings or chords of a lane [rad]."""
         graph, first = self._graph, int(self._graph.first[lane])
         rows = slice(first, first + int(graph.count[lane]))
         chords = np.arctan2(np.diff(graph.y[rows]), np.diff(graph.x[rows]))

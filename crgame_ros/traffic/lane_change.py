@@ -23,7 +23,7 @@ CHANGE_THRESHOLD = 0.2
 def look_ahead(speed: float, shift: float = 3.5, duration: float = 4.0,
                shortest: float = SHORTEST_CHANGE, max_lateral_acceleration: float = 2.0) -> float:
     """
-    Give the length of a lane change, FS's empirical function of the speed.
+    Return the length of a lane change, FS's empirical function of the speed.
 
     L = max(L_min, v t, v sqrt(10 / sqrt(3) W / a_max)): drivers take about the same time at every
     speed, and no more lateral acceleration than is comfortable.
@@ -42,7 +42,7 @@ def look_ahead(speed: float, shift: float = 3.5, duration: float = 4.0,
 def quintic(offset: Array, slope: Array, curvature: Array, target: Array,
             length: Array) -> Array:
     """
-    Give the coefficients p_i of y = sum p_i x^i (FS 4) from now to the centre of a lane.
+    Return the coefficients p_i of y = sum p_i x^i (FS 4) from now to the centre of a lane.
 
     The six conditions are y, y', y'' at x = 0 and y = target, y' = y'' = 0 at x = L; solved in
     u = x / L, where they do not depend on L.
@@ -107,7 +107,7 @@ class GapAcceptance:
     def minimum_gap(self, behind_speed: Array, ahead_speed: Array,
                     urgency: Array | float = 0.0) -> Array:
         """
-        Give the least gap between two vehicles after a change.
+        Return the least gap between two vehicles after a change.
 
         :param behind_speed: (A,) of the one behind [m/s]
         :param ahead_speed: (A,) of the one ahead [m/s]
@@ -122,7 +122,7 @@ class GapAcceptance:
                 follow_speed: Array, own_acceleration: Array, follow_acceleration: Array,
                 urgency: Array | float = 0.0) -> NDArray[np.bool_]:
         """
-        Tell who may change now; all arguments are (A,).
+        Return who may change now; all arguments are (A,).
 
         :param speed: of the vehicle that wants to change [m/s]
         :param lead_gap: to the vehicle that would be ahead; inf where there is none [m]
@@ -145,7 +145,7 @@ class GapAcceptance:
 def incentive(here: Array, there: Array, others: Array | float = 0.0,
               politeness: Array | float = 0.2) -> Array:
     """
-    Give the advantage of a free change: MOBIL (Kesting, Treiber and Helbing 2007).
+    Return the advantage of a free change: MOBIL (Kesting, Treiber and Helbing 2007).
 
     :param here: (A,) acceleration in the present lane, behind its slow leader [m/s^2]
     :param there: (A,) acceleration in the target lane [m/s^2]
@@ -160,7 +160,7 @@ def incentive(here: Array, there: Array, others: Array | float = 0.0,
 def urgency(distance: float, speed: float, changes: float = 1.0, horizon: float = 15.0,
             shortest: float = 100.0) -> float:
     """
-    Give the hurry of a change that the route asks for, growing towards the last place for it.
+    Return the hurry of a change that the route asks for, growing towards the last place for it.
 
     0 until the time horizon, then linear up to 1 where the lane change has just its length left;
     every further lane to cross moves both back by as much (ours).

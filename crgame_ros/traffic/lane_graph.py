@@ -123,7 +123,7 @@ class LaneGraph:
         return [int(i) for i in np.flatnonzero(near <= MAX_GAP) if self._joined(lane, int(i))]
 
     def _joined(self, lane: int, follower: int) -> bool:
-        """Tell whether a lane goes on in another without a jump or a turn on the spot."""
+        """Return whether a lane goes on in another without a jump or a turn on the spot."""
         end, start = int(self.first[lane] + self.count[lane] - 1), int(self.first[follower])
         gap = np.hypot(self.x[start] - self.x[end], self.y[start] - self.y[end])
         turn = abs(wrap_pi(float(self.yaw[start] - self.yaw[end])))
@@ -144,19 +144,19 @@ class LaneGraph:
                     lateral_acceleration * PURSUIT_TIME / kink, 2.0))
 
     def _kink(self, lane: int) -> float:
-        """Give the greatest angle between a lane's beginning and an end before it [rad]."""
+        """Return the greatest angle between a lane's beginning and an end before it [rad]."""
         before = self.predecessors[lane][self.predecessors[lane] >= 0]
         ends = self.yaw[self.first[before] + self.count[before] - 1]
         start = self.yaw[self.first[lane]]
         return float(np.abs(heading_difference(start, ends)).max(initial=0.0))
 
     def rows(self, lane: IntArray, s: FloatArray) -> IntArray:
-        """Give the table row nearest to arc length s (N) of lanes (N)."""
+        """Return the table row nearest to arc length s (N) of lanes (N)."""
         row = np.rint(s / self.step[lane]).astype(np.int64)
         return np.asarray(self.first[lane] + np.clip(row, 0, self.count[lane] - 1))
 
     def poses(self, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
-        """Give the (N, 3) poses at arc length s and offset d to the left; straight beyond."""
+        """Return the (N, 3) poses at arc length s and offset d to the left; straight beyond."""
         return poses_on(self.table, lane, s, d)
 
     def project(self, lane: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray,
@@ -172,7 +172,7 @@ class LaneGraph:
                            np.array(guess, dtype=np.float64), rounds)
 
     def rows_of(self, lane: int) -> slice:
-        """Give the table rows of a lane."""
+        """Return the table rows of a lane."""
         return slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
 
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -184,7 +184,7 @@ class LaneGraph:
         return s, d
 
     def turn(self, lane: int) -> float:
-        """Give the angle by which a lane turns, positive to the left [rad]."""
+        """Return the angle by which a lane turns, positive to the left [rad]."""
         first = int(self.first[lane])
         return float(self.yaw[first + int(self.count[lane]) - 1] - self.yaw[first])
 
@@ -210,5 +210,5 @@ def padded(rows: list[list[int]]) -> IntArray:
 
 
 def heading_difference(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Give the angle from b to a in (-pi, pi] [rad]."""
+    """Return the angle from b to a in (-pi, pi] [rad]."""
     return np.asarray(wrap_pi_array(a - b), dtype=np.float64)

@@ -55,7 +55,7 @@ def point_records(x: FloatArray, y: FloatArray, yaw: FloatArray, curvature: Floa
 
 
 def column_of(points: Points, name: str) -> FloatArray:
-    """Give a column of points, to read and to write."""
+    """Return a column of points, to read and to write."""
     return cast(FloatArray, cast(Any, points)[name])
 
 
@@ -87,7 +87,7 @@ class LaneTable(NamedTuple):
 
 @inlined
 def first_at_least(values: FloatArray | IntArray, low: int, high: int, least: float) -> int:
-    """Give the first row from `low` on with no less than a value, `high` if none before it has."""
+    """Return the first row from `low` on with no less than a value, `high` if none before it has."""
     while low < high:
         middle = (low + high) // 2
         if values[middle] < least:
@@ -99,14 +99,14 @@ def first_at_least(values: FloatArray | IntArray, low: int, high: int, least: fl
 
 @inlined
 def nearest_row(lanes: LaneTable, lane: int, s: float) -> int:
-    """Give the row of the point nearest to arc length s."""
+    """Return the row of the point nearest to arc length s."""
     row = int(np.rint(s / lanes.step[lane]))
     return int(lanes.first[lane] + min(max(row, 0), lanes.points[lane] - 1))
 
 
 @compiled
 def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float]:
-    """Give x, y and heading of a centre line at arc length s; straight on beyond its ends."""
+    """Return x, y and heading of a centre line at arc length s; straight on beyond its ends."""
     share = s / lanes.step[lane]
     row = int(min(max(math.floor(share), 0.0), lanes.points[lane] - 2.0))
     share -= row
@@ -119,7 +119,7 @@ def point_on(lanes: LaneTable, lane: int, s: float) -> tuple[float, float, float
 
 @inlined
 def segment(lanes: LaneTable, lane: int, s: float) -> tuple[int, float]:
-    """Give the row at or before arc length s, and the share of the step beyond it."""
+    """Return the row at or before arc length s, and the share of the step beyond it."""
     share = s / lanes.step[lane]
     row = int(min(max(math.floor(share), 0.0), lanes.points[lane] - 2.0))
     return row + lanes.first[lane], share - row
@@ -153,7 +153,7 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
 
 @inlined
 def angle_between(a: float, b: float) -> float:
-    """Give the angle from b to a in [-pi, pi] [rad]."""
+    """Return the angle from b to a in [-pi, pi] [rad]."""
     turn = a - b
     return turn - 2.0 * math.pi * float(np.rint(turn / (2.0 * math.pi)))
 
@@ -170,7 +170,7 @@ def project_all(lanes: LaneTable, lane: IntArray, x: FloatArray, y: FloatArray,
 
 @compiled
 def poses_on(lanes: LaneTable, lane: IntArray, s: FloatArray, d: FloatArray) -> FloatArray:
-    """Give the poses (N, 3) at arc lengths s and offsets d to the left of lanes (N)."""
+    """Return the poses (N, 3) at arc lengths s and offsets d to the left of lanes (N)."""
     result = np.empty((len(s), 3))
     for i in range(len(s)):
         x, y, yaw = point_on(lanes, lane[i], s[i])

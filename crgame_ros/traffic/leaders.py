@@ -73,7 +73,7 @@ class Corridors(NamedTuple):
 
 @inlined
 def look_distance(speed: float) -> float:
-    """Give how far ahead an agent looks: it stops in half of that, comfortably [m]."""
+    """Return how far ahead an agent looks: it stops in half of that, comfortably [m]."""
     return 50.0 + 3.0 * speed + speed**2 / 4.0
 
 
@@ -124,7 +124,7 @@ def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int
 @compiled
 def corridors(agents: AgentTable, slots: IntArray, right: FloatArray,
               left: FloatArray) -> Corridors:
-    """Give what agents (A) take whose middles are between offsets (A) from the reference [m]."""
+    """Return what agents (A) take whose middles are between offsets (A) from the reference [m]."""
     count = len(slots)
     result = Corridors(slots, np.empty(count), np.empty(count), np.empty(count), np.empty(count))
     for i, slot in enumerate(slots):
@@ -137,7 +137,7 @@ def corridors(agents: AgentTable, slots: IntArray, right: FloatArray,
 @compiled
 def own_corridors(lanes: LaneTable, agents: AgentTable, slots: IntArray,
                   reference: FloatArray) -> Corridors:
-    """Give what agents (A) take between the reference that they follow and where they are."""
+    """Return what agents (A) take between the reference that they follow and where they are."""
     right, left = np.empty(len(slots)), np.empty(len(slots))
     for i, slot in enumerate(slots):
         off = agents.d[slot] - reference[nearest_row(lanes, agents.lane[slot], agents.s[slot])]
@@ -147,7 +147,7 @@ def own_corridors(lanes: LaneTable, agents: AgentTable, slots: IntArray,
 
 @inlined
 def first_from(entries: Entries, lane: int, rear: float) -> int:
-    """Give the first row of a lane whose entry begins at an arc length or behind it."""
+    """Return the first row of a lane whose entry begins at an arc length or behind it."""
     return first_at_least(entries.rear, entries.begin[lane], entries.begin[lane + 1], rear)
 
 
@@ -197,7 +197,7 @@ def _find(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
 @bare
 def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: float,
                 corridor: Corridors, i: int, reference: FloatArray) -> float:
-    """Give where an entry that is in an agent's way begins [m], inf for any other."""
+    """Return where an entry that is in an agent's way begins [m], inf for any other."""
     middle = 0.5 * (entries.rear[n] + entries.front[n])
     if middle + offset <= 0.0 or entries.owner[n] == corridor.owner[i]:
         return np.inf
@@ -213,7 +213,7 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
 
 @compiled
 def obstacles(pairs: Pairs, standing: NDArray[np.bool_], count: int) -> FloatArray:
-    """Give the least gap (count) of each agent to what stands for good, or inf."""
+    """Return the least gap (count) of each agent to what stands for good, or inf."""
     result = np.full(count, np.inf)
     for p in range(len(pairs.agent)):
         if standing[pairs.entry[p]]:

@@ -40,7 +40,7 @@ ALMOST, STRAIGHTENING = 0.8, 0.5
 
 @compiled
 def envelope_of(lanes: LaneTable, speed: FloatArray) -> FloatArray:
-    """Give the speeds from which one slows down in time for what the same lane allows ahead."""
+    """Return the speeds from which one slows down in time for what the same lane allows ahead."""
     result = speed.copy()
     for lane in range(len(lanes.first)):
         first, gain = lanes.first[lane], 2.0 * COASTING * lanes.step[lane]
@@ -52,7 +52,7 @@ def envelope_of(lanes: LaneTable, speed: FloatArray) -> FloatArray:
 @bare
 def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: float, top: float,
              ahead: float) -> float:
-    """Give the speed that limits and curves allow an agent a distance ahead of its centre."""
+    """Return the speed that limits and curves allow an agent a distance ahead of its centre."""
     result = math.inf
     for step in range(way.depth[i]):
         lane, begins = way.lane[i, step], way.offset[i, step] - ahead
@@ -68,7 +68,7 @@ def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: 
 @compiled
 def _speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Ways,
             agents: AgentTable, slots: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Give what is allowed now (A), and the acceleration (A) that keeps to what is ahead."""
+    """Return what is allowed now (A), and the acceleration (A) that keeps to what is ahead."""
     desired, limit = np.empty(len(slots)), np.full(len(slots), math.inf)
     _fill_speeds(lanes, envelope, lateral, way, agents, slots, desired, limit)
     return desired, limit
@@ -96,7 +96,7 @@ def _fill_speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Wa
 @bare
 def halt_before(speed: float, distance: float, braking: float) -> float:
     """
-    Give the acceleration that halts a distance ahead.
+    Return the acceleration that halts a distance ahead.
 
     The speed follows sqrt(2 b d), looked at a moment ahead so that braking sets in smoothly; where
     more is needed it is braked with at once.
@@ -147,7 +147,7 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
 @compiled
 def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
     """
-    Give the distances (A) at which to halt before lights, some way before the line.
+    Return the distances (A) at which to halt before lights, some way before the line.
 
     :param light: (A) distance of the front from the line [m]
     """
@@ -203,7 +203,7 @@ class Longitudinal:
     def speeds(self, way: Ways, agents: Agents,
                slots: IntArray) -> tuple[FloatArray, FloatArray]:
         """
-        Give the (A) speeds that limits and curves allow [m/s], those ahead in time.
+        Return the (A) speeds that limits and curves allow [m/s], those ahead in time.
 
         :return: and the accelerations (A) with which nobody gets too fast [m/s^2]
         """
@@ -212,14 +212,14 @@ class Longitudinal:
         return desired, limit
 
     def allowed(self, lane: int, s: float, factor: float) -> float:
-        """Give the speed that limit and curves allow somewhere [m/s]."""
+        """Return the speed that limit and curves allow somewhere [m/s]."""
         row = nearest_row(self._graph.table, lane, s)
         return float(min(self._graph.limit[lane] * factor, self._envelope[row]))
 
     def behind(self, agents: Agents, desired: FloatArray, pairs: Pairs, entries: Entries,
                corridor: Corridors) -> FloatArray:
         """
-        Give the acceleration (A) behind everything ahead; that of a free road at most.
+        Return the acceleration (A) behind everything ahead; that of a free road at most.
 
         :param corridor: what each agent takes.
         """

@@ -152,7 +152,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
 
 @compiled
 def is_let_in(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> bool:
-    """Tell whether an agent was let in so far on its way: not only into a junction before."""
+    """Return whether an agent was let in so far on its way: not only into a junction before."""
     return bool(agents.grant[slot] >= 0 and step <= passage.granted[i])
 
 

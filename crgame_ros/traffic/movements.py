@@ -90,7 +90,7 @@ class Movements:
 
     def after(self, lane: int) -> IntArray:
         """
-        Tell what decides about the movements of ways on from a lane, through the next junction.
+        Return what decides about the movements of ways on from a lane, through the next junction.
 
         :return: (L) the movement that a way from here belongs to if it leads over a lane;
             UNDECIDED where that still depends on what follows, and everywhere else. The first lane
@@ -102,7 +102,7 @@ class Movements:
         return result
 
     def is_first(self, lane: int) -> bool:
-        """Tell whether the file names a lane as the first of a junction, and no incoming one."""
+        """Return whether the file names a lane as the first of a junction, and no incoming one."""
         return lane in self._first and lane not in self._named
 
     def _read(self, incoming: IntersectionIncomingElement) -> None:
@@ -120,7 +120,7 @@ class Movements:
         return [int(i) for i in self._graph.successors[lane] if i >= 0]
 
     def _begins(self, lane: int, follower: int, names: dict[int, set[int]]) -> bool:
-        """Tell whether a junction begins between two lanes."""
+        """Return whether a junction begins between two lanes."""
         return follower in names or (
             bool(self._inside[follower]) and follower not in self._named)
 
@@ -180,7 +180,7 @@ class Movements:
                     yield lanes, follower
 
     def _angle(self, lanes: tuple[int, ...]) -> float:
-        """Give the turn from the end of the first lane to the beginning of the last one [rad]."""
+        """Return the turn from the end of the first lane to the beginning of the last one [rad]."""
         graph = self._graph
         first = np.array(lanes)
         begin = graph.yaw[graph.first[first]]
@@ -214,7 +214,7 @@ def _agree(result: FloatArray, ways: Iterable[tuple[tuple[int, ...], float]]) ->
 
 
 def _inside(graph: LaneGraph) -> NDArray[np.bool_]:
-    """Tell which lanes meet others that they neither lead into nor run beside."""
+    """Return which lanes meet others that they neither lead into nor run beside."""
     lines = [shapely.LineString(np.stack((graph.x[a:b], graph.y[a:b]), axis=-1))
              for a, b in zip(graph.first, graph.first + graph.count, strict=True)]
     one, other = shapely.STRtree(lines).query(lines, predicate='dwithin', distance=MEETING)

@@ -79,7 +79,7 @@ class PassageRules:
     left_first: bool = True
 
     def in_the_way(self, obstacles: Obstacles) -> NDArray[np.bool_]:
-        """Tell which of them are nearer to the centre line than a vehicle and its clearance."""
+        """Return which of them are nearer to the centre line than a vehicle and its clearance."""
         reach = obstacles.half_width + self.wide_half_width + self.clearance
         return np.abs(obstacles.d) < reach
 

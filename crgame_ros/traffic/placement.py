@@ -263,7 +263,7 @@ def _sort_part(order: IntArray, keys: FloatArray, start: int, end: int) -> None:
 @bare
 def rear_within(entries: Entries, i: int, low: float, high: float) -> float:
     """
-    Give where the part of an entry begins that is in the way between two offsets.
+    Return where the part of an entry begins that is in the way between two offsets.
 
     :return: arc length [m], inf where nothing of it is in the way.
     """
@@ -277,7 +277,7 @@ def rear_within(entries: Entries, i: int, low: float, high: float) -> float:
 
 @bare
 def front_within(entries: Entries, i: int, low: float, high: float) -> float:
-    """Give where the part of an entry between two offsets ends, -inf without one [m]."""
+    """Return where the part of an entry between two offsets ends, -inf without one [m]."""
     low, high = low - max(entries.drift[i], 0.0), high - min(entries.drift[i], 0.0)
     if entries.high[i] < low or entries.low[i] > high:
         return -math.inf
@@ -288,7 +288,7 @@ def front_within(entries: Entries, i: int, low: float, high: float) -> float:
 
 @inlined
 def _cut(corners: FloatArray, i: int, way: float, low: float, high: float) -> float:
-    """Give the least arc length, times the way 1 or -1, of a part between offsets, or inf."""
+    """Return the least arc length, times the way 1 or -1, of a part between offsets, or inf."""
     result = math.inf
     for n in range(4):
         s, d = way * corners[i, n, 0], corners[i, n, 1]

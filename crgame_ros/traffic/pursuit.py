@@ -22,7 +22,7 @@ LONG_FRONT = 5.0
 @inlined
 def curve_shift(curvature: float, front: float) -> float:
     """
-    Give how far to the left of a bend's middle a rear axle runs, negative to the right [m].
+    Return how far to the left of a bend's middle a rear axle runs, negative to the right [m].
 
     With it f^2 / (4 R) inside, the rear's inner and the front's outer corner are equally far out:
     a vehicle takes as much more than half its width on either side.
@@ -36,7 +36,7 @@ def curve_shift(curvature: float, front: float) -> float:
 @inlined
 def swing_out(swing: float, swing_long: float, front: float) -> float:
     """
-    Give how far to the left a vehicle swings out for a bend that is too tight without [m].
+    Return how far to the left a vehicle swings out for a bend that is too tight without [m].
 
     :param swing: of cars, at the point of the lane [1/m]
     :param swing_long: of long vehicles [1/m]
@@ -49,7 +49,7 @@ def swing_out(swing: float, swing_long: float, front: float) -> float:
 @compiled
 def pursuit_distance(speed: float, curvature: float) -> float:
     """
-    Give how far ahead on the reference the target point of `steer` lies.
+    Return how far ahead on the reference the target point of `steer` lies.
 
     A chord of length l leaves an arc by l^2 |kappa| / 8.
 

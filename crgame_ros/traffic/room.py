@@ -22,7 +22,7 @@ CLOSE_TIME = 0.25
 
 def safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
                others: Bodies) -> float:
-    """Give the speed from which a newcomer gets behind everybody ahead with firm braking."""
+    """Return the speed from which a newcomer gets behind everybody ahead with firm braking."""
     here = np.flatnonzero(agents.active)
     poses = np.concatenate((agents.centers()[here], others.poses))
     lengths = np.concatenate((agents.length[here], others.length))
@@ -43,7 +43,7 @@ def safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
 def is_free(pose: FloatArray, speed: float, length: float, width: float, agents: Agents,
             others: Bodies, close: bool = False) -> bool:
     """
-    Tell whether a place is free, with a gap to the front and the rear.
+    Return whether a place is free, with a gap to the front and the rear.
 
     :param close: whether touching nobody is enough.
     """

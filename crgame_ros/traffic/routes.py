@@ -174,7 +174,7 @@ class Routes:
 
 
 def _edges(graph: LaneGraph, length: FloatArray) -> tuple[csr_matrix, csr_matrix]:
-    """Give the costs of going on and of changing lanes, (L, L) each."""
+    """Return the costs of going on and of changing lanes, (L, L) each."""
     shape = (len(graph), len(graph))
     lane, column = np.nonzero(graph.successors >= 0)
     stay = csr_matrix((np.maximum(length[lane], 0.1),
@@ -188,7 +188,7 @@ def _edges(graph: LaneGraph, length: FloatArray) -> tuple[csr_matrix, csr_matrix
 
 
 def _cost(reverse: csr_matrix, members: IntArray) -> FloatArray:
-    """Give the cost from each lane to the nearest of some lanes."""
+    """Return the cost from each lane to the nearest of some lanes."""
     return np.asarray(dijkstra(reverse, indices=members, min_only=True), dtype=np.float64)
 
 

@@ -50,7 +50,7 @@ FARTHEST = 150.0
 
 
 def is_long(length: float) -> bool:
-    """Tell whether a vehicle needs ways that are wide enough [m]."""
+    """Return whether a vehicle needs ways that are wide enough [m]."""
     return length > LONG
 
 
@@ -157,7 +157,7 @@ class Spawner:
 
     def _ahead(self, agents: Agents, slots: IntArray,
                others: Bodies) -> tuple[FloatArray, FloatArray]:
-        """Give the gaps (A) to who is ahead of agents on their ways, and its speeds (A)."""
+        """Return the gaps (A) to who is ahead of agents on their ways, and its speeds (A)."""
         lanes, middle = self._graph.table, np.zeros(len(slots))
         entries = place(lanes, self._cells.table, with_agents(others, agents.table))
         way = own_ways(lanes, self._routes.next, agents.table, slots)
@@ -265,7 +265,7 @@ class Spawner:
 
     def _speed(self, lane: int, s: float, agents: Agents, slot: int) -> float:
         """
-        Give the speed at which a newcomer drives.
+        Return the speed at which a newcomer drives.
 
         It could still stop before a junction, the end of the lane or a light that is not green,
         and slow down for the bends and limits on its way.
@@ -305,7 +305,7 @@ class Spawner:
         return True
 
     def _has_room(self, agents: Agents, slot: int, others: Bodies) -> bool:
-        """Tell whether a newcomer has the usual gap on its way, which may bend."""
+        """Return whether a newcomer has the usual gap on its way, which may bend."""
         gap, speed = self._ahead(agents, np.array([slot]), others)
         own = float(agents.speed[slot])
         return bool(gap[0] >= START_GAP + START_TIME * own + max(
@@ -316,6 +316,6 @@ class Spawner:
             lane, self._random, is_long(float(agents.length[slot])))
 
     def _fits_into(self, agents: Agents, slot: int, lane: int) -> bool:
-        """Tell whether a vehicle of an agent's size gets on from a lane."""
+        """Return whether a vehicle of an agent's size gets on from a lane."""
         long = is_long(float(agents.length[slot]))
         return not long or len(self._routes.reachable(lane, long)) > 0

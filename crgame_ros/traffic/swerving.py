@@ -125,7 +125,7 @@ class Swerving:
 
 
 def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles:
-    """Give what stands in a chain of lanes, by the distance from its beginning."""
+    """Return what stands in a chain of lanes, by the distance from its beginning."""
     parts = [np.flatnonzero(standing.lane == i) for i in chain]
     number: IntArray = np.repeat(np.arange(len(chain)), [len(p) for p in parts])
     row = np.concatenate(parts)
@@ -139,7 +139,7 @@ def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles
 
 def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArray:
     """
-    Give the speeds at which agents that steer as `tracking.steer` does keep to a band's clearance.
+    Return the speeds at which agents that steer as `tracking.steer` does keep to a band's clearance.
 
     They steer for a point that is farther ahead the faster they drive, and so cut what is shorter
     than that. On small angles a rear axle that steers for the point at the distance l moves as

@@ -51,7 +51,7 @@ ASIDE = 0.6
 def tight_lanes(graph: LaneGraph, car: Shape, large_car: Shape,
                 truck: Shape) -> NDArray[np.bool_]:
     """
-    Tell for cars and long vehicles (2) which lanes (2, L) they leave the road on, as agents drive.
+    Return for cars and long vehicles (2) which lanes (2, L) they leave the road on, as agents drive.
 
     Each lane with a bend, a kink or little width is driven from every lane before it to every
     lane behind it. Where one leaves the road it is tried whether swinging out helps, and
@@ -76,7 +76,7 @@ class _Area:
             shapely.prepare(area)
 
     def off(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Give how far points (N) are off it at most, as steps of `OFF` [m]."""
+        """Return how far points (N) are off it at most, as steps of `OFF` [m]."""
         result = np.zeros(len(x))
         left = np.arange(len(x))
         for area, away in zip(self._areas, OFF, strict=True):
@@ -142,7 +142,7 @@ class _Trials:
         return result
 
     def _around(self, way: IntArray, aside: float) -> shapely.Geometry:
-        """Give the lanes of a way (3) and what is near them."""
+        """Return the lanes of a way (3) and what is near them."""
         ids = self._graph.ids
         return shapely.buffer(self._graph.network.area_of(
             ids[i] for i in way.tolist() if i >= 0), aside)
@@ -179,7 +179,7 @@ class _Trials:
                 set_to[graph.rows_of(lane)] = 0.0
 
     def _bump(self, lane: int, tight: _Tight) -> FloatArray:
-        """Give the swing at the points of a lane with which the vehicle is 1 m farther out."""
+        """Return the swing at the points of a lane with which the vehicle is 1 m farther out."""
         graph, shape = self._graph, self._shape
         s = np.arange(int(graph.count[lane])) * graph.step[lane]
         begin, end = tight.begin[lane] - AROUND, tight.end[lane] + AROUND
@@ -256,7 +256,7 @@ class _Trials:
 
 
 def _suspicious(graph: LaneGraph, shape: Shape) -> FloatArray:
-    """Give from where to where lanes (L, 2) bend or are narrow [m]; inf and -inf where nowhere."""
+    """Return from where to where lanes (L, 2) bend or are narrow [m]; inf and -inf where nowhere."""
     wide = 0.5 * shape.width + 0.5 * EASY_WIDTH
     bad = (graph.half_width < wide) | (np.abs(graph.curvature) > EASY_BEND)
     s = (np.arange(len(bad)) - np.repeat(graph.first, graph.count)) * np.repeat(

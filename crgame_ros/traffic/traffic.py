@@ -195,7 +195,7 @@ class Traffic:
         self._spawner.arrive(others.k + 1, agents, bodies)
 
     def _look_at_obstacles(self, entries: Entries, others: WorldView) -> NDArray[np.bool_]:
-        """Tell which entries (E) stand for good, and swerve around them."""
+        """Return which entries (E) stand for good, and swerve around them."""
         if not len(self._others):
             return np.zeros(len(entries.owner), dtype=bool)
         standing = standing_entries(entries, self._others.standing(others))
@@ -208,7 +208,7 @@ class Traffic:
 
     def _decide(self, k: int, slots: IntArray, entries: Entries,
                 standing: NDArray[np.bool_]) -> FloatArray:
-        """Give the accelerations (A) of the agents; begin lane changes, enter junctions."""
+        """Return the accelerations (A) of the agents; begin lane changes, enter junctions."""
         agents, long, lanes = self._agents, self._longitudinal, self._graph.table
         way, corridor, pairs = self._look_ahead(slots, entries)
         desired, limit = long.speeds(way, agents, slots)
@@ -247,7 +247,7 @@ class Traffic:
         self._spawner.slow_down(agents, slots, desired, halts, newcomers)
 
     def _look_ahead(self, slots: IntArray, entries: Entries) -> tuple[Ways, Corridors, Pairs]:
-        """Give the agents' (A) ways, the room that they take on them, and who is in it."""
+        """Return the agents' (A) ways, the room that they take on them, and who is in it."""
         agents, lanes, reference = self._agents, self._graph.table, self._swerving.reference
         way = own_ways(lanes, self._routes.next, agents.table, slots)
         corridor = own_corridors(lanes, agents.table, slots, reference)
@@ -275,7 +275,7 @@ class Traffic:
 
     def _junctions(self, k: int, slots: IntArray, way: Ways, entries: Entries, pairs: Pairs,
                    desired: FloatArray, gap: FloatArray, elapsed_s: float) -> FloatArray:
-        """Give the distances (A) of the fronts from lights and junctions to halt at, or inf."""
+        """Return the distances (A) of the fronts from lights and junctions to halt at, or inf."""
         agents, graph, conflicts = self._agents, self._graph, self._conflicts
         light = self._lines.halts(way, agents.speed[slots], agents.length[slots],
                                   agents.stops[slots])

@@ -109,20 +109,20 @@ def wishes(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots
 
 @inlined
 def _no_change(speed: float) -> float:
-    """Give how far before a junction or a line nobody changes lanes any more [m]."""
+    """Return how far before a junction or a line nobody changes lanes any more [m]."""
     return NO_CHANGE + speed**2 / (2.0 * BEFORE_JUNCTION)
 
 
 @inlined
 def _is_inside(to: Destinations, agents: AgentTable, slot: int, lane: int) -> bool:
-    """Tell whether a lane is in a junction, for a vehicle as wide as an agent."""
+    """Return whether a lane is in a junction, for a vehicle as wide as an agent."""
     return bool(to.inside[1 if agents.width[slot] > to.narrow else 0, lane])
 
 
 @bare
 def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slot: int,
              at: Situations, i: int) -> bool:
-    """Tell whether an agent may change lanes at all, here and now."""
+    """Return whether an agent may change lanes at all, here and now."""
     if agents.source[slot] != NOBODY or agents.calm_until[slot] > k or (
             at.blocked[i] <= TOO_NEAR):
         return False

@@ -88,7 +88,7 @@ class Others:
         return len(self._descriptions)
 
     def bodies(self, world: WorldView) -> Bodies:
-        """Give the pieces of all who are there."""
+        """Return the pieces of all who are there."""
         if not len(self):
             return NOTHING
         present = np.isfinite(world.poses[self._of]).all(axis=1) & np.isfinite(
@@ -101,7 +101,7 @@ class Others:
                       np.full(len(of), NOBODY))
 
     def _accelerations(self, world: WorldView) -> FloatArray:
-        """Give how the others (O) speed up along their headings, from one tick to the next."""
+        """Return how the others (O) speed up along their headings, from one tick to the next."""
         yaw = world.poses[:, 2]
         speed = world.velocities[:, 0] * np.cos(yaw) + world.velocities[:, 1] * np.sin(yaw)
         if world.k == self._seen_k + 1:
@@ -114,7 +114,7 @@ class Others:
         return self._acceleration
 
     def standing(self, world: WorldView) -> NDArray[np.bool_]:
-        """Tell which others (O) are there and stand for good, as far as one can tell."""
+        """Return which others (O) are there and stand for good, as far as one can tell."""
         speed = np.hypot(world.velocities[:, 0], world.velocities[:, 1])
         still = speed < STANDING
         self._still = np.where(still, self._still + 1, 0)
@@ -146,7 +146,7 @@ def with_agents(others: Bodies, agents: AgentTable) -> Bodies:
 
 def standing_entries(entries: Entries,
                      standing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which entries (E) belong to others that stand for good."""
+    """Return which entries (E) belong to others that stand for good."""
     result = np.zeros(len(entries.owner), dtype=bool)
     other = entries.owner < 0
     result[other] = standing[-1 - entries.owner[other]]

@@ -114,7 +114,7 @@ def load_control_settings(path: Path) -> ControlSettings:
 @functools.cache
 def control_settings() -> ControlSettings:
     """
-    Give the package's own gains and lags.
+    Return the package's own gains and lags.
 
     :raises InputError: if `config/control.yaml` cannot be used.
     """

@@ -40,7 +40,7 @@ class DriverPlace:
 
 
 def driver_place(vehicle: VehicleParameters) -> DriverPlace:
-    """Give the places that the vehicle's file names, or what is usual for its size."""
+    """Return the places that the vehicle's file names, or what is usual for its size."""
     is_car = vehicle.length <= LONGEST_CAR
     usual = _CAR_HEIGHTS if is_car else _TRUCK_HEIGHTS
     height, eye_height, mirror_height, bonnet_height = (

@@ -89,7 +89,7 @@ class DynamicBicycle(VehicleModel):
 
     def _speed(self, speed: float, acceleration: float, commanded: float,
                time_s: float) -> tuple[float, float]:
-        """Give speed and acceleration after a while, whatever their signs."""
+        """Return speed and acceleration after a while, whatever their signs."""
         lag = self.settings.acceleration_lag
         decay = exp(-time_s / lag)
         difference = acceleration - commanded

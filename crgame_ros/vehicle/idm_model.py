@@ -48,7 +48,7 @@ def free_acceleration(speed: Number, desired: Number, model: IdmParameters,
 def interaction(speed: Number, gap: Number, leader_speed: Number, model: IdmParameters,
                 larger: Callable[[Any, Any], Any] = max) -> Number:
     """
-    Give the interaction term -a (s* / s)^2 of the IDM (CRG reference 10) [m/s^2].
+    Return the interaction term -a (s* / s)^2 of the IDM (CRG reference 10) [m/s^2].
 
     The desired gap is s* = s0 + max(0, v T + v dv / (2 sqrt(a b))) with dv = v - v_leader.
 

@@ -27,7 +27,7 @@ INDICATORS = {0: 'off', int(Light.LEFT): 'left', int(Light.RIGHT): 'right', HAZA
 
 
 def lights_of(left: object, right: object, horn: object) -> int:
-    """Give the bit field of three switches."""
+    """Return the bit field of three switches."""
     return (Light.LEFT * bool(left)) | (Light.RIGHT * bool(right)) | (Light.HORN * bool(horn))
 
 

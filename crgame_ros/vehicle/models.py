@@ -44,11 +44,11 @@ class VehicleModel(ABC):
         """
 
     def direction(self, speed: float) -> float:
-        """Give the direction of travel, 1 or -1: that of the motion, at rest that of the gear."""
+        """Return the direction of travel, 1 or -1: that of the motion, at rest that of the gear."""
         return copysign(1.0, speed) if speed != 0.0 else float(self.gear)
 
     def speed_limit(self, direction: float) -> float:
-        """Give the largest absolute speed in a direction of travel [m/s]."""
+        """Return the largest absolute speed in a direction of travel [m/s]."""
         return self.vehicle.max_speed if direction > 0.0 else self.vehicle.max_reverse_speed
 
 

@@ -33,5 +33,5 @@ class SpeedEnvelope:
         return np.asarray(np.sqrt(self._squares))
 
     def at(self, s: float) -> float:
-        """Give the speed allowed at an arc length [m/s]; exact under constant deceleration."""
+        """Return the speed allowed at an arc length [m/s]; exact under constant deceleration."""
         return math.sqrt(np.interp(s, self._s, self._squares))

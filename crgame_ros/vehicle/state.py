@@ -35,7 +35,7 @@ class VehicleState(NamedTuple):
 
     def center(self, rear_to_center: float) -> tuple[float, float]:
         """
-        Give the position of the vehicle's centre.
+        Return the position of the vehicle's centre.
 
         :param rear_to_center: distance l_r from the rear axle forward to the centre [m]
         :return: (x, y) of the centre in the same frame [m]
@@ -61,7 +61,7 @@ STATE_WIDTH = len(StateColumn)
 
 def pose_rates(states: NDArray[np.float64]) -> NDArray[np.float64]:
     """
-    Give the rates of x, y and yaw of the rear axle.
+    Return the rates of x, y and yaw of the rear axle.
 
     :param states: (N, 8) columns as in `StateColumn`.
     :return: (N, 3) [m/s, m/s, rad/s]

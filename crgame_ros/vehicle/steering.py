@@ -75,7 +75,7 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
 
 
 def table_text(path: str) -> str:
-    """Give the text of a ratio table, for who has not its file."""
+    """Return the text of a ratio table, for who has not its file."""
     return json.dumps(write(load_steering_ratio(path)))
 
 

@@ -12,7 +12,7 @@ FIRM_BRAKING = 4.0
 
 def braking_acceleration(speed: float, deceleration: float = FIRM_BRAKING) -> float:
     """
-    Give the acceleration against a motion; none at rest.
+    Return the acceleration against a motion; none at rest.
 
     :param speed: signed [m/s]
     :param deceleration: above 0 [m/s^2]
@@ -23,7 +23,7 @@ def braking_acceleration(speed: float, deceleration: float = FIRM_BRAKING) -> fl
 
 def moving_time(speed: float, acceleration: float, dt_s: float) -> float:
     """
-    Give the part of a step until braking has brought a vehicle to rest [s].
+    Return the part of a step until braking has brought a vehicle to rest [s].
 
     :return: all of the step where it does not, or where the acceleration is no braking.
     """

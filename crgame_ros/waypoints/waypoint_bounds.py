@@ -109,7 +109,7 @@ def _refuse_turning_back(bounds: Bounds, s: FloatArray, center: FloatArray,
 
 
 def _place(reason: str, lane: WaypointLane, s: FloatArray) -> str:
-    """Give the station of the place that shapely names, as in `Self-intersection[1 2]`."""
+    """Return the station of the place that shapely names, as in `Self-intersection[1 2]`."""
     _, _, rest = reason.partition('[')
     try:
         x, y = (float(text) for text in rest.rstrip(']').split())

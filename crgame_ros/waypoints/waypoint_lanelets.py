@@ -23,7 +23,7 @@ _MAX_CHAIN = 1000
 
 def lanelet_waypoints(network: RoadNetwork, lanelet_id: int) -> FloatArray:
     """
-    Give the way-points of one lanelet.
+    Return the way-points of one lanelet.
 
     Position and width are those of the centre line's vertices; vertices within `MIN_SPACING` of
     the last are left out, and way-points on the straight are added next to the ends of segments

@@ -24,7 +24,7 @@ End = tuple[int, int]
 
 def completed_links(roads: WaypointRoads, where: str) -> dict[int, LaneLinks]:
     """
-    Give the links of every lane, with those that only the lane at the other end names.
+    Return the links of every lane, with those that only the lane at the other end names.
 
     A neighbour that already has another neighbour on that side keeps it.
 
@@ -53,7 +53,7 @@ def completed_links(roads: WaypointRoads, where: str) -> dict[int, LaneLinks]:
 
 def turns(roads: WaypointRoads, links: Mapping[int, LaneLinks]) -> dict[End, float]:
     """
-    Give the angles by which ends of lanes turn to the mean heading of the lanes that meet there.
+    Return the angles by which ends of lanes turn to the mean heading of the lanes that meet there.
 
     Splines of lanes that follow each other have slightly different headings where they meet;
     their bounds would gape there. An end that turns by more than `MAX_TURN` stays.
@@ -73,7 +73,7 @@ def turns(roads: WaypointRoads, links: Mapping[int, LaneLinks]) -> dict[End, flo
 
 
 def is_reachable(links: Mapping[int, LaneLinks], start: int, goal: int) -> bool:
-    """Tell whether a lane can be reached, over successors and neighbours of the same direction."""
+    """Return whether a lane can be reached, over successors and neighbours of the same direction."""
     seen, waiting = {start}, [start]
     while waiting:
         near = links[waiting.pop()]

@@ -140,14 +140,14 @@ class CurveIndex:
 
     def _slopes(self, piece: IntArray, u: FloatArray,
                 points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Give the first and second derivative of half the squared distance."""
+        """Return the first and second derivative of half the squared distance."""
         position, first, second = self._at(piece, u)
         offset = position - points
         return (np.einsum('ij,ij->i', offset, first),
                 np.einsum('ij,ij->i', first, first) + np.einsum('ij,ij->i', offset, second))
 
     def _at(self, piece: IntArray, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Give position and derivatives (n, 2) on pieces."""
+        """Return position and derivatives (n, 2) on pieces."""
         c3, c2, c1, c0 = self._pieces.coefficients[:, piece]
         t = u[:, None]
         return (((c3 * t + c2) * t + c1) * t + c0, (3.0 * c3 * t + 2.0 * c2) * t + c1,

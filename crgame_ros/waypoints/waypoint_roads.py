@@ -141,7 +141,7 @@ class WaypointRoads:
 
     def only(self, lane_ids: Collection[int]) -> 'WaypointRoads':
         """
-        Give some of the lanes, with the links between these.
+        Return some of the lanes, with the links between these.
 
         :raises InputError: if there is none.
         """
@@ -156,7 +156,7 @@ class WaypointRoads:
 
     def lane(self, lane_id: int) -> WaypointLane:
         """
-        Give a lane.
+        Return a lane.
 
         :raises InputError: if it does not exist.
         """
@@ -165,7 +165,7 @@ class WaypointRoads:
         return self._lanes[lane_id]
 
     def links(self, lane_id: int) -> LaneLinks:
-        """Give the lanes around a lane."""
+        """Return the lanes around a lane."""
         self.lane(lane_id)
         return self._links[lane_id]
 

@@ -116,7 +116,7 @@ class WaypointLane:
 
     @property
     def rows(self) -> FloatArray:
-        """Give the way-points (W, 4): x, y, width, speed limit; the inverse of `of_rows`."""
+        """Return the way-points (W, 4): x, y, width, speed limit; the inverse of `of_rows`."""
         return np.column_stack((self.points, self.width, self.speed_limit))
 
     @property
@@ -126,7 +126,7 @@ class WaypointLane:
 
     @property
     def pieces(self) -> CurvePieces:
-        """Give the curve as cubic pieces, for an index over several lanes."""
+        """Return the curve as cubic pieces, for an index over several lanes."""
         return CurvePieces(np.asarray(self._curve.c), self.s[:-1], np.diff(self.s),
                            np.zeros(len(self.s) - 1, dtype=np.int64))
 
@@ -148,12 +148,12 @@ class WaypointLane:
                           self._quantity('speed_limit', s))
 
     def tangents(self, s: FloatArray) -> FloatArray:
-        """Give the derivatives (N, 2) of the position by the station, of about unit length."""
+        """Return the derivatives (N, 2) of the position by the station, of about unit length."""
         return np.asarray(self._curve(np.clip(s, 0.0, self.length), 1), dtype=np.float64)
 
     def poses(self, s: FloatArray, d: FloatArray) -> FloatArray:
         """
-        Give poses beside the lane: the inverse of `project`.
+        Return poses beside the lane: the inverse of `project`.
 
         :param s: (N,) stations [m]
         :param d: (N,) offsets to the left [m]

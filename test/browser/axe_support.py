@@ -29,7 +29,7 @@ def _axe() -> str:
 
 
 def barriers(browser: Browser) -> list[str]:
-    """Give what stands in the way of somebody who reads the page as it is now."""
+    """Return what stands in the way of somebody who reads the page as it is now."""
     if not browser.run('return "axe" in window'):
         # The page's own policy refuses scripts from elsewhere.
         browser.driver.execute_cdp_cmd('Runtime.evaluate', {'expression': _axe()})

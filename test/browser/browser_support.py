@@ -117,7 +117,7 @@ class Browser:
             time.sleep(_POLL_S)
 
     def console_errors(self) -> list[str]:
-        """Give every error that the page has logged since it was opened, thrown ones too."""
+        """Return every error that the page has logged since it was opened, thrown ones too."""
         self._errors += [entry['message'] for entry in self.driver.get_log('browser')
                          if entry['level'] == 'SEVERE']
         return list(self._errors)

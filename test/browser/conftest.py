@@ -34,7 +34,7 @@ def _opener(factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
 
 @pytest.fixture
 def new_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
-    """Give a function that opens a browser of its own: as many people as a test needs."""
+    """Return a function that opens a browser of its own: as many people as a test needs."""
     yield from _opener(tmp_path_factory)
 
 
@@ -47,13 +47,13 @@ def only_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture
 def browser(only_browser: Browser) -> Browser:
-    """Give a browser of 1280x720 as if it had just been opened."""
+    """Return a browser of 1280x720 as if it had just been opened."""
     only_browser.renew()
     return only_browser
 
 
 @pytest.fixture(scope='module')
 def module_browser(only_browser: Browser) -> Browser:
-    """Give such a browser once, for all tests of a module."""
+    """Return such a browser once, for all tests of a module."""
     only_browser.renew()
     return only_browser

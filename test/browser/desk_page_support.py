@@ -93,7 +93,7 @@ class Participant:
 
 
 def finished(folder: Path) -> dict[str, dict[str, Any]]:
-    """Give what is told of each finished item."""
+    """Return what is told of each finished item."""
     entries = [entry for entry in read_journal(folder / 'P07') if entry['entry'] == 'finished']
     assert len({entry['item'] for entry in entries}) == len(entries)
     return {entry['item']: entry for entry in entries}

@@ -42,7 +42,7 @@ class Graph(NamedTuple):
     address: str
 
     def commands(self, vehicle: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Give n (R) and the (R, 4) commands that a vehicle obeyed since the last `forget`."""
+        """Return n (R) and the (R, 4) commands that a vehicle obeyed since the last `forget`."""
         self.peer.listen()
         table = self.peer.cycles()
         return table.column('n'), table.commands(vehicle)
@@ -123,7 +123,7 @@ class LivePage:
         return self.browser.wait(condition, what, PATIENCE_S, arguments)
 
     def text(self, selector: str) -> str:
-        """Give the text of an element, as the page holds it; empty where there is none."""
+        """Return the text of an element, as the page holds it; empty where there is none."""
         return str(self.run(
             'return document.querySelector(arguments[0])?.textContent ?? ""', selector))
 
@@ -163,11 +163,11 @@ class LivePage:
         ActionChains(self.driver).key_up(key).perform()
 
     def seat(self, seat: str) -> dict[str, Any]:
-        """Give a seat as the page knows it."""
+        """Return a seat as the page knows it."""
         return dict(self.run('return crgame.store.seats[arguments[0]]', seat))
 
     def seat_button(self, seat: str, action: str) -> str:
-        """Give the selector of a button in a seat's row."""
+        """Return the selector of a button in a seat's row."""
         return f'li[data-seat="{seat}"] [data-action="{action}"]'
 
     def claim(self, seat: str) -> None:
@@ -209,7 +209,7 @@ class LivePage:
                   ' && crgame.world.shown?.epoch === crgame.store.status.epoch', 'a new run')
 
     def vehicle(self, index: int) -> NDArray[np.float64]:
-        """Give the 13 numbers of a vehicle as it was drawn last."""
+        """Return the 13 numbers of a vehicle as it was drawn last."""
         row = self.run('const at = 13 * arguments[0];'
                        'return [...crgame.world.shown.vehicles.subarray(at, at + 13)];', index)
         return np.array([np.nan if value is None else value for value in row], dtype=float)

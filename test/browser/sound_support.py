@@ -55,26 +55,26 @@ NO_TROUBLE = {'collision': False, 'offRoad': False, 'kerb': 0}
 
 
 def own_vehicle(**values: Any) -> dict[str, Any]:
-    """Give a car that stands with a silent engine, but for what is said."""
+    """Return a car that stands with a silent engine, but for what is said."""
     return {'id': 'hv0', 'train': 'CAR', 'gear': 0, 'rpm': 800, 'load': 0.0, 'speed': 0.0,
             'deceleration': 0.0, 'lateral': 0.0, 'lights': 0} | values
 
 
 def other_vehicle(**values: Any) -> dict[str, Any]:
-    """Give a car that passes ahead, but for what is said."""
+    """Return a car that passes ahead, but for what is said."""
     return {'id': 'av0', 'train': 'CAR', 'rpm': 1500, 'speed': 15.0, 'lights': 0,
             'distance': 4.0, 'pan': 0.0, 'doppler': 1.0} | values
 
 
 def update(at: float = 0.0, own: dict[str, Any] | None = None,
            others: Sequence[dict[str, Any]] = (), **trouble: float) -> dict[str, Any]:
-    """Give what is heard from a time on [s]."""
+    """Return what is heard from a time on [s]."""
     return {'at': at, 'own': own or own_vehicle(), 'others': list(others),
             'trouble': NO_TROUBLE | trouble}
 
 
 def decoded(answer: Any) -> FloatArray:
-    """Give the samples (channels, n) that a script has returned."""
+    """Return the samples (channels, n) that a script has returned."""
     channels, text = answer
     samples = np.frombuffer(base64.b64decode(text), dtype='<f4').astype(np.float64)
     return samples.reshape(channels, -1)
@@ -124,5 +124,5 @@ def strongest_Hz(samples: FloatArray, low: float = 20.0, high: float = 8000.0) -
 
 
 def rms(samples: FloatArray) -> float:
-    """Give the root of the mean square."""
+    """Return the root of the mean square."""
     return float(np.sqrt(np.mean(samples ** 2)))

@@ -100,13 +100,13 @@ class StudySession:
 
     @property
     def browser(self) -> Browser:
-        """Give the participant's browser."""
+        """Return the participant's browser."""
         assert self._browser is not None
         return self._browser
 
     @property
     def entries(self) -> list[dict[str, Any]]:
-        """Give what the journal has."""
+        """Return what the journal has."""
         return read_journal(self.folder)
 
     def act(self) -> str:
@@ -124,7 +124,7 @@ class StudySession:
         return shown
 
     def time_s(self) -> float | None:
-        """Give the run's clock as the page shows it [s]; None between drives."""
+        """Return the run's clock as the page shows it [s]; None between drives."""
         return self._robot.time_s()
 
     def mark(self, name: str) -> None:

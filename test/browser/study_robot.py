@@ -98,11 +98,11 @@ class StudyRobot:
 
     @property
     def lost(self) -> bool:
-        """Tell whether the browser does not answer any more."""
+        """Return whether the browser does not answer any more."""
         return self._refused > 3
 
     def time_s(self) -> float | None:
-        """Give the run's clock as the frame of the drive tells it [s]; None between drives."""
+        """Return the run's clock as the frame of the drive tells it [s]; None between drives."""
         try:
             time_s = self._browser.run(_CLOCK)
         except (WebDriverException, HTTPError):

@@ -31,7 +31,7 @@ return [...at(vehicles, 13), ...at(objects, 6)];"""
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Give a run of two vehicles and six obstacles, in which the AV perceives."""
+    """Return a run of two vehicles and six obstacles, in which the AV perceives."""
     recorded = RecordedRun(scenarios_directory() / 'traffic.yaml', 1.0)
     recorded.scene |= {'vehicles': [
         vehicle | {'perception': {'localisation': True, 'sensors': [], 'range': 80.0}}
@@ -72,7 +72,7 @@ def drawn(page: Browser) -> None:
 
 
 def told_plans(page: Browser, shown: str) -> int:
-    """Give what was told last, of this picture, of plans in it."""
+    """Return what was told last, of this picture, of plans in it."""
     page.run('window.told.length = 0')
     page.wait('window.told.some(({ type, shown }) => type === "view" && shown === arguments[0])',
               arguments=(shown,))
@@ -149,12 +149,12 @@ def test_who_drives_sees_as_far_as_fog_lets_them_and_a_director_sees_all(
 
 
 def ids(run: RecordedRun, wanted: Any) -> set[str]:
-    """Give the ids of those that are wanted, but for the own vehicle's."""
+    """Return the ids of those that are wanted, but for the own vehicle's."""
     every = [item['id'] for item in (*run.scene['vehicles'], *run.scene['objects'])]
     return {name for name, take in list(zip(every, wanted, strict=True))[1:] if take}
 
 
 def named(page: Browser, run: RecordedRun) -> set[str]:
-    """Give whom the words beside the map name, but for the own vehicle."""
+    """Return whom the words beside the map name, but for the own vehicle."""
     words = page.run('return crgame.around.describe()').replace(',', ' ').split()
     return ids(run, np.ones(len(run.states[0]) + len(run.objects[0]), dtype=bool)) & set(words)

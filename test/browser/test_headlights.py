@@ -59,7 +59,7 @@ def cockpit() -> Iterator[Served]:
 
 @pytest.fixture(scope='module')
 def pictures(cockpit: Served, module_browser: Browser) -> dict[str, Any]:
-    """Give what is seen by day, at dusk and in fog."""
+    """Return what is seen by day, at dusk and in fog."""
     if find_library() is None:
         pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
     page = module_browser

@@ -44,7 +44,7 @@ def show(page: Served, browser: Browser, lights: int, n: int) -> None:
 
 
 def amber(browser: Browser, at: tuple[float, float]) -> bool:
-    """Tell whether the map is amber at a place of hv0, in its own coordinates [m]."""
+    """Return whether the map is amber at a place of hv0, in its own coordinates [m]."""
     red, green, blue = browser.run("""
         const { camera, shown } = crgame.world;
         const [x0, y0, yaw] = shown.vehicles;
@@ -59,7 +59,7 @@ def amber(browser: Browser, at: tuple[float, float]) -> bool:
 
 
 def sign(browser: Browser, name: str) -> tuple[bool, str]:
-    """Give whether a sign over the speed is lit, and what it is called."""
+    """Return whether a sign over the speed is lit, and what it is called."""
     lit, label = browser.run("""
         const sign = document.querySelector(`.sign-${arguments[0]}`);
         return [sign.hasAttribute('data-on'), sign.getAttribute('aria-label')];""", name)

@@ -39,7 +39,7 @@ def only_page(graph: Graph, module_browser: Browser) -> LivePage:
 
 @pytest.fixture
 def page(only_page: LivePage) -> Iterator[LivePage]:
-    """Give the page of a run that goes on."""
+    """Return the page of a run that goes on."""
     if only_page.run('return crgame.store.status.run') == 'paused':
         # Left by a test that failed.
         only_page.order('start')
@@ -50,7 +50,7 @@ def page(only_page: LivePage) -> Iterator[LivePage]:
 
 @pytest.fixture
 def new_run(page: LivePage) -> LivePage:
-    """Give the page of a run that has just begun."""
+    """Return the page of a run that has just begun."""
     page.reset()
     return page
 
@@ -207,7 +207,7 @@ def test_a_trigger_lets_the_pedestrian_go(new_run: LivePage) -> None:
 
 
 def plan_color(page: LivePage) -> int:
-    """Give how blue the picture is where the AV's plan leads in a second's time."""
+    """Return how blue the picture is where the AV's plan leads in a second's time."""
     page.wait('crgame.store.plans.size > 0 && crgame.store.status.n === crgame.world.shown.n'
               ' && !crgame.world.camera.moves && crgame.store.plans.get(1).t'
               ' + crgame.store.plans.get(1).points.at(-1) > crgame.world.shown.t + 1', 'a plan')

@@ -67,7 +67,7 @@ def take_the_wheel(page: LivePage) -> None:
 
 @pytest.fixture
 def page(only_page: LivePage) -> Iterator[LivePage]:
-    """Give the page of somebody who drives."""
+    """Return the page of somebody who drives."""
     take_the_wheel(only_page)
     yield only_page
     for tab in only_page.driver.window_handles[1:]:

@@ -81,7 +81,7 @@ def wait_for_card(page: LivePage) -> str:
 
 
 def folder_on_card(page: LivePage) -> Path:
-    """Give the folder that the card names."""
+    """Return the folder that the card names."""
     return Path(page.text('.outcome-files code'))
 
 

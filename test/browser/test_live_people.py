@@ -47,7 +47,7 @@ def graph(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Graph]:
 
 
 def link(graph: Graph, purpose: str) -> str:
-    """Give a link that was printed."""
+    """Return a link that was printed."""
     found = re.search(rf'to {purpose} +(https://\S+)', graph.launcher.text)
     assert found, graph.launcher.text
     return found[1]
@@ -69,7 +69,7 @@ class Person(LivePage):
 
 
 def throttle(graph: Graph, seat: str) -> float:
-    """Give the throttle that a vehicle obeyed last."""
+    """Return the throttle that a vehicle obeyed last."""
     graph.peer.listen()
     return float(graph.commands(seat)[1][-1, THROTTLE]) \
         if graph.peer.messages['/timing/cycle'] else np.nan

@@ -133,7 +133,7 @@ def pixels(page: LivePage, x: float, y: float, half_px: int = 1) -> NDArray[np.i
 
 
 def share_of(picture: NDArray[np.int64], page: LivePage, color: str) -> float:
-    """Give the share of a picture that has a colour of the theme."""
+    """Return the share of a picture that has a colour of the theme."""
     wanted = page.run("""
         const probe = document.createElement('span');
         probe.style.color = `var(--${arguments[0]})`;
@@ -145,7 +145,7 @@ def share_of(picture: NDArray[np.int64], page: LivePage, color: str) -> float:
 
 
 def place_of(page: LivePage, name: str) -> tuple[float, float]:
-    """Give where an object is drawn."""
+    """Return where an object is drawn."""
     x, y = page.run("""
         const at = 6 * crgame.store.scene.objects.findIndex(({ id }) => id === arguments[0]);
         return [...crgame.world.shown.objects.subarray(at, at + 2)];""", name)
@@ -153,7 +153,7 @@ def place_of(page: LivePage, name: str) -> tuple[float, float]:
 
 
 def told(listener: Peer, page: LivePage, name: str) -> bool:
-    """Tell whether the planner's newest request at the shown time holds somebody."""
+    """Return whether the planner's newest request at the shown time holds somebody."""
     scheduler = listener.games[-1].scheduler
     n = page.run('return crgame.world.shown.n')
     request = next(message for message in reversed(listener.messages['/<av>/plan_request'])

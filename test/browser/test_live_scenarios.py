@@ -54,7 +54,7 @@ def only_page(graph: Graph, module_browser: Browser) -> LivePage:
 
 @pytest.fixture
 def page(only_page: LivePage) -> Iterator[LivePage]:
-    """Give the page at its scenario panel; no text may have run in it afterwards."""
+    """Return the page at its scenario panel; no text may have run in it afterwards."""
     only_page.tab('scenario')
     yield only_page
     assert only_page.run('return [window.ran ?? false, document.images.length]') == [False, 0]

@@ -48,7 +48,7 @@ def page(graph: Graph, module_browser: Browser) -> LivePage:
 
 
 def put_backs(page: LivePage) -> list[dict[str, object]]:
-    """Give the events by drivers, as the page knows them."""
+    """Return the events by drivers, as the page knows them."""
     return list(page.run('return crgame.store.fired.filter((event) => event.by === "driver")'))
 
 

@@ -94,7 +94,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory, around: Around) -> Iterator[
 
 
 def state(browser: Browser) -> dict[str, Any]:
-    """Give what the stage told last."""
+    """Return what the stage told last."""
     return dict(browser.run('return window.told.at(-1)?.state ?? {}'))
 
 
@@ -109,7 +109,7 @@ def wait_for_state(browser: Browser, condition: str) -> dict[str, Any]:
 
 
 def seen(peer: Peer) -> dict[str, str]:
-    """Give what was recorded last of the picture in the seat."""
+    """Return what was recorded last of the picture in the seat."""
     return next((read_status(status).values
                  for message in reversed(peer.messages['/diagnostics'])
                  for status in message.status if status.name == 'cockpit_node: hv0 view'), {})

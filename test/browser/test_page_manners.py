@@ -36,7 +36,7 @@ return least;"""
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Give a game with traffic, whose events and title somebody else wrote."""
+    """Return a game with traffic, whose events and title somebody else wrote."""
     recorded = RecordedRun(scenarios_directory() / 'traffic.yaml', 14.0)
     recorded.scene |= {'title': OVERRIDE, 'events': [
         {'name': 'slow', 'label': '', 'when': None, 'kind': 'speed_limit', 'speed': 30 / 3.6,
@@ -58,7 +58,7 @@ def server(run: RecordedRun, module_browser: Browser) -> Iterator[Served]:
 
 @pytest.fixture
 def page(server: Served, module_browser: Browser) -> Iterator[Browser]:
-    """Give the page in its usual size; it may not have complained afterwards."""
+    """Return the page in its usual size; it may not have complained afterwards."""
     module_browser.resize(1280, 720)
     yield module_browser
     assert module_browser.console_errors() == []

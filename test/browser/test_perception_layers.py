@@ -74,7 +74,7 @@ def test_a_recording_shows_what_was_perceived(browser: Browser,
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Give a run of two vehicles and six obstacles."""
+    """Return a run of two vehicles and six obstacles."""
     return RecordedRun(scenarios_directory() / 'traffic.yaml', 1.0)
 
 
@@ -108,7 +108,7 @@ def send(page: Served, slot: str, frame: bytes) -> None:
 
 
 def pixel(browser: Browser, x: float, y: float) -> list[int]:
-    """Give the colour of the pixel at a point of the map."""
+    """Return the colour of the pixel at a point of the map."""
     px, py = browser.run("""
         const { camera } = crgame.world;
         const box = document.querySelector('#world').getBoundingClientRect();
@@ -118,7 +118,7 @@ def pixel(browser: Browser, x: float, y: float) -> list[int]:
 
 
 def color(browser: Browser, name: str) -> list[int]:
-    """Give a colour of the theme."""
+    """Return a colour of the theme."""
     found: list[int] = browser.run("""
         const probe = document.createElement('span');
         probe.style.color = `var(--${arguments[0]})`;

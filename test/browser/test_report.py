@@ -128,7 +128,7 @@ def test_it_fits_and_can_be_read(shown: Browser, file: Path, width: int, height:
 
 
 def _contrast(first: str, second: str) -> float:
-    """Give the ratio of two colours as WCAG 2 defines it."""
+    """Return the ratio of two colours as WCAG 2 defines it."""
     def luminance(colour: str) -> float:
         parts = [int(part) / 255.0 for part in re.findall(r'\d+', colour)[:3]]
         red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4

@@ -108,7 +108,7 @@ def look(page: Browser, x: float, y: float, z: float, *, yaw: float = 0.0, pitch
 
 
 def straight_bounds(scene: Scene, marking: str) -> list[tuple[NDArray[np.float64], float]]:
-    """Give middles (2) and headings [rad] of straight parts of bounds that are painted so."""
+    """Return middles (2) and headings [rad] of straight parts of bounds that are painted so."""
     found = []
     for lanelet in scene['lanelets']:
         for side in ('left', 'right'):
@@ -215,7 +215,7 @@ def test_fog_leaves_the_contrast_that_it_should(page: Browser, light: str,
 
 
 def as_light(pixels: Pixels) -> float:
-    """Give the mean green light of pixels, which are encoded as sRGB says."""
+    """Return the mean green light of pixels, which are encoded as sRGB says."""
     value = pixels[:, :, 1].mean() / 255.0
     return float(((value + 0.055) / 1.055) ** 2.4)
 

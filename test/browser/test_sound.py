@@ -63,7 +63,7 @@ def heard_at(page: Browser, speed: float, powertrain: str = 'combustion',
 
 
 def band_rms(samples: FloatArray, low_Hz: float, high_Hz: float) -> float:
-    """Give the amplitude of what lies between two frequencies."""
+    """Return the amplitude of what lies between two frequencies."""
     spectrum = np.abs(np.fft.rfft(samples)) ** 2
     bins_Hz = np.fft.rfftfreq(len(samples), 1.0 / RATE_Hz)
     return math.sqrt(spectrum[(bins_Hz >= low_Hz) & (bins_Hz <= high_Hz)].sum())

@@ -55,7 +55,7 @@ window.moveStick = (value) => { pad.axes = [value, 0, 0, 0]; };
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Give the cut-in game."""
+    """Return the cut-in game."""
     return RecordedRun(scenarios_directory() / 'cut_in.yaml', 15.0)
 
 

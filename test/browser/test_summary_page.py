@@ -31,7 +31,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def offline(browser: Browser) -> Iterator[Browser]:
-    """Give a browser without network."""
+    """Return a browser without network."""
     browser.driver.execute_cdp_cmd('Network.enable', {})
     browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
         'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
@@ -61,7 +61,7 @@ def test_it_fits_can_be_read_and_leads_to_reports(offline: Browser, page: Path) 
 
 
 def _contrast(browser: Browser, selector: str) -> float:
-    """Give the ratio of an element's colour to that of its ground as WCAG 2 defines it."""
+    """Return the ratio of an element's colour to that of its ground as WCAG 2 defines it."""
     colours = browser.run("""
         const node = document.querySelector(arguments[0]);
         let ground = node;

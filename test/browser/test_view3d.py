@@ -67,7 +67,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 
 @pytest.fixture(scope='module')
 def page(cockpit: Served, module_browser: Browser) -> Browser:
-    """Give a page whose 3D view is open, in a window that costs little."""
+    """Return a page whose 3D view is open, in a window that costs little."""
     if find_library() is None:
         pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
     module_browser.resize(640, 400)
@@ -79,14 +79,14 @@ def page(cockpit: Served, module_browser: Browser) -> Browser:
 
 
 def in_vehicle(pose: NDArray[np.float64], point: Any) -> NDArray[np.float64]:
-    """Give a point of the map ahead of a rear axle, to its left and above the road."""
+    """Return a point of the map ahead of a rear axle, to its left and above the road."""
     dx, dy = point[0] - pose[0], point[1] - pose[1]
     return np.array([dx * math.cos(pose[2]) + dy * math.sin(pose[2]),
                      -dx * math.sin(pose[2]) + dy * math.cos(pose[2]), point[2]])
 
 
 def sight(aside: float, pitch: float) -> tuple[NDArray[np.float64], ...]:
-    """Give the directions forwards, to the left and up of somebody who looks there [rad]."""
+    """Return the directions forwards, to the left and up of somebody who looks there [rad]."""
     forwards = np.array([math.cos(pitch) * math.cos(aside), math.cos(pitch) * math.sin(aside),
                          math.sin(pitch)])
     left = np.array([-math.sin(aside), math.cos(aside), 0.0])
@@ -94,7 +94,7 @@ def sight(aside: float, pitch: float) -> tuple[NDArray[np.float64], ...]:
 
 
 def pinhole(offset: NDArray[np.float64], aside: float, across: float) -> tuple[float, float]:
-    """Give the pixel in which an eye sees a point: similar triangles, nothing else."""
+    """Return the pixel in which an eye sees a point: similar triangles, nothing else."""
     forwards, left, up = sight(aside, 0.0)
     scale = 0.5 * WIDTH / math.tan(0.5 * across) / (offset @ forwards)
     return 0.5 * WIDTH - scale * (offset @ left), 0.5 * HEIGHT - scale * (offset @ up)
@@ -102,7 +102,7 @@ def pinhole(offset: NDArray[np.float64], aside: float, across: float) -> tuple[f
 
 def on_glass(point: NDArray[np.float64], name: str) -> tuple[float, float]:
     """
-    Give where on a mirror's glass its driver sees a point, from the left and from the top.
+    Return where on a mirror's glass its driver sees a point, from the left and from the top.
 
     The line from the eye's image behind the glass to the point passes through it there.
 

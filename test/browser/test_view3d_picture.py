@@ -86,7 +86,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 
 @pytest.fixture
 def page(cockpit: Served, browser: Browser) -> Browser:
-    """Give a page whose 3D view is open."""
+    """Return a page whose 3D view is open."""
     if find_library() is None:
         pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
     browser.resize(800, 500)

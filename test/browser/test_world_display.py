@@ -29,7 +29,7 @@ return { t, n, epoch, vehicles: [...vehicles], objects: [...objects], latest: la
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Give a game with traffic: two vehicles and six recorded obstacles."""
+    """Return a game with traffic: two vehicles and six recorded obstacles."""
     return RecordedRun(scenarios_directory() / 'traffic.yaml', 20.0)
 
 

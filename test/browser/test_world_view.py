@@ -24,7 +24,7 @@ LONGEST_SCRIPT_MS = 8.0
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Give the cut-in game: a human and an AV side by side on a straight road."""
+    """Return the cut-in game: a human and an AV side by side on a straight road."""
     return RecordedRun(scenarios_directory() / 'cut_in.yaml', 5.0)
 
 
@@ -83,7 +83,7 @@ def theme(browser: Browser, name: str) -> list[int]:
 
 
 def bonnet(run: RecordedRun, index: int) -> tuple[float, float]:
-    """Give a point of a vehicle's bonnet, before the windscreen: 3.3 m before the rear axle."""
+    """Return a point of a vehicle's bonnet, before the windscreen: 3.3 m before the rear axle."""
     x, y, yaw = run.states[0, index, :3]
     return float(x + 3.3 * math.cos(yaw)), float(y + 3.3 * math.sin(yaw))
 

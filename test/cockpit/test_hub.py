@@ -39,7 +39,7 @@ def _refuse(name: str) -> None:
 
 
 async def received(client: Client) -> Sink:
-    """Give everything that waits for a client."""
+    """Return everything that waits for a client."""
     sink = Sink()
     task = asyncio.create_task(client.write(sink))
     await asyncio.sleep(0.005)

@@ -48,7 +48,7 @@ async def listed(running: Cockpit) -> dict[str, Any]:
 
 
 async def entry(running: Cockpit, name: str) -> str:
-    """Give the id of the entry with a file name."""
+    """Return the id of the entry with a file name."""
     return next(str(item['id']) for folder in (await listed(running))['folders']
                 for item in folder['entries'] if item['name'] == name)
 

@@ -45,7 +45,7 @@ async def opened(folder: Path) -> AsyncIterator[tuple[PumpBackend, Access, list[
 
 
 def links_of(lines: list[str]) -> dict[str, str]:
-    """Give the links by what they are for."""
+    """Return the links by what they are for."""
     return {' '.join(line.split()[:-1]): line.split()[-1] for line in lines if '?token=' in line}
 
 

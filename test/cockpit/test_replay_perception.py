@@ -44,7 +44,7 @@ def frames(chunk: bytes) -> list[FloatArray]:
 
 
 def of_kind(found: list[FloatArray], kind: FrameKind) -> dict[int, FloatArray]:
-    """Give the frames of a kind by n; of scans those of the first sensor."""
+    """Return the frames of a kind by n; of scans those of the first sensor."""
     return {int(frame[2]): frame for frame in found if frame[0] == kind
             and (kind is not FrameKind.SCAN or frame[6] == 0)}
 

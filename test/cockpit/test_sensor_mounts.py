@@ -25,7 +25,7 @@ SPEED, YAW_RATE = 15.0, 0.3
 
 @pytest.fixture(scope='module')
 def vehicle() -> VehicleParameters:
-    """Give the parameters of an AV."""
+    """Return the parameters of an AV."""
     return build_setup(load_game(scenarios_directory() / 'cut_in.yaml')).avs[0].vehicle
 
 
@@ -39,14 +39,14 @@ def mounts(vehicle: VehicleParameters) -> SensorMounts:
 
 
 def replaced(mounts: SensorMounts) -> SensorMounts:
-    """Give the same mounts without any states."""
+    """Return the same mounts without any states."""
     fresh = copy.copy(mounts)
     fresh._states = OrderedDict()
     return fresh
 
 
 def states(state: VehicleState) -> np.ndarray:
-    """Give rows of which the second is the AV, with columns that are not of the state."""
+    """Return rows of which the second is the AV, with columns that are not of the state."""
     return np.array([[0.0] * 12, [*state, 1.0, 2.0, 3.0, 4.0]])
 
 

@@ -47,13 +47,13 @@ def plan(speed: float, duration_s: float,
 
 
 def circle(radius: float) -> Callable[[float], float]:
-    """Give the curvature of a circle to the left."""
+    """Return the curvature of a circle to the left."""
     return lambda s: 1.0 / radius
 
 
 def s_curve(speed: float, lateral_acceleration: float = 2.0,
             period_s: float = 6.0) -> Callable[[float], float]:
-    """Give a sinusoidal curvature that asks for a lateral acceleration [m/s^2]."""
+    """Return a sinusoidal curvature that asks for a lateral acceleration [m/s^2]."""
     return lambda s: lateral_acceleration / speed ** 2 \
         * math.sin(2.0 * math.pi * s / (speed * period_s))
 

@@ -39,7 +39,7 @@ def network() -> LaneletNetwork:
 
 
 def rear(x: float, y: float, yaw: float = 0.0) -> list[float]:
-    """Give the rear-axle state of a BMW whose centre is at a pose."""
+    """Return the rear-axle state of a BMW whose centre is at a pose."""
     return [x - BMW.rear_to_center * math.cos(yaw), y - BMW.rear_to_center * math.sin(yaw), yaw,
             0.0, 0.0, 0.0, 0.0, 0.0]
 

@@ -50,7 +50,7 @@ def fence(low: tuple[float, float], high: tuple[float, float], cell: float = 0.1
 
 
 def rear(x: float, y: float, yaw: float = 0.0) -> list[float]:
-    """Give the rear-axle state of a BMW whose centre is at a pose."""
+    """Return the rear-axle state of a BMW whose centre is at a pose."""
     return [x - BMW.rear_to_center * math.cos(yaw), y - BMW.rear_to_center * math.sin(yaw), yaw,
             0.0, 0.0, 0.0, 0.0, 0.0]
 

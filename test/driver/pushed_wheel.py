@@ -28,7 +28,7 @@ EFFECT_SIZE = ctypes.sizeof(ff.Effect)
 
 
 def wheel_at(speed: float, yaw_rate: float) -> float:
-    """Give the angle of the usual vehicle's wheel that holds a turn [rad]."""
+    """Return the angle of the usual vehicle's wheel that holds a turn [rad]."""
     car = load_vehicle_parameters()
     steering, full = Steering(car), car.max_steering_wheel_angle
     angle = math.atan(car.wheelbase * yaw_rate / speed)
@@ -36,7 +36,7 @@ def wheel_at(speed: float, yaw_rate: float) -> float:
 
 
 def raw_of(angle: float) -> int:
-    """Give what a G29 reports at an angle [rad]: 0 is 7.85 rad to the left."""
+    """Return what a G29 reports at an angle [rad]: 0 is 7.85 rad to the left."""
     return round(32767.5 * (1.0 - angle / 7.85))
 
 
@@ -103,12 +103,12 @@ class PushedWheel(EvdevDevice):
 
     @property
     def force_device(self) -> Any:
-        """Give the double."""
+        """Return the double."""
         return self.motor
 
     @property
     def force_limits(self) -> ForceLimits | None:
-        """Give its limits."""
+        """Return its limits."""
         return self.limits if self.motor is not None else None
 
 

@@ -31,7 +31,7 @@ WHEELS = ['logitech_g29', 'logitech_g923', 'logitech_g923_xbox']
 
 
 def find(name: str, axes: frozenset[int], buttons: frozenset[int]) -> list[str]:
-    """Give the names of the shipped maps that fit a device, in order."""
+    """Return the names of the shipped maps that fit a device, in order."""
     return [m.name for m in load_device_maps() if m.fits(name, axes, buttons)]
 
 

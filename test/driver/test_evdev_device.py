@@ -36,7 +36,7 @@ def feed(decoder: EventDecoder, *events: tuple[int, int, int]) -> list[bool]:
 
 
 def absent(tmp_path: Path, name: str) -> EvdevDevice:
-    """Give a device of a map that is not there, to be fed by its decoder."""
+    """Return a device of a map that is not there, to be fed by its decoder."""
     device_map = load_device_map(name)
     device = EvdevDevice((device_map,), directory=tmp_path / 'none')
     device.device_map = device_map

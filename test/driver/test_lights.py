@@ -25,7 +25,7 @@ BUTTONS = LightButtons(*(frozenset({i}) for i in range(4)))
 
 
 def lever(*presses: int) -> IndicatorLever:
-    """Give a lever after presses and releases of buttons, one after the other."""
+    """Return a lever after presses and releases of buttons, one after the other."""
     made = IndicatorLever(BUTTONS)
     for button in presses:
         made.hold({button})

@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 def brush(steady: float, ahead: float, load: float, friction: float,
           half_length: float) -> tuple[float, float]:
     """
-    Give a tyre's lateral force [N] and aligning moment [N m] from the bristles themselves.
+    Return a tyre's lateral force [N] and aligning moment [N m] from the bristles themselves.
 
     Each bristle at x of the contact leans by (a - x) alpha, until its stress is the friction that
     the parabolic pressure allows. The slip angle alpha is the one that gives the steady force

@@ -21,7 +21,7 @@ def silence(watchdog: SeatWatchdog, last: DriverCommand, seconds: float, speed: 
 
 
 def heard(command: DriverCommand) -> SeatWatchdog:
-    """Give a watchdog that has just passed a command."""
+    """Return a watchdog that has just passed a command."""
     watchdog = SeatWatchdog()
     assert watchdog.filter(command, 0.0, DT_S, 15.0) == command
     return watchdog

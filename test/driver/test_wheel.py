@@ -24,7 +24,7 @@ WHEEL = ControlLayout(STEERING, THROTTLE, BRAKE)
 
 
 def raw(steering: float = 32767.5, throttle: float = 255, brake: float = 255) -> RawInput:
-    """Give the raw axes of a Logitech wheel."""
+    """Return the raw axes of a Logitech wheel."""
     return RawInput({0: steering, 2: throttle, 5: brake})
 
 

@@ -26,7 +26,7 @@ GAME = scenarios_directory() / 'cut_in.yaml'
 
 @pytest.fixture
 def plan(tmp_path: Path) -> dict[str, Any]:
-    """Give a plan with a planner of somebody's own."""
+    """Return a plan with a planner of somebody's own."""
     (tmp_path / 'mine.py').write_text(PLANNER)
     return {'games': [str(GAME)], 'planners': ['idm', 'mine.py:Mine'], 'seeds': 2}
 
@@ -37,7 +37,7 @@ def grid(values: dict[str, Any], folder: Path) -> CellGrid:
 
 
 def keys(values: dict[str, Any], folder: Path) -> dict[tuple[str, int], str]:
-    """Give the keys of a plan's cells by planner and seed."""
+    """Return the keys of a plan's cells by planner and seed."""
     return {(cell.planner, cell.seed): cell.key for cell in grid(values, folder)}
 
 

@@ -60,7 +60,7 @@ KINDS = ('Dividing', 'Sleeping', 'Eating', 'Dying', 'Late')
 
 @pytest.fixture(scope='module')
 def process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CellProcess]:
-    """Give a process over the store of the cells."""
+    """Return a process over the store of the cells."""
     folder = tmp_path_factory.mktemp('evaluation')
     (folder / 'bad.py').write_text(PLANNERS)
     made = CellProcess(folder / 'files', 800_000_000)
@@ -70,7 +70,7 @@ def process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CellProcess]:
 
 @pytest.fixture(scope='module')
 def cells(process: CellProcess) -> dict[str, Cell]:
-    """Give a cell of each planner."""
+    """Return a cell of each planner."""
     folder = process._contents.parent
     plan = parse_plan({'games': [str(GAME)], 'duration': 0.5, 'planners': [
         'idm', *({'planner': f'bad.py:{kind}', 'label': kind} for kind in KINDS)]}, 'plan', folder)

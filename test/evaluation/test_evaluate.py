@@ -88,7 +88,7 @@ class Evaluation:
         return Counter(self.begun_file.read_text().split())
 
     def tables(self) -> list[list[dict[str, Any]]]:
-        """Give the rows that depend on no clock, sorted."""
+        """Return the rows that depend on no clock, sorted."""
         return [sorted((row for file in self.out.glob(f'{table}/part-*.parquet')
                         for row in pq.read_table(file).to_pylist()),
                        key=lambda row: (row['cell'], row.get('vehicle')))
@@ -108,7 +108,7 @@ def environment(begun: Path) -> dict[str, str]:
 
 @pytest.fixture(scope='module')
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Evaluation:
-    """Give the evaluation that two workers compute when nobody disturbs them."""
+    """Return the evaluation that two workers compute when nobody disturbs them."""
     evaluation = Evaluation(tmp_path_factory.mktemp('expected'))
     told = evaluation.run('--workers', '2')
     assert f'{CELLS} of {CELLS} cells' in told
@@ -120,7 +120,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Evaluation:
 
 @pytest.fixture(scope='module')
 def expected(undisturbed: Evaluation) -> list[list[dict[str, Any]]]:
-    """Give its tables."""
+    """Return its tables."""
     return undisturbed.tables()
 
 

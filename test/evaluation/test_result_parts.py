@@ -28,7 +28,7 @@ os.kill(os.getpid(), 9)
 
 
 def rows(number: int, status: str = 'ok') -> dict[str, Any]:
-    """Give the rows of a cell with two vehicles."""
+    """Return the rows of a cell with two vehicles."""
     key = f'{number:032x}'
     return {'cell': {'cell': key, 'planner': 'idm', 'seed': number, 'status': status},
             'vehicles': [{'cell': key, 'vehicle': name, 'distance': number + 0.1}

@@ -20,13 +20,13 @@ RADIUS = 30.0
 
 
 def arc(turns: float = 0.5, points: int = 200) -> Array:
-    """Give points of a circle around (0, RADIUS), counter-clockwise from the origin."""
+    """Return points of a circle around (0, RADIUS), counter-clockwise from the origin."""
     angle = np.linspace(0.0, 2.0 * math.pi * turns, points)
     return RADIUS * np.column_stack((np.sin(angle), 1.0 - np.cos(angle)))
 
 
 def zigzag() -> Array:
-    """Give an open polyline of uneven segments, with a vertex that is there twice."""
+    """Return an open polyline of uneven segments, with a vertex that is there twice."""
     random = np.random.default_rng(3)
     x = np.cumsum(random.uniform(1.0, 9.0, 12))
     points = np.column_stack((x, random.uniform(-2.0, 2.0, 12)))

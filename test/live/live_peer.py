@@ -74,7 +74,7 @@ class Peer:
             self.listen()
 
     def publisher(self, name: str, vehicle_id: str = '') -> Publisher:
-        """Give a publisher that somebody listens to."""
+        """Return a publisher that somebody listens to."""
         publisher = self._endpoints.publisher(name, vehicle_id)
         self.wait_until(publisher.get_subscription_count, f'a subscriber of {name}')
         return publisher
@@ -124,7 +124,7 @@ class Peer:
         return CycleTable(chosen[-1].columns, np.concatenate([table.rows for table in chosen]))
 
     def states(self, vehicle_id: str) -> NDArray[np.float64]:
-        """Give rows of stamp [ns], x, y, yaw, signed speed of a vehicle, as published."""
+        """Return rows of stamp [ns], x, y, yaw, signed speed of a vehicle, as published."""
         rows = []
         for message in self.messages['/vehicles/state']:
             first = list(message.joint_names).index(f'{vehicle_id}/x')
@@ -136,7 +136,7 @@ class Peer:
         return np.array(rows)
 
     def statuses(self, name: str) -> list[tuple[DiagnosticStatus, dict[str, str]]]:
-        """Give the statuses of a subject on /diagnostics so far, each with its values."""
+        """Return the statuses of a subject on /diagnostics so far, each with its values."""
         return [(status, {item.key: item.value for item in status.values})
                 for message in self.messages['/diagnostics'] for status in message.status
                 if status.name == name]

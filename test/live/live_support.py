@@ -37,7 +37,7 @@ def wait_until(condition: Callable[[], object], what: str, limit_s: float = PATI
 
 
 def is_node(pid: int) -> bool:
-    """Tell whether a process is one of our nodes and runs."""
+    """Return whether a process is one of our nodes and runs."""
     try:
         name = Path(f'/proc/{pid}/comm').read_text().strip()
         return name in NODES and _state(pid) != 'Z'
@@ -46,7 +46,7 @@ def is_node(pid: int) -> bool:
 
 
 def _state(pid: int) -> str:
-    """Give the state of a process, one letter as in proc(5)."""
+    """Return the state of a process, one letter as in proc(5)."""
     return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0]
 
 
@@ -113,11 +113,11 @@ class Launcher:
                     if (found := re.search(r'http://\S+', line)))
 
     def node(self, name: str) -> int:
-        """Give the process id of a node, the latest if it was started again."""
+        """Return the process id of a node, the latest if it was started again."""
         return dict(self.started)[name]
 
     def says(self, pattern: str) -> bool:
-        """Tell whether a line with this regular expression has come."""
+        """Return whether a line with this regular expression has come."""
         return any(re.search(pattern, line) for line in list(self.lines))
 
     def wait_for(self, pattern: str) -> None:

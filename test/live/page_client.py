@@ -100,15 +100,15 @@ class PageClient:
         self._held = None
 
     def seat(self, name: str) -> dict[str, Any]:
-        """Give a seat as the page shows it."""
+        """Return a seat as the page shows it."""
         return dict(self.documents['seats']['seats'][name])
 
     def newest(self, kind: int) -> NDArray[np.float64] | None:
-        """Give the newest frame of a kind."""
+        """Return the newest frame of a kind."""
         return next((frame for frame in reversed(list(self.frames)) if frame[0] == kind), None)
 
     def vehicle(self, index: int) -> NDArray[np.float64]:
-        """Give the newest 13 numbers of a vehicle."""
+        """Return the newest 13 numbers of a vehicle."""
         frame = self.newest(STATE)
         assert frame is not None
         return frame[6:].reshape(-1, 13)[index]

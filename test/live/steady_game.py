@@ -44,7 +44,7 @@ class Run(NamedTuple):
         self.peer.wait_until(lambda: self.peer.n >= last, f'n = {last}')
 
     def counters(self) -> dict[str, str]:
-        """Give what sim_node said last of the plans of av0."""
+        """Return what sim_node said last of the plans of av0."""
         return self.peer.statuses('sim_node: av0 plans')[-1][1]
 
 

@@ -225,7 +225,7 @@ def test_planner_stop_and_go(graph: Graph, page: PageClient) -> None:
 
 
 def _planner(page: PageClient) -> dict:
-    """Give the row of av0, empty before its first report in an epoch."""
+    """Return the row of av0, empty before its first report in an epoch."""
     return dict(page.documents['status']['planners'].get('av0', {}))
 
 

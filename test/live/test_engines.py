@@ -65,18 +65,18 @@ class Recorded:
         self._offset_ns = min(self.messages['/vehicles/state'])
 
     def at(self, topic: str, n: int) -> object | None:
-        """Give what a topic said of step n."""
+        """Return what a topic said of step n."""
         stamp_ns = self._offset_ns + n * 10_000_000
         return self.messages[topic].get(stamp_ns)
 
     def joints(self, n: int) -> tuple[NDArray[np.float64], ...]:
-        """Give positions, velocities and accelerations (V, 4) of the driven vehicles."""
+        """Return positions, velocities and accelerations (V, 4) of the driven vehicles."""
         point = self.at('/vehicles/state', n).points[0]  # type: ignore[union-attr,attr-defined]
         return tuple(np.array(values).reshape(-1, 4) for values in (
             point.positions, point.velocities, point.accelerations))
 
     def objects(self, topic: str, n: int) -> ObjectStates:
-        """Give the objects of a tick."""
+        """Return the objects of a tick."""
         point = self.at(topic, n).points[0]  # type: ignore[union-attr,attr-defined]
         return ObjectStates(np.array(point.positions).reshape(-1, 3),
                             np.array(point.velocities).reshape(-1, 3))
@@ -164,7 +164,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launcher, Pe
 
 
 def agents(peer: Peer) -> NDArray[np.float64]:
-    """Give the poses (ticks, A, 3) of the agents since the last `forget`."""
+    """Return the poses (ticks, A, 3) of the agents since the last `forget`."""
     messages = peer.messages['/traffic/objects']
     poses = np.array([message.points[0].positions for message in messages])
     names = [name.partition('/')[0] for name in messages[0].joint_names[::3]]

@@ -39,7 +39,7 @@ class Stage(NamedTuple):
 
     @property
     def fired(self) -> tuple[FiredEvent, ...]:
-        """Give what has taken effect in the present epoch, as published last."""
+        """Return what has taken effect in the present epoch, as published last."""
         epoch, fired = parse_events_document(self.peer.messages['/scenario/events'][-1].data)
         assert epoch == self.peer.games[-1].epoch
         return fired

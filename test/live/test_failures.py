@@ -94,7 +94,7 @@ def test_monitor_and_supervisor_are_started_again(run: Run) -> None:
 
 
 def _computed_s(pid: int) -> float:
-    """Give the time that a process has computed for [s]."""
+    """Return the time that a process has computed for [s]."""
     fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
@@ -116,7 +116,7 @@ def test_who_takes_the_place_of_the_dead_has_everything_loaded(run: Run) -> None
 
 
 def _recorded_steps(bag: Path, offset_ns: int) -> list[int]:
-    """Give the steps of /vehicles/state in a recording, in its order."""
+    """Return the steps of /vehicles/state in a recording, in its order."""
     with BagReader(bag) as reader:
         return [(from_time(item.message.header.stamp) - offset_ns) // STEP_NS
                 for item in reader.decoded(['/vehicles/state'])]

@@ -56,7 +56,7 @@ class Played(NamedTuple):
     codes: dict[str, int]
 
     def stamps_s(self, topic: str, index: int) -> list[float]:
-        """Give the stamps of what came in one of the rounds [s]."""
+        """Return the stamps of what came in one of the rounds [s]."""
         ends = [*self.begun[1:], {name: len(found) for name, found in self.peer.messages.items()}]
         heard = self.peer.messages[topic][self.begun[index].get(topic, 0):
                                           ends[index].get(topic, 0)]

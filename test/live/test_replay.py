@@ -62,7 +62,7 @@ def _replay_setup(folder: Path) -> Setup:
 
 
 def _joints(result: OfflineResult) -> NDArray[np.float64]:
-    """Give the human's (n + 1, 2, 4) joint positions and velocities."""
+    """Return the human's (n + 1, 2, 4) joint positions and velocities."""
     return np.array([vehicle_to_joints(VehicleState(*row))[:2]
                      for row in result.states_of('hv0').tolist()])
 

@@ -42,7 +42,7 @@ def peer(running: Peer) -> Iterator[Peer]:
 
 
 def _seats(peer: Peer) -> dict[str, dict[str, str]]:
-    """Give what /seats says now."""
+    """Return what /seats says now."""
     peer.listen()
     return json.loads(peer.messages['/seats'][-1].data) if peer.messages['/seats'] else {}
 
@@ -74,12 +74,12 @@ class Taker:
         self.peer.wait_until(send, what)
 
     def consumed(self) -> np.ndarray:
-        """Give the commands (R, 4) that the vehicle obeyed since the last `forget`."""
+        """Return the commands (R, 4) that the vehicle obeyed since the last `forget`."""
         return self.peer.cycles().commands(self.seat)
 
 
 def _last(taker: Taker, column: int, value: float) -> bool:
-    """Tell whether the last cycle consumed this."""
+    """Return whether the last cycle consumed this."""
     return bool(taker.peer.messages['/timing/cycle']) and taker.consumed()[-1, column] == value
 
 

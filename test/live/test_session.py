@@ -48,7 +48,7 @@ def ended(page: PageClient, epoch: int) -> None:
 
 
 def _settled(page: PageClient) -> dict[str, Any]:
-    """Give the status without the measured pace, which falls to 0 within a second of the end."""
+    """Return the status without the measured pace, which falls to 0 within a second of the end."""
     return {key: value for key, value in page.documents['status'].items()
             if key != 'measured_factor'}
 

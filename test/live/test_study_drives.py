@@ -88,7 +88,7 @@ class Participant:
 
     @property
     def page(self) -> PageClient:
-        """Give the page that has the seat."""
+        """Return the page that has the seat."""
         assert self._page is not None
         return self._page
 

@@ -44,7 +44,7 @@ def write_game(folder: Path) -> Path:
 
 
 def told(bag: Path, scheduler: ScenarioScheduler) -> dict[int, NDArray[np.float64]]:
-    """Give poses and velocities (2, A, 3) that traffic_node published in a run, by tick."""
+    """Return poses and velocities (2, A, 3) that traffic_node published in a run, by tick."""
     found = {}
     with BagReader(bag) as reader:
         for item in reader.decoded(['/traffic/agents']):

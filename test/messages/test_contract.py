@@ -41,7 +41,7 @@ def _by_name(topic: Topic) -> str:
 
 
 def _walk(message: Any, path: str) -> Iterator[str]:
-    """Give the parts of a path like `status.values` that a message type does not have."""
+    """Yield the parts of a path like `status.values` that a message type does not have."""
     for part in path.split('.'):
         fields = message.get_fields_and_field_types()
         if part not in fields:

@@ -20,7 +20,7 @@ INSTALL_S, CHECK_S = 600.0, 600.0
 
 def missing(path: str | None = None) -> str:
     """
-    Say in a few words what these tests lack on this machine, empty if nothing.
+    Return in a few words what these tests lack on this machine, empty if nothing.
 
     :param path: where programs are looked for, by default as everywhere.
     """
@@ -44,7 +44,7 @@ def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> N
 
 
 def is_stale(folder: Path) -> bool:
-    """Tell whether node_modules is absent, incomplete or older than the lock file."""
+    """Return whether node_modules is absent, incomplete or older than the lock file."""
     # npm writes it when everything else is there.
     installed = folder / 'node_modules' / '.package-lock.json'
     lock = folder / 'package-lock.json'
@@ -52,7 +52,7 @@ def is_stale(folder: Path) -> bool:
 
 
 def installed_tools() -> Path:
-    """Give the folder of the tools, installed if they are not; skip the test without npm."""
+    """Return the folder of the tools, installed if they are not; skip the test without npm."""
     why = missing()
     if why:
         pytest.skip(f'the checks of the page are not run: {why}')

@@ -23,7 +23,7 @@ MAX_COLUMNS = 99
 
 @pytest.fixture(scope='module')
 def tools() -> Path:
-    """Give the folder of the tools that package-lock.json pins."""
+    """Return the folder of the tools that package-lock.json pins."""
     return installed_tools()
 
 

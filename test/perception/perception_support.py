@@ -53,7 +53,7 @@ def straight(steps: int, speed: float) -> list[VehicleState]:
 
 def localise(course: Sequence[VehicleState], spec: LocalisationSpec | None = None,
              seed: int = 0) -> tuple[Array, Array]:
-    """Give the errors (steps, 4) and covariances (steps, 4, 4) along a course."""
+    """Return the errors (steps, 4) and covariances (steps, 4, 4) along a course."""
     localisation = Localisation(spec or LocalisationSpec(), seed, 'av0', course[0], DT)
     errors, covariances = [], []
     for n, truth in enumerate(course[1:], start=1):
@@ -95,15 +95,15 @@ class World:
             VEHICLE, self.transform, self.ego(0), seed, DT, occupancy)
 
     def ego(self, n: int) -> VehicleState:
-        """Give the AV's true state."""
+        """Return the AV's true state."""
         return self.course[n] if self.course else VehicleState(0.0, 0.0, 0.0, 0.0)
 
     def states(self, n: int) -> Array:
-        """Give the (V, 8) states of the driven vehicles."""
+        """Return the (V, 8) states of the driven vehicles."""
         return np.array([*([self.human] if self.human else []), self.ego(n)])
 
     def poses(self, n: int) -> Array:
-        """Give the true (M, 3) centre poses of the objects."""
+        """Return the true (M, 3) centre poses of the objects."""
         return self.start + DT * n * self.velocities
 
     def observe(self, n: int) -> None:
@@ -142,7 +142,7 @@ class World:
                            np.arange(points, dtype=np.int64) * 100_000_000, *arrays)
 
     def perceived(self, n: int, name: str) -> tuple[Array, Array]:
-        """Give the poses and velocities, each (P, 3), at which a request shows a thing."""
+        """Return the poses and velocities, each (P, 3), at which a request shows a thing."""
         request = self.perception.perceive(self.request(n))
         if f'{name}/x' not in request.names:
             # It is left out where nobody knows of it.
@@ -152,7 +152,7 @@ class World:
         return request.positions[:, first:first + 3], request.velocities[:, first:first + 3]
 
     def knows(self, n: int, name: str) -> bool:
-        """Tell whether a request shows a thing; it does at all points or at none."""
+        """Return whether a request shows a thing; it does at all points or at none."""
         poses, velocities = self.perceived(n, name)
         present = np.isfinite(poses)
         assert present.all() == present.any()

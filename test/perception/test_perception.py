@@ -43,7 +43,7 @@ def behind_a_van(**fields: Any) -> World:
 
 
 def in_sight(world: World, n: int) -> bool:
-    """Tell whether the line from the front bumper to the pedestrian passes the van, by area."""
+    """Return whether the line from the front bumper to the pedestrian passes the van, by area."""
     x, y = VEHICLE.rear_to_center + 0.5 * VEHICLE.length, 0.0
     px, py = world.poses(n)[0, :2]
     # The corner of the van that hides: front right (23, 1.9). The pedestrian's hull around it.

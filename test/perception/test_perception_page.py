@@ -16,7 +16,7 @@ import yaml
 
 
 def examples(root: Path, language: str) -> list[str]:
-    """Give the page's code of a language, in order."""
+    """Return the page's code of a language, in order."""
     page = (root / 'docs' / 'perception.md').read_text(encoding='utf-8')
     found: list[str] = re.findall(rf'```{language}\n(.*?)```', page, re.DOTALL)
     return found

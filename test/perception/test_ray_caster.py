@@ -39,7 +39,7 @@ def caster(**fields: Any) -> RayCaster:
 
 
 def outline(shape: Shape, pose: Array) -> shapely.Geometry:
-    """Give the outline of a body; a circle as one of 4,096 corners."""
+    """Return the outline of a body; a circle as one of 4,096 corners."""
     if shape.kind == 'circle':
         ground = shapely.Point(0.0, 0.0).buffer(shape.radius, quad_segs=1024)
     elif shape.kind == 'polygon':
@@ -52,7 +52,7 @@ def outline(shape: Shape, pose: Array) -> shapely.Geometry:
 
 
 def lines_of(scan: Scan, horizon: float) -> Array:
-    """Give the rays as shapely lines."""
+    """Return the rays as shapely lines."""
     x, y, yaw = scan.pose
     direction = scan.angles + yaw
     ends = np.stack((x + horizon * np.cos(direction), y + horizon * np.sin(direction)), axis=1)
@@ -60,7 +60,7 @@ def lines_of(scan: Scan, horizon: float) -> Array:
 
 
 def first_met(scan: Scan, things: list[Any], horizon: float) -> tuple[Array, Array]:
-    """Give the distance (R) to the first thing that each ray meets, and to the second (R)."""
+    """Return the distance (R) to the first thing that each ray meets, and to the second (R)."""
     origin = shapely.Point(scan.pose[:2])
     met = shapely.intersection(lines_of(scan, horizon)[:, None], np.array(things)[None, :])
     distance = shapely.distance(origin, met)

@@ -41,7 +41,7 @@ PATIENCE_S = 10.0
 
 
 def _matrix(frame: TransformStamped) -> NDArray[np.float64]:
-    """Give a transform as a matrix (4, 4), by the quaternion's own definition."""
+    """Return a transform as a matrix (4, 4), by the quaternion's own definition."""
     turn, place = frame.transform.rotation, frame.transform.translation
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_quat((turn.x, turn.y, turn.z, turn.w)).as_matrix()
@@ -50,7 +50,7 @@ def _matrix(frame: TransformStamped) -> NDArray[np.float64]:
 
 
 def _hits(message: LaserScan) -> NDArray[np.float64]:
-    """Give the points (H, 4) that the rays of a scan hit, in its frame."""
+    """Return the points (H, 4) that the rays of a scan hit, in its frame."""
     ranges = np.array(message.ranges)
     angles = message.angle_min + message.angle_increment * np.arange(len(ranges))
     found = np.isfinite(ranges)
@@ -66,7 +66,7 @@ def _world() -> World:
 
 
 def _surfaces(world: World, n: int) -> shapely.Geometry:
-    """Give the outlines of all objects at a step, made by shapely."""
+    """Return the outlines of all objects at a step, made by shapely."""
     parts = []
     for (x, y, yaw), item in zip(world.poses(n), (PEDESTRIAN, VAN, CAR), strict=True):
         body = shapely.Point(0.0, 0.0).buffer(item.shape.radius, quad_segs=512) \
@@ -80,7 +80,7 @@ def _surfaces(world: World, n: int) -> shapely.Geometry:
 
 @pytest.fixture
 def endpoints(ros_domain: int) -> Endpoints:
-    """Give the endpoints of a node of the test's own."""
+    """Return the endpoints of a node of the test's own."""
     rclpy.init(domain_id=ros_domain)
     node = rclpy.create_node('tester')
     yield Endpoints(node)

@@ -13,5 +13,5 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 @pytest.fixture
 def vehicle() -> VehicleParameters:
-    """Give the default vehicle."""
+    """Return the default vehicle."""
     return load_vehicle_parameters()

@@ -146,5 +146,5 @@ def recorded_request(given: PlannerContext, ego: VehicleState, k: int) -> PlanRe
 
 
 def start_of(given: PlannerContext) -> VehicleState:
-    """Give the ego at the start of the planning problem."""
+    """Return the ego at the start of the planning problem."""
     return initial_state(given)

@@ -46,7 +46,7 @@ class Witness(Planner):
 
 @pytest.fixture(scope='module')
 def context() -> PlannerContext:
-    """Give a planner the street of the crossing."""
+    """Return a planner the street of the crossing."""
     loaded = load_scenario(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml')
     return PlannerContext('av0', loaded.scenario, loaded.planning_problems[0],
                           load_vehicle_parameters('bmw_320i'), {}, 0.1)
@@ -58,7 +58,7 @@ def crew_of(context: PlannerContext, *events: EventSpec) -> PlannerCrew:
 
 
 def present(crew: PlannerCrew) -> tuple[str, list[float | None]]:
-    """Tell who is in office, and which limits it was set up with."""
+    """Return who is in office, and which limits it was set up with."""
     planner = crew.adapter.planner
     return planner.name_tag, [round(limit, 3) for limit in planner.limits]
 

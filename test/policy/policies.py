@@ -66,5 +66,5 @@ def failing() -> Policy:
 
 
 def nothing() -> int:
-    """Give what is no policy."""
+    """Return what is no policy."""
     return 3

@@ -32,7 +32,7 @@ def setup() -> Setup:
 
 @pytest.fixture(scope='module')
 def guide(setup: Setup) -> RouteGuide:
-    """Give the AV's route."""
+    """Return the AV's route."""
     av = setup.avs[0]
     return RouteGuide(setup.loaded.scenario, av.planning_problem, av.state, av.vehicle)
 

@@ -240,7 +240,7 @@ def runs() -> type[ExportRuns]:
 
 @pytest.fixture(scope='session')
 def studied(recorder: RunRecorder, tmp_path_factory: pytest.TempPathFactory) -> Studied:
-    """Give a study that people took part in, with its data."""
+    """Return a study that people took part in, with its data."""
     folder = tmp_path_factory.mktemp('studies') / 'demo'
     found = take_part(StudyMaker(recorder, folder, scenarios_directory() / 'cut_in.yaml'))
     assert main(['study', 'data', str(folder), '--bids']) == 0
@@ -249,7 +249,7 @@ def studied(recorder: RunRecorder, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture
 def copied(studied: Studied, tmp_path: Path) -> Iterator[Path]:
-    """Give a copy of the study's folder to spoil."""
+    """Return a copy of the study's folder to spoil."""
     shutil.copytree(studied.folder, tmp_path / 'demo')
     yield tmp_path / 'demo'
     shutil.rmtree(tmp_path / 'demo')

@@ -52,7 +52,7 @@ def _time_s(message: Message) -> float:
 
 
 def _worst_m(log: RunLog, whole: RunLog) -> tuple[float, float]:
-    """Give the largest distances of vehicles and objects from where they are in the whole run."""
+    """Return the largest distances of vehicles and objects from where they are in the whole run."""
     rows = log.ks - whole.ks[0]
     vehicles = log.vehicle_states[:, :, :2] - whole.vehicle_states[rows, :, :2]
     objects = log.object_poses[:, :, :2] - whole.object_poses[rows, :, :2]
@@ -192,7 +192,7 @@ def test_the_states_of_a_run_whose_game_is_missing_are_not_those_of_the_run_befo
 def test_objects_that_are_not_the_same_at_both_ends_of_a_gap_are_absent_in_it() -> None:
     """One drives on, one appears, one is another of the same name 80 m farther on."""
     def point(*objects: tuple[float, float, float]) -> Any:
-        """Give objects by x, speed and yaw rate (NaN where absent)."""
+        """Return objects by x, speed and yaw rate (NaN where absent)."""
         rows = [[value for x, _, _ in objects for value in (x, 0.0 * x, 0.0 * x)],
                 [value for _, speed, rate in objects for value in (speed, 0.0 * speed, rate)]]
         return np.array([*rows, rows[1]])

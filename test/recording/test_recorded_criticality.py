@@ -30,7 +30,7 @@ def observed(request: pytest.FixtureRequest) -> tuple[Criticality, OfflineResult
 
 
 def _flat(found: Any, name: str = '') -> dict[str, Any]:
-    """Give the leaves of a document by their paths."""
+    """Return the leaves of a document by their paths."""
     if isinstance(found, dict | list):
         entries = found.items() if isinstance(found, dict) else enumerate(found)
         return {path: leaf for key, value in entries

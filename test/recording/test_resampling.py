@@ -32,7 +32,7 @@ ROLLING = HumanSpec('hv0', 'idle', spawn=LaneletSpawn(13, 100.0, 0.0, 25.0))
 
 
 def intervals_through(stalls_ms: dict[int, int], steps: int, **timing: Any) -> NDArray[np.float64]:
-    """Give Delta t_eff of a loop that works 1 ms a cycle and stalls before some."""
+    """Return Delta t_eff of a loop that works 1 ms a cycle and stalls before some."""
     controller = TimeController(TimingSpec(**timing), DT)
     controller.start(0)
     now_ns, found = 0, []

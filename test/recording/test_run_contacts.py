@@ -27,7 +27,7 @@ def _crash(rate: float = 100.0) -> OfflineResult:
 
 
 def _recorded(recorder: Any, result: OfflineResult) -> list[Message]:
-    """Give the messages of a run with its verdicts, as the monitor's node sends them."""
+    """Return the messages of a run with its verdicts, as the monitor's node sends them."""
     messages: list[Message] = recorder.messages(result, log_ns=START)
     for verdict in result.violations:
         stamp_ns = result.setup.scheduler.stamp_ns(verdict.n)

@@ -227,7 +227,7 @@ def test_offline_run_and_recording_have_the_same_tables(
 
 def _plan(result: OfflineResult, tick: int, aside: float, told: VehicleState | None
           ) -> RecordedPlan:
-    """Give a plan of av0 that is what it drove, moved to its left."""
+    """Return a plan of av0 that is what it drove, moved to its left."""
     states = result.states_of('av0')[::10][tick:tick + 21].copy()
     states[:, 0] -= aside * np.sin(states[:, 2])
     states[:, 1] += aside * np.cos(states[:, 2])

@@ -26,7 +26,7 @@ def report_of(folder: Path) -> str:
 
 
 def rows_of(html: str, caption: str) -> list[list[str]]:
-    """Give the cells of the table with a caption."""
+    """Return the cells of the table with a caption."""
     after = html[html.index(f'<caption>{caption}'):].partition('<tbody>')[2]
     body = after.partition('</tbody>')[0]
     return [[unescape(_TAG.sub('', cell)) for cell in re.findall(r'<t[hd].*?>(.*?)</t[hd]>', row)]

@@ -94,24 +94,24 @@ class Graph:
         await self.say('/vehicles/state', message.stamp(OFFSET_NS + n * 10_000_000))
 
     def document(self, kind: str) -> dict[str, Any]:
-        """Give a document as pages have it."""
+        """Return a document as pages have it."""
         return dict(json.loads(self.hub._documents.get(kind, b'{}')))
 
     @property
     def scene(self) -> dict[str, Any]:
-        """Give the scene."""
+        """Return the scene."""
         return self.document('scene')
 
     def seat(self, name: str = 'hv0') -> dict[str, Any]:
-        """Give a seat as pages have it."""
+        """Return a seat as pages have it."""
         return dict(self.document('seats').get('seats', {}).get(name, {}))
 
     def orders(self) -> list[str]:
-        """Give the sources that were ordered."""
+        """Return the sources that were ordered."""
         return [json.loads(item.data)['source'] for item in self.peer.messages['/seats/order']]
 
     def throttles(self) -> list[float]:
-        """Give the throttle of each command that came from the cockpit."""
+        """Return the throttle of each command that came from the cockpit."""
         return [item.axes[0] for item in self.peer.messages['/<v>/driver_command']]
 
     async def until(self, condition: Callable[[], object], what: str) -> None:

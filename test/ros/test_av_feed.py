@@ -23,7 +23,7 @@ def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
 
 
 def _frame(graph: Graph, slot: str) -> list[float]:
-    """Give the newest frame of a slot as numbers."""
+    """Return the newest frame of a slot as numbers."""
     return np.frombuffer(graph.hub._frames[slot].data).tolist()
 
 

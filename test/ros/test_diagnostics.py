@@ -25,7 +25,7 @@ NOW_NS = 12_345_678_901
 
 @pytest.fixture
 def node(ros_domain: int) -> Iterator[Node]:
-    """Give a node in a namespace."""
+    """Return a node in a namespace."""
     rclpy.init(domain_id=ros_domain)
     node = rclpy.create_node('planner_node_av0', namespace='/exp1')
     yield node

@@ -135,11 +135,11 @@ class Graph:
     executor: SingleThreadedExecutor
 
     def publishers(self) -> set[Endpoint]:
-        """Give every publisher but those that each node has."""
+        """Return every publisher but those that each node has."""
         return self._endpoints(self.node.get_publishers_info_by_topic)
 
     def subscriptions(self) -> set[Endpoint]:
-        """Give every subscription but those that each node has."""
+        """Return every subscription but those that each node has."""
         return self._endpoints(self.node.get_subscriptions_info_by_topic)
 
     def _endpoints(self, look_up: object) -> set[Endpoint]:
@@ -148,7 +148,7 @@ class Graph:
                 if name not in OF_EVERY_NODE for info in look_up(name) if info.node_name != TESTER}
 
     def services(self) -> set[tuple[str, str, str]]:
-        """Give every service but those that each node has: node, name, type."""
+        """Return every service but those that each node has: node, name, type."""
         return {(node, name, kind) for node in self.node.get_node_names() if node != TESTER
                 for name, kinds in self.node.get_service_names_and_types_by_node(node, '/')
                 if name.rpartition('/')[2] not in SERVICES_OF_EVERY_NODE for kind in kinds}

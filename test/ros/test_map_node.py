@@ -37,7 +37,7 @@ def _game(epoch: int, occupancy: Path | None) -> String:
 
 
 def _states(*positions: tuple[float, float]) -> JointTrajectory:
-    """Say where two vehicles are."""
+    """Return where two vehicles are."""
     names = [name for i in range(len(positions)) for name in vehicle_joint_names(f'hv{i}')]
     return JointTrajectory(joint_names=names, points=[JointTrajectoryPoint(
         positions=[value for x, y in positions for value in (x, y, 0.0, 0.0)],

@@ -57,13 +57,13 @@ def _documents(setup: Setup) -> ScenarioSet:
 
 @pytest.fixture(scope='module')
 def setup() -> Setup:
-    """Give the game with parked cars, a pedestrian, a human and an AV."""
+    """Return the game with parked cars, a pedestrian, a human and an AV."""
     return build_setup(load_game(SCENARIOS / 'parked_cars.yaml'))
 
 
 @pytest.fixture
 def scene(setup: Setup) -> SceneMarkers:
-    """Give the markers of that game at its start."""
+    """Return the markers of that game at its start."""
     return SceneMarkers(_documents(setup))
 
 

@@ -24,13 +24,13 @@ def _texts(game: str, epoch: int = 0) -> dict[str, str]:
 
 @pytest.fixture(scope='module')
 def cut_in() -> dict[str, str]:
-    """Give the documents of a game of hv0 and av0."""
+    """Return the documents of a game of hv0 and av0."""
     return _texts('cut_in')
 
 
 @pytest.fixture(scope='module')
 def two_avs() -> dict[str, str]:
-    """Give the documents of a game of hv0, av0 and av1 in another scenario."""
+    """Return the documents of a game of hv0, av0 and av1 in another scenario."""
     return _texts('two_avs')
 
 

@@ -11,7 +11,7 @@ ADA, BOB = SeatPerson('p1', 'Ada', 'Keyboard'), SeatPerson('p2', 'Bob', 'G29')
 
 
 def driven(person: SeatPerson | None) -> tuple[str, str, str, SeatPerson | None]:
-    """Give a seat of a cockpit with somebody in it."""
+    """Return a seat of a cockpit with somebody in it."""
     return 'hv0', 'cockpit', 'cockpit', person
 
 

@@ -43,7 +43,7 @@ class Table(NamedTuple):
 
     @property
     def human(self) -> Seat:
-        """Give the seat of hv0."""
+        """Return the seat of hv0."""
         return self.seats.humans[0]
 
     def say(self, command: DriverCommand, source: str = GAME) -> None:
@@ -167,7 +167,7 @@ def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
         """A slot that is never empty."""
 
         def take(self) -> object:
-            """Give another command."""
+            """Return another command."""
             nonlocal asked
             asked += 1
             return to_joy(FULL, OFFSET_NS, GAME)

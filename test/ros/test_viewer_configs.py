@@ -20,27 +20,27 @@ DISPLAYED = {'MarkerArray': 'visualization_msgs/msg/MarkerArray', 'Path': 'nav_m
 
 @pytest.fixture(scope='module')
 def contract() -> dict[str, Topic]:
-    """Give the topics of a game of two humans and two AVs."""
+    """Return the topics of a game of two humans and two AVs."""
     return {name: topic for topic in load_contract().topics.values()
             for name in topic.names(('hv0', 'hv1'), ('av0', 'av1'))}
 
 
 @pytest.fixture(scope='module')
 def topics(contract: dict[str, Topic]) -> dict[str, str]:
-    """Give the types of these topics."""
+    """Return the types of these topics."""
     return {name: topic.type_name for name, topic in contract.items()}
 
 
 @pytest.fixture(scope='module')
 def rviz(project_root: Path) -> dict[str, Any]:
-    """Give the configuration of RViz."""
+    """Return the configuration of RViz."""
     return yaml.safe_load((project_root / 'config' / 'crgame.rviz').read_text())[
         'Visualization Manager']
 
 
 @pytest.fixture(scope='module')
 def foxglove(project_root: Path) -> dict[str, Any]:
-    """Give the layout of Foxglove."""
+    """Return the layout of Foxglove."""
     return json.loads((project_root / 'config' / 'crgame_foxglove.json').read_text())
 
 

@@ -26,7 +26,7 @@ STATES = '/vehicles/tick_state'
 
 @pytest.fixture(scope='module')
 def scenario() -> ScenarioSet:
-    """Give the documents of a game with recorded traffic."""
+    """Return the documents of a game with recorded traffic."""
     setup = build_setup(load_game(SCENARIOS / 'traffic.yaml'))
     collector = DocumentCollector()
     collector.take('xml', setup.loaded.xml_text)

@@ -22,7 +22,7 @@ ELEMENT = ('<environment><time>{time}</time><timeOfDay>{time_of_day}</timeOfDay>
 
 
 def scenario_with(time_of_day: str, weather: str) -> str:
-    """Give one of our scenarios with an environment element, as commonroad-io reads it."""
+    """Return one of our scenarios with an environment element, as commonroad-io reads it."""
     text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
     element = ELEMENT.format(time='19:30', time_of_day=time_of_day, weather=weather)
     assert '</location>' in text

@@ -40,12 +40,12 @@ NOBODY = ObjectStates(np.empty((0, 3)), np.empty((0, 3)))
 
 
 def avs_of(loaded: LoadedScenario) -> list[VehicleState]:
-    """Give the AVs' initial states."""
+    """Return the AVs' initial states."""
     return [problem_pose(p, CAR.rear_to_center, CAR.wheelbase) for p in loaded.planning_problems]
 
 
 def box(state: VehicleState) -> pycrcc.RectOBB:
-    """Give the car's footprint to the drivability checker's collision test."""
+    """Return the car's footprint to the drivability checker's collision test."""
     x, y = state.center(CAR.rear_to_center)
     return pycrcc.RectOBB(CAR.length / 2, CAR.width / 2, state.yaw, x, y)
 

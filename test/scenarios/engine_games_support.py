@@ -55,30 +55,30 @@ def without_human(values: dict[str, Any]) -> None:
 
 
 def speeds(result: OfflineResult, vehicle_id: str) -> Array:
-    """Give a driven vehicle's speed at every tick [m/s]."""
+    """Return a driven vehicle's speed at every tick [m/s]."""
     states: Array = result.states_of(vehicle_id)[::STEPS_PER_TICK, 3]
     return states
 
 
 def strongest_braking(result: OfflineResult, vehicle_id: str) -> float:
-    """Give the greatest deceleration between two ticks [m/s^2]."""
+    """Return the greatest deceleration between two ticks [m/s^2]."""
     return float(-np.diff(speeds(result, vehicle_id)).min() / TICK_S)
 
 
 def column(result: OfflineResult, object_id: str) -> int:
-    """Give the column of an object."""
+    """Return the column of an object."""
     return result.setup.obstacles.ids.index(object_id)
 
 
 def agents(result: OfflineResult) -> tuple[Array, Array]:
-    """Give poses (ticks, A, 3) and speeds (ticks, A) of the agents; NaN where absent."""
+    """Return poses (ticks, A, 3) and speeds (ticks, A) of the agents; NaN where absent."""
     columns = result.setup.agent_columns
     velocities = result.object_velocities[:, columns]
     return result.object_poses[:, columns], np.hypot(velocities[..., 0], velocities[..., 1])
 
 
 def bodies(result: OfflineResult, id_: str) -> Array:
-    """Give the body of anything as shapes (ticks,); empty where it is absent."""
+    """Return the body of anything as shapes (ticks,); empty where it is absent."""
     descriptions = {item.id: item for item in result.setup.descriptions}
     shape = descriptions[id_].shape
     if id_ in result.setup.vehicle_ids:
@@ -102,7 +102,7 @@ def bodies(result: OfflineResult, id_: str) -> Array:
 
 
 def distances(result: OfflineResult, one: str, other: str) -> Array:
-    """Give the distance between two bodies at every tick; NaN where one is absent [m]."""
+    """Return the distance between two bodies at every tick; NaN where one is absent [m]."""
     measured: Array = shapely.distance(bodies(result, one), bodies(result, other))
     return measured
 

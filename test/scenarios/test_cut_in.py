@@ -22,7 +22,7 @@ DURATION_S = 17.0
 
 @pytest.fixture
 def game(project_root: Path) -> Game:
-    """Give the cut-in."""
+    """Return the cut-in."""
     return effective_game(RunRequest(game=project_root / 'scenarios' / 'cut_in.yaml'))
 
 

@@ -34,7 +34,7 @@ def _listening(values: dict[str, Any]) -> None:
 
 
 def _ticks_with_walker() -> list[int]:
-    """Give the ticks whose request contained the pedestrian, and forget the requests."""
+    """Return the ticks whose request contained the pedestrian, and forget the requests."""
     ticks = [request.k for request in ListeningIdm.requests if 'walker' in request.obstacle_ids]
     ListeningIdm.requests.clear()
     return ticks
@@ -107,7 +107,7 @@ def _fast(values: dict[str, Any]) -> None:
 
 
 def _gap_when_braking_begins(result: OfflineResult) -> float:
-    """Give the distance to the human when the AV is fastest, before it brakes for him [m]."""
+    """Return the distance to the human when the AV is fastest, before it brakes for him [m]."""
     return float(distances(result, 'av0', 'hv0')[int(np.argmax(speeds(result, 'av0')))])
 
 

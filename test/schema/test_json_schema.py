@@ -100,7 +100,7 @@ def test_written_files_fit_their_schema() -> None:
 
 
 def places(value: Any) -> Iterator[tuple[Any, Any]]:
-    """Give every mapping and list inside of a value with each of its keys."""
+    """Yield every mapping and list inside of a value with each of its keys."""
     items = value.items() if isinstance(value, dict) else enumerate(value) \
         if isinstance(value, list) else ()
     for key, inner in list(items):

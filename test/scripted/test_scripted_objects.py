@@ -40,7 +40,7 @@ NOBODY = Others(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0))
 
 
 def cars(*rows: tuple[float, ...]) -> Others:
-    """Give cars, 4.5 m x 1.8 m, by x, y, yaw and speed."""
+    """Return cars, 4.5 m x 1.8 m, by x, y, yaw and speed."""
     table = np.array(rows)
     velocities = np.stack((table[:, 3] * np.cos(table[:, 2]), table[:, 3] * np.sin(table[:, 2]),
                            np.zeros(len(table))), axis=-1)
@@ -55,7 +55,7 @@ def make(entries: Any, network: RoadNetwork | None = None, k0: int = 0) -> Scrip
 
 def drive(objects: ScriptedObjects, steps: int,
           others: Callable[[float], Others] = lambda time_s: NOBODY) -> tuple[Array, Array]:
-    """Give the poses and velocities (steps + 1, M, 3) of all steps."""
+    """Return the poses and velocities (steps + 1, M, 3) of all steps."""
     states = [objects.states]
     first = objects.k
     for k in range(first, first + steps):
@@ -231,7 +231,7 @@ def test_pedestrian_waits_for_a_gap_and_then_walks() -> None:
 
 
 def clearance(walk: Array, others: Callable[[float], Others], radius: float = 0.35) -> float:
-    """Give the least distance between a walker's circle and the others' rectangles [m]."""
+    """Return the least distance between a walker's circle and the others' rectangles [m]."""
     least = math.inf
     for index, (x, y, _) in enumerate(walk.tolist()):
         around = others(index * DT)

@@ -38,7 +38,7 @@ def setup_of(loaded: LoadedScenario, humans: Sequence[HumanSpec] = (), **fields:
 
 def moved(loaded: LoadedScenario, speed: float, shift: tuple[float, float] = (0.0, 0.0),
           turn: float = 0.0) -> LoadedScenario:
-    """Give the first planning problem another initial speed and pose."""
+    """Return the first planning problem another initial speed and pose."""
     problems = list(copy.deepcopy(loaded.planning_problems))
     state = problems[0].initial_state
     state.velocity, state.orientation = speed, state.orientation + turn
@@ -67,7 +67,7 @@ def arc(start: VehicleState, acceleration: float = 0.0, curvature: float = 0.0,
 
 
 def ego_of(request: JointSeries) -> VehicleState:
-    """Give the ego of a request."""
+    """Return the ego of a request."""
     return VehicleState(*vehicles_from_joints(
         request.positions[0, :4], request.velocities[0, :4],
         request.accelerations[0, :4]).tolist())

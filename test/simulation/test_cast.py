@@ -28,7 +28,7 @@ HUMAN = (HumanSpec('hv0', 'idle'),)
 
 
 def problems_of(game: Game) -> list[int]:
-    """Give the planning problems that are driven."""
+    """Return the planning problems that are driven."""
     return [av.planning_problem.planning_problem_id for av in build_setup(game).avs]
 
 

@@ -39,7 +39,7 @@ def footprint(setup: Setup, index: int, state: VehicleState) -> shapely.Polygon:
 
 
 def overlap(setup: Setup, states: Sequence[VehicleState]) -> float:
-    """Give the common area of the first two vehicles [m^2]."""
+    """Return the common area of the first two vehicles [m^2]."""
     return float(footprint(setup, 0, states[0]).intersection(
         footprint(setup, 1, states[1])).area)
 

@@ -219,19 +219,19 @@ def test_the_whole_world_is_mapped_for_each_planner(shared_scenarios: Path) -> N
 
 
 def setup_without_transforms(setup: Setup) -> Setup:
-    """Give the same run with all planners in simulation coordinates."""
+    """Return the same run with all planners in simulation coordinates."""
     return replace(setup, avs=tuple(replace(av, transform=RigidTransform()) for av in setup.avs))
 
 
 def places(names: Sequence[str], positions: Array, velocities: Array) -> Array:
-    """Give x, y, vx, vy and yaw (Q, 5) of everybody in a point of a request."""
+    """Return x, y, vx, vy and yaw (Q, 5) of everybody in a point of a request."""
     starts = [index for index, name in enumerate(names) if name.endswith('/x')]
     return np.array([(*positions[i:i + 2], *velocities[i:i + 2], positions[i + 2])
                      for i in starts])
 
 
 def distances(points: Array) -> Array:
-    """Give the (Q, Q) distances between points (Q, 2)."""
+    """Return the (Q, Q) distances between points (Q, 2)."""
     return np.hypot(*np.moveaxis(points[:, None] - points[None], 2, 0))
 
 

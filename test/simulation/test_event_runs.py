@@ -38,7 +38,7 @@ def play(game: Game, *triggers: tuple[int, str], **options: Any) -> OfflineResul
 
 
 def speeds(result: OfflineResult) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Give the AV's speed at every step."""
+    """Return the AV's speed at every step."""
     return result.states_of('av0')[:, StateColumn.SPEED]
 
 

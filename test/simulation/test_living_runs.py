@@ -24,7 +24,7 @@ def living(name: str, **changes: Any) -> Setup:
 
 
 def speeds(result: OfflineResult) -> NDArray[np.float64]:
-    """Give the agents' (ticks, A) speeds; NaN where absent."""
+    """Return the agents' (ticks, A) speeds; NaN where absent."""
     columns = result.setup.agent_columns
     return np.hypot(*np.moveaxis(result.object_velocities[:, columns, :2], -1, 0))
 

@@ -57,7 +57,7 @@ class Weaving(DriverSource):
     """Drives with commands that change at every cycle and are no float32 numbers."""
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Give the command of cycle n."""
+        """Return the command of cycle n."""
         return DriverCommand(0.3 + 0.2 * math.sin(0.1 * n), 0.0, 0.1 * math.sin(0.037 * n))
 
 

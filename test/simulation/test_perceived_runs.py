@@ -31,7 +31,7 @@ def perceiving(name: str, perception: Mapping[str, Any] | None, **changes: Any) 
 
 
 def moved(result: OfflineResult) -> NDArray[np.float64]:
-    """Give how far the AV moves in each step, (n)."""
+    """Return how far the AV moves in each step, (n)."""
     return np.hypot(*np.diff(result.states_of('av0')[:, :2], axis=0).T)
 
 
@@ -96,7 +96,7 @@ def test_a_plan_is_checked_against_what_the_planner_was_told() -> None:
 
 
 def perceived(setup: Setup) -> tuple[Simulation, JointSeries, JointSeries]:
-    """Give a simulation at step 0, its true request and the perceived one."""
+    """Return a simulation at step 0, its true request and the perceived one."""
     simulation = Simulation(setup)
     result = simulation.begin()
     av = setup.avs[0]

@@ -51,7 +51,7 @@ def along(roads: RoadNetwork, before: int, way: int) -> NDArray[np.float64]:
 
 
 def from_end(points: NDArray[np.float64], length: float) -> NDArray[np.float64]:
-    """Give the last metres of a line."""
+    """Return the last metres of a line."""
     to_end = np.append(np.cumsum(np.hypot(*np.diff(points, axis=0).T)[::-1])[::-1], 0.0)
     at = np.linspace(min(length, to_end[0]), 0.0, 21)
     return np.column_stack([np.interp(-at, -to_end, column) for column in points.T])
@@ -98,7 +98,7 @@ def test_who_leaves_a_roundabout_indicates_and_who_goes_round_does_not() -> None
 
 
 def comes_round(roads: RoadNetwork, lanelet: int) -> bool:
-    """Tell whether one may drive from a lanelet over others back to it."""
+    """Return whether one may drive from a lanelet over others back to it."""
     reached, left = {lanelet}, [lanelet]
     while left:
         for following in roads.successors(left.pop()):

@@ -91,7 +91,7 @@ class Course:
         self.to(self.simulation.n + 1)
 
     def told(self) -> Iterator[tuple[str, int, str]]:
-        """Give what has happened, without times."""
+        """Return what has happened, without times."""
         return ((entry.what, entry.number, entry.by) for entry in self.entries)
 
 

@@ -38,7 +38,7 @@ def tracked(name: str, **changes: Any) -> Setup:
 
 
 def errors_to(truth: OfflineResult, other: OfflineResult) -> NDArray[np.float64]:
-    """Give the distance (n + 1) of each state of an AV to another run's whole path."""
+    """Return the distance (n + 1) of each state of an AV to another run's whole path."""
     points = truth.states_of('av0')[:, :2]
     path = other.states_of('av0')[:, :2]
     return np.array([np.hypot(*(path - point).T).min() for point in points])

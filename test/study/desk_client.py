@@ -102,7 +102,7 @@ def shows(what: str, item: str = '') -> Callable[[dict[str, Any]], bool]:
 
 
 async def do(socket: ClientWebSocketResponse, order: dict[str, Any]) -> dict[str, Any]:
-    """Give an order as the experimenter; give the reply."""
+    """Return an order as the experimenter; give the reply."""
     await socket.send_json({**order, 'id': 7})
     return await shown(socket, lambda content: content['type'] == 'reply')
 
@@ -126,7 +126,7 @@ async def do_until(served_: Served, socket: ClientWebSocketResponse, wanted: str
 
 
 def answer_to(question: dict[str, Any]) -> Any:
-    """Give an answer that can be taken."""
+    """Return an answer that can be taken."""
     match question['kind']:
         case 'choice':
             return [] if question['several'] else question['choices'][0][0]

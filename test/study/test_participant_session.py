@@ -46,7 +46,7 @@ os.kill(os.getpid(), 9)
 
 @pytest.fixture
 def session(tmp_path: Path) -> Iterator[ParticipantSession]:
-    """Give a new session."""
+    """Return a new session."""
     with open_session(tmp_path) as opened:
         yield opened
 

@@ -30,7 +30,7 @@ def study_of(folder: Path, **changed: Any) -> StudyFile:
 
 
 def told(study: StudyFile) -> str:
-    """Give all findings."""
+    """Return all findings."""
     return '\n'.join(f'{finding.kind}: {finding.text}' for finding in check_study(study))
 
 

@@ -96,7 +96,7 @@ def test_catch_up_steps_are_counted() -> None:
 
 
 def stall_intervals(spec: TimingSpec, stall_ms: int) -> np.ndarray:
-    """Give Delta t_eff of 400 cycles around a stall."""
+    """Return Delta t_eff of 400 cycles around a stall."""
     cycles = busy_loop(TimeController(spec, DT), lambda n: stall_ms * MS if n == 100 else MS, 400)
     return np.array([cycle.dt_eff_s for cycle in cycles])
 

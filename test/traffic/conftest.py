@@ -13,5 +13,5 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / 'benchmarks'))
 
 @pytest.fixture
 def maps(project_root: Path) -> Path:
-    """Give the directory of the package's own scenarios."""
+    """Return the directory of the package's own scenarios."""
     return project_root / 'scenarios'

@@ -64,18 +64,18 @@ class Drive:
     speeds: FloatArray
 
     def accelerations(self) -> FloatArray:
-        """Give the (K - 1, C) accelerations [m/s^2]."""
+        """Return the (K - 1, C) accelerations [m/s^2]."""
         return np.diff(self.speeds, axis=0) / STEP_S
 
     def lanelets(self, k: int) -> list[int]:
-        """Give the lanelets of all cars at a tick; -1 where one has left the map."""
+        """Return the lanelets of all cars at a tick; -1 where one has left the map."""
         found = np.full(self.poses.shape[1], -1)
         here = np.isfinite(self.poses[k, :, 0])
         found[here] = self.network.lanelets_at(self.poses[k, here])
         return [-1 if i < 0 else self.network.lanelet_ids[i] for i in found]
 
     def boxes(self, car: int) -> NDArray[np.object_]:
-        """Give the outline of a car at every tick."""
+        """Return the outline of a car at every tick."""
         corners = np.array([[2.25, 0.9], [2.25, -0.9], [-2.25, -0.9], [-2.25, 0.9]])
         x, y, yaw = self.poses[:, car].T
         cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
@@ -84,7 +84,7 @@ class Drive:
              y[:, None] + corners[:, 0] * sin + corners[:, 1] * cos), axis=-1)))
 
     def distances(self, one: int, other: int) -> FloatArray:
-        """Give the (K) distances of two cars; 0 where they overlap [m]."""
+        """Return the (K) distances of two cars; 0 where they overlap [m]."""
         return np.asarray(shapely.distance(self.boxes(one), self.boxes(other)))
 
 

@@ -37,7 +37,7 @@ def coming(roads: RoadNetwork, number: int, start: int, goal: int, away: float,
 
 
 def passes_origin(poses: np.ndarray) -> int:
-    """Give the tick at which somebody is nearest to the middle of the junction."""
+    """Return the tick at which somebody is nearest to the middle of the junction."""
     return int(np.nanargmin(np.hypot(poses[:, 0], poses[:, 1])))
 
 

@@ -78,7 +78,7 @@ def chase(spec: TrafficSpec, *changes: tuple[int, TrafficChange], ticks: int = 1
 
 
 def bits(run: support.Run, *numbers: int) -> bytes:
-    """Give all that was seen of some agents, of all without any."""
+    """Return all that was seen of some agents, of all without any."""
     chosen = list(numbers) or list(range(len(run.descriptions)))
     return np.array(run.poses)[:, chosen].tobytes() + np.array(run.speeds)[:, chosen].tobytes()
 

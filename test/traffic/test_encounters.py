@@ -35,7 +35,7 @@ def meeting(graph: LaneGraph, places: list[float], speeds: list[float]) -> Agent
 
 
 def touch(agents: Agents, braking: float, room: float) -> bool:
-    """Tell whether two cars that drive straight on touch, the first of them braking."""
+    """Return whether two cars that drive straight on touch, the first of them braking."""
     poses, velocities = agents.centers(), agents.speed
     for t in np.arange(STEP, HORIZON + STEP, STEP):
         shapes = []

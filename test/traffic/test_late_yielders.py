@@ -33,7 +33,7 @@ def towards_a_human(maps: Path, share: float) -> support.Run:
 
 
 def braking(run: support.Run) -> NDArray[np.float64]:
-    """Give the decelerations (ticks, A) [m/s^2]."""
+    """Return the decelerations (ticks, A) [m/s^2]."""
     return -np.diff(run.speeds, axis=0) / run.dt
 
 

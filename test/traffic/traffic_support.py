@@ -114,7 +114,7 @@ class Run:
         return found
 
     def series(self, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """Give poses and speeds of one agent over time."""
+        """Return poses and speeds of one agent over time."""
         return (np.array([p[number] for p in self.poses]),
                 np.array([s[number] for s in self.speeds]))
 

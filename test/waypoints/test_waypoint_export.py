@@ -39,7 +39,7 @@ def lane(points: Sequence[Sequence[float]] | np.ndarray, width: object = 3.5,
 
 
 def circle(radius: float, angle: float = 2.0 * math.pi, count: int = 25) -> np.ndarray:
-    """Give points of an arc around the origin."""
+    """Return points of an arc around the origin."""
     phi = np.linspace(0.0, angle, count)
     return radius * np.stack((np.cos(phi), np.sin(phi)), axis=-1)
 

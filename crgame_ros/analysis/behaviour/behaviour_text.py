@@ -14,7 +14,7 @@ from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour, Lan
 
 
 def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
-    """Tell how a vehicle was driven; what is not defined is left out."""
+    """Yield how a vehicle was driven; what is not defined is left out."""
     values = found.values
     yield f'{found.vehicle_id} as it was driven'
     for name in ('speed', 'acceleration', 'jerk'):
@@ -44,7 +44,7 @@ def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
 
 
 def detection_lines(found: DetectionScore) -> Iterator[str]:
-    """Tell how somebody did in a detection response task."""
+    """Yield how somebody did in a detection response task."""
     yield f'{found.task}, answered in {found.seat}'
     yield (f'  hit_rate             {found.hit_rate:9.2f}        {found.hits} hits, '
            f'{found.misses} misses, {found.premature} premature, {found.unrequested} unrequested')

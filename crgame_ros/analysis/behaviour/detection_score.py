@@ -42,7 +42,7 @@ class DetectionScore(NamedTuple):
     response_median_s: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Say it in JSON's terms: what is not defined is null."""
+        """Return it in JSON's terms: what is not defined is null."""
         return {key: None if isinstance(value, float) and math.isnan(value) else value
                 for key, value in self._asdict().items()}
 

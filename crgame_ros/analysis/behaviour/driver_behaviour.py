@@ -86,12 +86,12 @@ class _Everybody:
         self._ahead = np.array([item.rear_to_center for item in log.vehicles])
 
     def transform(self, number: int) -> RigidTransform:
-        """Give what leads to where the road of a driven vehicle is."""
+        """Return what leads to where the road of a driven vehicle is."""
         av = self.record.log.game.av(self.ids[number])
         return RigidTransform() if av is None else av.transform
 
     def at(self, row: int, transform: RigidTransform) -> tuple[list[FloatArray], FloatArray]:
-        """Give everybody's centre with corners (C + 1, 2), and velocities (N, 2) at a step."""
+        """Return everybody's centre with corners (C + 1, 2), and velocities (N, 2) at a step."""
         log = self.record.log
         states = log.vehicle_states[row]
         centers = shifted(states[:, :3], self._ahead)
@@ -168,7 +168,7 @@ def _named(name: str, spread: Spread) -> dict[str, float]:
 
 def _calm(everybody: _Everybody, states: FloatArray, keeping: LaneKeeping,
           controls: DriverControls) -> NDArray[np.bool_]:
-    """Tell at each command whether the second may be stable, by the steps around it."""
+    """Return at each command whether the second may be stable, by the steps around it."""
     calm = (keeping.beyond <= 0.0) & (
         np.abs(states[:, StateColumn.ACCELERATION]) <= STABLE_ACCELERATION)
     after = np.searchsorted(everybody.times_s, controls.times_s - 1e-9).clip(0, len(calm) - 1)

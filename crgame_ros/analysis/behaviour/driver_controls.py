@@ -49,7 +49,7 @@ class DriverControls:
         return cls(times_s[known], throttle, brake, math.degrees(max_wheel_angle) * steering, dt_s)
 
     def pieces(self) -> Iterator[slice]:
-        """Give the pieces in which the driver drove without a gap."""
+        """Yield the pieces in which the driver drove without a gap."""
         gaps = np.flatnonzero(np.diff(self.times_s) > LONGEST_GAP_S + 0.5 * self.dt_s) + 1
         bounds = [0, *gaps.tolist(), len(self.times_s)]
         for first, end in zip(bounds[:-1], bounds[1:], strict=True):

@@ -72,7 +72,7 @@ def gap_in_lane(strip: LaneStrip, own: FloatArray, own_velocity: FloatArray,
 
 
 def _is_in(strip: LaneStrip, corners: FloatArray) -> bool:
-    """Tell whether a footprint is in a lane with more than a margin."""
+    """Return whether a footprint is in a lane with more than a margin."""
     beyond = strip.beyond(corners)
     return bool((beyond.min(axis=0) < -IN_LANE).all())
 

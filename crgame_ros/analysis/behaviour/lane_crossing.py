@@ -39,7 +39,7 @@ class LaneCrossing(NamedTuple):
 def lane_crossing(strip: LaneStrip, wheels: FloatArray, rear: FloatArray, speed: FloatArray,
                   yaw_rate: FloatArray) -> LaneCrossing:
     """
-    Give the times to lane crossing of a vehicle in a lane.
+    Return the times to lane crossing of a vehicle in a lane.
 
     :param strip: the lane.
     :param wheels: (K, W, 2) [m]
@@ -64,7 +64,7 @@ def lane_crossing(strip: LaneStrip, wheels: FloatArray, rear: FloatArray, speed:
 def first_crossing(wheels: FloatArray, rear: FloatArray, speed: float, yaw_rate: float,
                    starts: FloatArray, ends: FloatArray) -> float:
     """
-    Give when the first wheel crosses one of some segments, with speed and yaw rate held [s].
+    Return when the first wheel crosses one of some segments, with speed and yaw rate held [s].
 
     :param wheels: (W, 2) [m]
     :param rear: (3) pose of the rear axle.
@@ -114,7 +114,7 @@ def _around(to_start: FloatArray, chord: FloatArray, arm: FloatArray, yaw_rate: 
 
 
 def _linear(line: Curve, side: float, wheels: FloatArray, velocities: FloatArray) -> FloatArray:
-    """Give the least time to a boundary on the left (1) or on the right (-1) by its wheels (K)."""
+    """Return the least time to a boundary on the left (1) or on the right (-1) by its wheels (K)."""
     s, d = (each.reshape(wheels.shape[:2]) for each in line.project(wheels.reshape(-1, 2)))
     heading = line.heading_at(s)
     towards = side * (velocities[..., 1] * np.cos(heading) - velocities[..., 0] * np.sin(heading))

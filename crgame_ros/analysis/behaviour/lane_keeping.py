@@ -71,7 +71,7 @@ class LaneKeeping:
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """Tell the steps (K) on a lane at which no lane is being changed."""
+        """Return the steps (K) on a lane at which no lane is being changed."""
         kept = np.isfinite(self.offset)
         for change in self.changes:
             kept[change.start:change.end + 1] = False
@@ -108,7 +108,7 @@ def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters
 
 
 def _visits(lanes: LaneVisits, centers: FloatArray, jumps: Sequence[int]) -> Iterator[LaneVisit]:
-    """Give the stays in lanes, those between two jumps by themselves."""
+    """Yield the stays in lanes, those between two jumps by themselves."""
     for first, end in pairwise((0, *sorted({*jumps} - {0, len(centers)}), len(centers))):
         for visit in lanes.follow(centers[first:end]):
             yield visit._replace(first=first + visit.first, end=first + visit.end)
@@ -116,7 +116,7 @@ def _visits(lanes: LaneVisits, centers: FloatArray, jumps: Sequence[int]) -> Ite
 
 def sdlp(offset: FloatArray, kept: NDArray[np.bool_], speed: FloatArray) -> float:
     """
-    Give the standard deviation of lateral position, with N - 1 [m].
+    Return the standard deviation of lateral position, with N - 1 [m].
 
     :param offset: (K) from the lane's centre line [m]
     :param kept: (K) whether no lane is being changed.
@@ -128,7 +128,7 @@ def sdlp(offset: FloatArray, kept: NDArray[np.bool_], speed: FloatArray) -> floa
 
 
 def driven_offsets(offset: FloatArray, kept: NDArray[np.bool_], speed: FloatArray) -> FloatArray:
-    """Give the offsets that lane keeping is measured by; parameters are those of `sdlp`."""
+    """Return the offsets that lane keeping is measured by; parameters are those of `sdlp`."""
     return np.asarray(offset[kept & np.isfinite(offset) & (np.abs(speed) >= STANDING)])
 
 
@@ -154,20 +154,20 @@ def _changes(visits: Sequence[LaneVisit], strips: Sequence[LaneStrip], centers: 
 
 
 def _begun(visits: Sequence[LaneVisit], number: int) -> int:
-    """Give the step at which a vehicle came to the lane of a stay."""
+    """Return the step at which a vehicle came to the lane of a stay."""
     while visits[number].entry is LaneEntry.ALONG:
         number -= 1
     return visits[number].first
 
 
 def _done(visits: Sequence[LaneVisit], number: int) -> int:
-    """Give the step at which a vehicle has left the lane of a stay."""
+    """Return the step at which a vehicle has left the lane of a stay."""
     while number + 1 < len(visits) and visits[number + 1].entry is LaneEntry.ALONG:
         number += 1
     return visits[number].end
 
 
 def _last_moving(towards: FloatArray, rows: NDArray[np.int64]) -> int:
-    """Give the last of the rows, from the first on, that moves sideways all the time."""
+    """Return the last of the rows, from the first on, that moves sideways all the time."""
     slow = np.flatnonzero(towards <= SIDEWAYS)
     return int(rows[slow[0] if len(slow) else -1])

@@ -49,7 +49,7 @@ class LaneStrip(NamedTuple):
 
     def beyond(self, points: FloatArray) -> FloatArray:
         """
-        Give how far points (..., 2) are beyond the left and the right boundary.
+        Return how far points (..., 2) are beyond the left and the right boundary.
 
         :return: (..., 2) below 0 inside [m]
         """
@@ -60,7 +60,7 @@ class LaneStrip(NamedTuple):
 
 def strip_of(roads: RoadNetwork, visits: Sequence[LaneVisit], number: int) -> LaneStrip:
     """
-    Give the lane of a stay: with the lanelets that the vehicle took, then the straightest ones.
+    Return the lane of a stay: with the lanelets that the vehicle took, then the straightest ones.
 
     :param visits: of the vehicle, in order.
     :param number: of the stay.
@@ -98,7 +98,7 @@ def _prolonged(roads: RoadNetwork, lanelets: list[int], length: float,
 
 def wheels_of(rear: FloatArray, wheelbase: float, width: float) -> FloatArray:
     """
-    Give the outer edges of the wheels, at the vehicle's sides: rear left and right, then front.
+    Return the outer edges of the wheels, at the vehicle's sides: rear left and right, then front.
 
     :param rear: (K, 3) poses of the rear axle.
     :param width: of the vehicle [m]

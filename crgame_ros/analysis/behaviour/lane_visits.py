@@ -64,7 +64,7 @@ class LaneVisits:
 
     def follow(self, poses: FloatArray) -> tuple[LaneVisit, ...]:
         """
-        Give the stays in lanes for cars, in order.
+        Return the stays in lanes for cars, in order.
 
         :param poses: (K, 3) of the reference point, at the scenario's steps; finite.
         """
@@ -88,7 +88,7 @@ class LaneVisits:
 
     def _next(self, last: LaneVisit, row: int,
               poses: FloatArray) -> tuple[LaneEntry, int, int | None]:
-        """Give how a vehicle goes on from a lanelet that it has left, until when and in which."""
+        """Return how a vehicle goes on from a lanelet that it has left, until when and in which."""
         along = self._along(last.lanelet)
         beside = [each for lanelet in (last.lanelet, *along) for each in self._beside(lanelet)]
         # Maps tell of neighbours for a part of the way only.
@@ -110,7 +110,7 @@ class LaneVisits:
         return found if found is not None and self._fits(found, pose) else None
 
     def _fits(self, lanelet: int, pose: FloatArray) -> bool:
-        """Tell whether a lanelet is for cars, and a heading along it or against it."""
+        """Return whether a lanelet is for cars, and a heading along it or against it."""
         turn = self._turn(lanelet, pose)
         found = self._roads.lanelet_network.find_lanelet_by_id(lanelet)
         # A boundary that is a point bounds nothing.
@@ -119,13 +119,13 @@ class LaneVisits:
                         for side in (found.left_vertices, found.right_vertices)))
 
     def _turn(self, lanelet: int, pose: FloatArray) -> float:
-        """Give the angle between a heading and a lanelet's direction, 0 to pi [rad]."""
+        """Return the angle between a heading and a lanelet's direction, 0 to pi [rad]."""
         s, _ = self._roads.locate(lanelet, float(pose[0]), float(pose[1]))
         line = self._roads.line(lanelet)
         return abs(wrap_pi(float(pose[2]) - float(line.heading_at(np.array(s)))))
 
     def _end(self, lanelet: int, row: int, poses: FloatArray) -> int:
-        """Give the first step from one on at which a lanelet no longer holds the vehicle."""
+        """Return the first step from one on at which a lanelet no longer holds the vehicle."""
         area = self._areas.get(lanelet)
         if area is None:
             area = self._areas[lanelet] = self._roads.area_of([lanelet])

@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
               events: Sequence[tuple[int, SpeedLimit]]) -> FloatArray:
     """
-    Give the speed limit at each step: NaN off the lanes and where there is none [m/s].
+    Return the speed limit at each step: NaN off the lanes and where there is none [m/s].
 
     :param visits: stays in lanelets.
     :param count: number of steps K.
@@ -36,7 +36,7 @@ def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
 
 def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
                  first_k: int) -> list[tuple[int, SpeedLimit]]:
-    """Give the limits that events set, with the step since `first_k` at which they took effect."""
+    """Return the limits that events set, with the step since `first_k` at which they took effect."""
     actions: Mapping[str, object] = {event.name: event.action for event in game.events}
     found = []
     for event in fired:
@@ -48,7 +48,7 @@ def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
 
 def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
     """
-    Give the time above the limit [s]; each step stands for its time.
+    Return the time above the limit [s]; each step stands for its time.
 
     :return: NaN where there was no limit at all
     """

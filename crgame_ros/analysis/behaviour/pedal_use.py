@@ -33,7 +33,7 @@ class PedalUse(NamedTuple):
 def applied(travel: FloatArray, pressed: float = PRESSED,
             released: float = RELEASED_AGAIN) -> NDArray[np.bool_]:
     """
-    Tell when a pedal is applied, with hysteresis; at first it is not.
+    Return when a pedal is applied, with hysteresis; at first it is not.
 
     :param travel: (N) 0 to 1, without a gap.
     :param pressed: from which on it is applied; `released`: down to which it stays so.
@@ -45,7 +45,7 @@ def applied(travel: FloatArray, pressed: float = PRESSED,
 
 def use_of_pedal(pieces: Sequence[FloatArray], dt_s: float) -> PedalUse:
     """
-    Say how a pedal was used.
+    Return how a pedal was used.
 
     :param pieces: its travel, each dt apart and without a gap; one that begins with the pedal
         pressed has an application there.

@@ -72,6 +72,6 @@ def reaction_to(event_s: float, controls: DriverControls,
 
 
 def _first_onset(responds: NDArray[np.bool_], times_s: NDArray[np.float64]) -> float:
-    """Give the time of the first that responds after one that does not; NaN without one."""
+    """Return the time of the first that responds after one that does not; NaN without one."""
     onsets = np.flatnonzero(responds[1:] & ~responds[:-1])
     return float(times_s[onsets[0] + 1]) if len(onsets) else math.nan

@@ -26,7 +26,7 @@ class Spread(NamedTuple):
 
 
 def spread_of(values: NDArray[np.float64]) -> Spread:
-    """Give the spread of those values that are finite."""
+    """Return the spread of those values that are finite."""
     known = values[np.isfinite(values)]
     if not len(known):
         return Spread(math.nan, math.nan, math.nan, math.nan)

@@ -49,7 +49,7 @@ def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArra
 
 
 def stationary_points(angles_deg: FloatArray) -> FloatArray:
-    """Give the angles at which the difference changes sign, or the one before is zero."""
+    """Return the angles at which the difference changes sign, or the one before is zero."""
     steps = np.diff(angles_deg)
     before, after = steps[:-1], steps[1:]
     return angles_deg[1:-1][(np.sign(before) * np.sign(after) < 0.0) | (before == 0.0)]
@@ -72,7 +72,7 @@ def _upwards(points_deg: FloatArray, gap_deg: float) -> int:
 
 def reversal_rate(pieces: Sequence[FloatArray], dt_s: float, setting: ReversalSetting) -> float:
     """
-    Give the reversals of a steering wheel per minute.
+    Return the reversals of a steering wheel per minute.
 
     :param pieces: angles of the steering wheel, each dt apart and without a gap; those shorter
         than `SHORTEST_S` are left out [degrees]

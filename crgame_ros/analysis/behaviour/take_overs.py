@@ -90,7 +90,7 @@ def find_take_overs(controls: DriverControls, calm: NDArray[np.bool_],
 
 def hands_on_after(controls: DriverControls, request_s: float) -> float:
     """
-    Give the time from a request to hands on of the first take-over after it.
+    Return the time from a request to hands on of the first take-over after it.
 
     :param controls: of the AV.
     :return: NaN where nobody took it over in `LONGEST_WAIT_S`, or nobody's hands came on [s]
@@ -105,7 +105,7 @@ def hands_on_after(controls: DriverControls, request_s: float) -> float:
 
 
 def _hands_on(controls: DriverControls, piece: slice) -> int | None:
-    """Give the row of the first input in a piece."""
+    """Return the row of the first input in a piece."""
     turned = np.abs(controls.wheel_deg[piece] - controls.wheel_deg[piece][0])
     inputs = np.flatnonzero((controls.throttle[piece] >= PEDAL_INPUT)
                             | (controls.brake[piece] >= PEDAL_INPUT)
@@ -115,7 +115,7 @@ def _hands_on(controls: DriverControls, piece: slice) -> int | None:
 
 def _stable(times_s: FloatArray, wheel_deg: FloatArray, calm: NDArray[np.bool_],
             dt_s: float) -> float:
-    """Give the beginning of the first stable second, NaN without one."""
+    """Return the beginning of the first stable second, NaN without one."""
     ends = np.searchsorted(times_s, times_s + STABLE_S - 0.5 * dt_s)
     for row, end in enumerate(ends.tolist()):
         if end == len(times_s):

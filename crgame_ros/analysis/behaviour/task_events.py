@@ -50,7 +50,7 @@ class TaskEvent(NamedTuple):
 
 
 def task_events(run: RunRecord) -> list[TaskEvent]:
-    """Give the events of a run's tasks, in the order of their onsets."""
+    """Return the events of a run's tasks, in the order of their onsets."""
     dt_s = run.log.game.scheduler.dt_s
     rows = [_row(run, entry, run.tasks[number + 1:], dt_s)
             for number, entry in enumerate(run.tasks) if entry.what in _BEGINS]
@@ -95,7 +95,7 @@ def _or_inf(seconds: float) -> float:
 
 
 def controls_of(run: RunRecord, vehicle_id: str) -> DriverControls | None:
-    """Give the commands that a driven vehicle obeyed; None of one that is not in the run."""
+    """Return the commands that a driven vehicle obeyed; None of one that is not in the run."""
     ids = [item.id for item in run.log.vehicles]
     if vehicle_id not in ids:
         return None
@@ -107,7 +107,7 @@ def controls_of(run: RunRecord, vehicle_id: str) -> DriverControls | None:
 
 def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:
     """
-    Give the time from a request to the first input with hands or pedals.
+    Return the time from a request to the first input with hands or pedals.
 
     Of an AV the first that makes hands on (as of a take-over), of a vehicle that somebody drives
     already the first response to an event (throttle released, brake pressed, wheel turned).

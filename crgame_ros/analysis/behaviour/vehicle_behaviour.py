@@ -76,7 +76,7 @@ class DriverBehaviour:
 
     def as_dict(self, series: bool = False) -> dict[str, Any]:
         """
-        Say it as JSON has it; null where a value is not finite.
+        Return it as JSON has it; null where a value is not finite.
 
         :param series: with the time series, too.
         """

@@ -12,7 +12,7 @@ import math
 
 def time_gap(gap: float, speed: float) -> float:
     """
-    Give the time in which the subject drives the gap [s].
+    Return the time in which the subject drives the gap [s].
 
     The time until its front passes the point where the other's rear is now (thw) is the same.
 
@@ -27,7 +27,7 @@ def time_gap(gap: float, speed: float) -> float:
 
 def time_to_collision(gap: float, speed: float, leader_speed: float) -> float:
     """
-    Give gap / (v_s - v_o), the time to collision at constant speeds [s].
+    Return gap / (v_s - v_o), the time to collision at constant speeds [s].
 
     :return: inf where the subject is not faster, or without a leader.
     """
@@ -40,7 +40,7 @@ def time_to_collision(gap: float, speed: float, leader_speed: float) -> float:
 def time_to_collision_accelerating(gap: float, speed: float, leader_speed: float,
                                    acceleration: float, leader_acceleration: float) -> float:
     """
-    Give the time to collision where each keeps its acceleration until it stands [s].
+    Return the time to collision where each keeps its acceleration until it stands [s].
 
     Who stands stays standing while the other goes on: braking never turns into driving back.
 
@@ -73,7 +73,7 @@ def time_to_collision_accelerating(gap: float, speed: float, leader_speed: float
 
 def deceleration_to_avoid_crash(gap: float, speed: float, leader_speed: float) -> float:
     """
-    Give the DRAC, ½ (v_s - v_o)² / gap [m/s²].
+    Return the DRAC, ½ (v_s - v_o)² / gap [m/s²].
 
     :return: 0 where the subject is not faster or without a leader, inf where they touch.
     """
@@ -86,7 +86,7 @@ def deceleration_to_avoid_crash(gap: float, speed: float, leader_speed: float) -
 def required_acceleration(gap: float, speed: float, leader_speed: float,
                           leader_acceleration: float) -> float:
     """
-    Give the constant acceleration that just avoids contact, min(a_o - DRAC, 0) [m/s²].
+    Return the constant acceleration that just avoids contact, min(a_o - DRAC, 0) [m/s²].
 
     :return: 0 where the subject is not faster or without a leader, -inf where they touch.
     """
@@ -96,13 +96,13 @@ def required_acceleration(gap: float, speed: float, leader_speed: float,
 
 
 def _standstill(speed: float, acceleration: float) -> float:
-    """Give the time after which a braking vehicle stands; inf for one that does not brake."""
+    """Return the time after which a braking vehicle stands; inf for one that does not brake."""
     brakes = speed * acceleration < 0.0 or (speed == 0.0 and acceleration < 0.0)
     return -speed / acceleration if brakes else math.inf
 
 
 def _smallest_root(gap: float, slope: float, bend: float) -> float:
-    """Give the smallest root >= 0 of gap + slope t + ½ bend t², inf without one."""
+    """Return the smallest root >= 0 of gap + slope t + ½ bend t², inf without one."""
     discriminant = slope ** 2 - 2.0 * bend * gap
     if not discriminant >= 0.0:
         return math.inf

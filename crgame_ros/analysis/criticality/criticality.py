@@ -111,7 +111,7 @@ class TickMeasures(NamedTuple):
     values: FloatArray
 
     def worst(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        """Give the most critical value of each measure, and to whom (`most_critical`)."""
+        """Return the most critical value of each measure, and to whom (`most_critical`)."""
         return most_critical(self.values, self.others)
 
 
@@ -198,7 +198,7 @@ class Criticality:
         return tuple(self._found)
 
     def as_dict(self) -> dict[str, Any]:
-        """Say what was found, as JSON has it: times in s since the start, SI units."""
+        """Return what was found, as JSON has it: times in s since the start, SI units."""
         return {
             'thresholds': self.thresholds._asdict(),
             'vehicles': {
@@ -216,7 +216,7 @@ class Criticality:
 
     def _accelerations(self, time_s: float, states: FloatArray, poses: FloatArray,
                        moves: FloatArray) -> FloatArray:
-        """Give everybody's acceleration (N, 2): the vehicles' own, the others' by differences."""
+        """Return everybody's acceleration (N, 2): the vehicles' own, the others' by differences."""
         result = np.zeros_like(moves)
         if self._before is not None and time_s > self._before[0]:
             lapse = time_s - self._before[0]
@@ -285,7 +285,7 @@ class Criticality:
 
 def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: float,
                leader_acceleration: float) -> tuple[float, ...]:
-    """Give the measures of car following, in the order of `MEASURES`."""
+    """Return the measures of car following, in the order of `MEASURES`."""
     headway = time_gap(gap, speed)
     return (gap, headway, headway, time_to_collision(gap, speed, leader_speed),
             time_to_collision_accelerating(gap, speed, leader_speed, acceleration,

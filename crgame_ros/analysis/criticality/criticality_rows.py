@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 
 def criticality_rows(criticality: Criticality, epoch: int, n: int) -> FloatArray:
     """
-    Give the rows (P, `COLUMNS`) of what was observed last: one for each pair that is near.
+    Return the rows (P, `COLUMNS`) of what was observed last: one for each pair that is near.
 
     :param epoch: counts resets.
     :param n: simulation step of the tick.

@@ -191,7 +191,7 @@ def _within(offsets: FloatArray, reach: FloatArray) -> NDArray[np.bool_]:
 
 
 def _hulls(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Give the corners (S, K, 2) of the smallest convex areas around pairs of footprints."""
+    """Return the corners (S, K, 2) of the smallest convex areas around pairs of footprints."""
     points = np.concatenate((first, second), axis=1)
     count, each = points.shape[:2]
     hulls = shapely.convex_hull(shapely.multipoints(

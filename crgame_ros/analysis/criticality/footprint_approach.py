@@ -53,7 +53,7 @@ def time_to_contact(first: FloatArray, second: FloatArray, velocity: FloatArray,
 def distance(first: FloatArray, second: FloatArray,
              touching: NDArray[np.bool_] | None = None) -> FloatArray:
     """
-    Give the smallest distance of convex footprints (min_distance) [m].
+    Return the smallest distance of convex footprints (min_distance) [m].
 
     :param first: (..., C, 2) corners in turn [m]; shorter ones repeat a corner
     :param second: (..., D, 2) corners of the others.
@@ -79,7 +79,7 @@ def distance(first: FloatArray, second: FloatArray,
 
 def approach(first: Corners, second: Corners, relative: list[float]) -> tuple[float, float]:
     """
-    Give `time_to_contact` and `distance` of two footprints.
+    Return `time_to_contact` and `distance` of two footprints.
 
     :param first: (C, 2) corners in turn [m]
     :param second: (D, 2) corners of the other.
@@ -106,7 +106,7 @@ def approach(first: Corners, second: Corners, relative: list[float]) -> tuple[fl
 
 
 def _least_square(corners: Corners, polygon: Corners) -> float:
-    """Give the smallest squared distance from any corner to any edge [m^2]."""
+    """Return the smallest squared distance from any corner to any edge [m^2]."""
     least = math.inf
     for (x, y), (next_x, next_y) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
         edge_x, edge_y = next_x - x, next_y - y
@@ -123,7 +123,7 @@ def _least_square(corners: Corners, polygon: Corners) -> float:
 
 def _both(first: FloatArray, second: FloatArray,
           shape: tuple[int, ...] = ()) -> tuple[FloatArray, FloatArray]:
-    """Give x and y of both in one array (2, ..., C); who has fewer corners repeats the last."""
+    """Return x and y of both in one array (2, ..., C); who has fewer corners repeats the last."""
     shape = np.broadcast_shapes(first.shape[:-2], second.shape[:-2], shape)
     result = np.empty((2, 2, *shape, max(first.shape[-2], second.shape[-2])))
     for row, corners in enumerate((first, second)):
@@ -134,7 +134,7 @@ def _both(first: FloatArray, second: FloatArray,
 
 
 def _edges(values: FloatArray) -> FloatArray:
-    """Give what leads from each corner to the next, and from the last to the first."""
+    """Return what leads from each corner to the next, and from the last to the first."""
     edges = np.empty_like(values)
     np.subtract(values[..., 1:], values[..., :-1], out=edges[..., :-1])
     np.subtract(values[..., 0], values[..., -1], out=edges[..., -1])

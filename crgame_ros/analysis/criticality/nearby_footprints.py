@@ -61,11 +61,11 @@ class NearbyFootprints:
         self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
 
     def scene(self, poses: FloatArray, moves: FloatArray, accelerations: FloatArray) -> Scene:
-        """Give where everybody is; parameters as of `Scene`."""
+        """Return where everybody is; parameters as of `Scene`."""
         return Scene(poses, moves, accelerations, placed(self._outlines, poses))
 
     def on_road(self, scene: Scene, transform: RigidTransform) -> Scene:
-        """Give a scene where the road of a vehicle is."""
+        """Return a scene where the road of a vehicle is."""
         if transform.is_identity:
             return scene
         return self.scene(transform.to_scenario(scene.poses),
@@ -82,7 +82,7 @@ class NearbyFootprints:
     def approach(self, subjects: Sequence[int], near: Sequence[Numbers],
                  scenes: Sequence[Scene]) -> list[FloatArray]:
         """
-        Give ttc_2d [s] and min_distance [m] of vehicles to those near them, (P, 2) each.
+        Return ttc_2d [s] and min_distance [m] of vehicles to those near them, (P, 2) each.
 
         :param subjects: numbers of the vehicles, one at least.
         :param near: who is near each.
@@ -116,6 +116,6 @@ class NearbyFootprints:
 
 
 def _convex(corners: FloatArray) -> FloatArray:
-    """Give the corners of the smallest convex footprint around one."""
+    """Return the corners of the smallest convex footprint around one."""
     hull = shapely.convex_hull(shapely.multipoints(corners))
     return np.asarray(shapely.get_coordinates(hull)[:-1])

@@ -42,7 +42,7 @@ class OwnPath(NamedTuple):
         return cls(Curve.from_polyline(points), resample(points, SPACING))
 
     def near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Give the distances (N) of positions (N, 2) to the nearest samples, and their s [m]."""
+        """Return the distances (N) of positions (N, 2) to the nearest samples, and their s [m]."""
         row = nearest(positions, self.samples)
         scale = self.line.length / (len(self.samples) - 1)
         dx, dy = (positions - self.samples[row]).T
@@ -91,7 +91,7 @@ class OwnPaths:
 
     def at(self, vehicle: int, yaw: float, positions: FloatArray) -> SeenPath:
         """
-        Give the path of a vehicle, as it is seen from some positions.
+        Return the path of a vehicle, as it is seen from some positions.
 
         :param vehicle: its number among the driven ones.
         :param yaw: of the vehicle [rad]

@@ -22,7 +22,7 @@ class Thresholds(NamedTuple):
     pet_s: float = 2.0
 
     def exceeded(self, measure: str, value: float) -> bool:
-        """Tell whether a value is critical; of measures without a threshold none is."""
+        """Return whether a value is critical; of measures without a threshold none is."""
         return {'ttc': value < self.ttc_s, 'drac': value > self.drac,
                 'pet': value < self.pet_s}.get(measure, False)
 

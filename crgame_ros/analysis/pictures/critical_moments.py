@@ -38,15 +38,15 @@ class Touching(Protocol):
 
     @property
     def vehicle_id(self) -> str:
-        """Give the driven vehicle."""
+        """Return the driven vehicle."""
 
     @property
     def other_id(self) -> str:
-        """Give what it touched."""
+        """Return what it touched."""
 
     @property
     def n(self) -> int:
-        """Give the simulation step."""
+        """Return the simulation step."""
 
 
 class Touch(NamedTuple):
@@ -151,6 +151,6 @@ def named(names: Collection[str]) -> str:
 
 
 def _merged(moment: Moment, later: Moment) -> Moment:
-    """Tell a less critical moment as part of another."""
+    """Return a less critical moment as part of another."""
     why = moment.why if later.why in moment.why else f'{moment.why}; {later.why}'
     return Moment(moment.time_s, why, tuple(dict.fromkeys((*moment.vehicles, *later.vehicles))))

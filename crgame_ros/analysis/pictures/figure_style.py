@@ -86,7 +86,7 @@ def new_figure(columns: int, height: float) -> Figure:
 
 def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION) -> bytes:
     """
-    Give a figure as a file has it, without a date: equal figures give equal bytes.
+    Return a figure as a file has it, without a date: equal figures give equal bytes.
 
     :param file_format: one of `FORMATS`.
     :param resolution: of PNG [dots per inch].
@@ -99,7 +99,7 @@ def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION)
 
 
 def vehicle_styles(descriptions: tuple[ObjectDescription, ...]) -> dict[str, VehicleStyle]:
-    """Give each driven vehicle its style, by id."""
+    """Return each driven vehicle its style, by id."""
     styles = {}
     for role, colours, dashes, markers in (
             (Role.HUMAN, HUMAN_COLOURS, HUMAN_DASHES, HUMAN_MARKERS),
@@ -111,17 +111,17 @@ def vehicle_styles(descriptions: tuple[ObjectDescription, ...]) -> dict[str, Veh
 
 
 def object_colour(description: ObjectDescription) -> str:
-    """Give the colour of what nobody drives: who walks or rides is darker."""
+    """Return the colour of what nobody drives: who walks or rides is darker."""
     return PERSON_COLOUR if description.type in PERSONS else OBJECT_COLOUR
 
 
 def shade(colour: str) -> str:
-    """Give a darker shade of a colour, for text on the road."""
+    """Return a darker shade of a colour, for text on the road."""
     return '#' + ''.join(f'{round(0.7 * level):02x}' for level in _levels(colour))
 
 
 def tint(colour: str) -> str:
-    """Give a lighter tint of a colour, as on white with 60 % of it."""
+    """Return a lighter tint of a colour, as on white with 60 % of it."""
     return '#' + ''.join(f'{round(255 - 0.6 * (255 - level)):02x}' for level in _levels(colour))
 
 

@@ -138,7 +138,7 @@ def _times(text: str) -> list[float]:
 
 def _frames(run: 'PicturedRun', values: argparse.Namespace, times_s: list[float] | None
             ) -> Iterator[tuple[str, 'Figure', str]]:
-    """Give the figures of frames with their names and what they show."""
+    """Yield the figures of frames with their names and what they show."""
     from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
     scene, log = run.scene, run.record.log
     scheduler = log.game.scheduler

@@ -81,7 +81,7 @@ class PicturedRoad:
             for kind, lines in self._lines.items()})
 
     def across(self, window: FrameWindow) -> tuple[float, float]:
-        """Tell from where to where road lies in a window, across it; 0, 0 without any [m]."""
+        """Return from where to where road lies in a window, across it; 0, 0 without any [m]."""
         cut = shapely.transform(window.polygon(), lambda points: points - self._origin)
         points = shapely.get_coordinates(shapely.intersection(self._surface, cut))
         if not len(points):
@@ -99,7 +99,7 @@ def _extent(lanelet: Lanelet) -> list[float]:
 
 
 def _lines(lanelet: Lanelet, known: set[int]) -> Iterator[tuple[str, FloatArray]]:
-    """Tell what a lanelet's bounds are; of those that two lanelets share one tells."""
+    """Yield what a lanelet's bounds are; of those that two lanelets share one tells."""
     for points, neighbour, same, marking in (
             (lanelet.left_vertices, lanelet.adj_left, lanelet.adj_left_same_direction,
              lanelet.line_marking_left_vertices),

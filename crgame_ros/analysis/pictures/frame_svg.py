@@ -73,7 +73,7 @@ class _Paper:
         self._parts: list[str] = []
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Give the pixels of a place in the window."""
+        """Return the pixels of a place in the window."""
         return (0.5 * self._size[0] + x * self._scale, 0.5 * self._size[1] - y * self._scale)
 
     def fill(self, areas: Iterable[Iterable[FloatArray]], colour: str, more: str = '') -> None:
@@ -102,7 +102,7 @@ class _Paper:
             f'stroke-linejoin="round">{escape(text)}</text>')
 
     def text(self) -> str:
-        """Give what was drawn."""
+        """Return what was drawn."""
         width, height = self._size
         return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
                 f'width="{width}" height="{height}" font-family="sans-serif" '

@@ -54,7 +54,7 @@ class FrameWindow:
         return np.asarray((points - (self.x, self.y)) @ _turn(self.yaw))
 
     def polygon(self, margin: float = 0.0) -> shapely.Polygon:
-        """Give it as a polygon of the map, wider by a margin [m] on every side."""
+        """Return it as a polygon of the map, wider by a margin [m] on every side."""
         corners = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1))) * (
             0.5 * self.length + margin, 0.5 * self.height + margin)
         return shapely.Polygon(corners @ _turn(self.yaw).T + (self.x, self.y))
@@ -72,7 +72,7 @@ def footprints(descriptions: Sequence[ObjectDescription], poses: FloatArray
 
 
 def all_poses(log: RunLog, rows: Sequence[int]) -> FloatArray:
-    """Give the poses (R, V + M, 3) of everybody's reference points; NaN where absent."""
+    """Return the poses (R, V + M, 3) of everybody's reference points; NaN where absent."""
     chosen = list(rows)
     return np.concatenate((log.vehicle_states[chosen, :, :3], log.object_poses[chosen]), axis=1)
 
@@ -137,13 +137,13 @@ def _focus(log: RunLog, vehicles: Sequence[str]) -> int:
 
 
 def _size(extent: FloatArray, least: float) -> tuple[float, float]:
-    """Give length and height of a window around an extent [m]."""
+    """Return length and height of a window around an extent [m]."""
     length = max(float(extent[0]) + 2.0 * MARGIN, least)
     height = max(float(extent[1]) + 2.0 * MARGIN_BESIDE, LEAST_HEIGHT, length / LONGEST)
     return max(length, SQUAREST * height), height
 
 
 def _turn(yaw: float) -> FloatArray:
-    """Give the matrix that takes coordinates along `yaw` to those of the map."""
+    """Return the matrix that takes coordinates along `yaw` to those of the map."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     return np.array(((cos, -sin), (sin, cos)))

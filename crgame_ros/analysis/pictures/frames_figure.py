@@ -89,7 +89,7 @@ def _panels_across(count: int, width: float, length: float, height: float) -> in
 
 
 def _handles(scene: FrameScene, frames: Sequence[SceneFrame]) -> list[Patch | Line2D]:
-    """Say what colours and lines mean."""
+    """Return what colours and lines mean."""
     roles = {item.role for item in scene.log.vehicles}
     shown = {body.colour for frame in frames for body in frame.bodies if not body.is_driven}
     handles: list[Patch | Line2D] = [
@@ -126,14 +126,14 @@ def _letter(number: int) -> str:
 
 
 def _digits(step_s: float) -> int:
-    """Give how many decimals tell a scenario's steps apart."""
+    """Return how many decimals tell a scenario's steps apart."""
     return next((digits for digits in range(1, 4)
                  if abs(step_s * 10**digits - round(step_s * 10**digits)) < 1e-6), 3)
 
 
 def panel_steps(scene: FrameScene, time_s: float, panels: int, spacing_s: float
                 ) -> tuple[int, ...]:
-    """Give scenario steps around a time, the panel at it being in the second half."""
+    """Return scenario steps around a time, the panel at it being in the second half."""
     step_s = scene.log.game.scheduler.time_step_s
     stride = max(1, round(spacing_s / step_s))
     first, last = int(scene.log.ks[0]), int(scene.log.ks[-1])

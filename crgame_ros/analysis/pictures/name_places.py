@@ -67,7 +67,7 @@ def place_names(frame: SceneFrame, text_height: float,
 
 
 def _overlaps(tried: FloatArray, others: FloatArray) -> FloatArray:
-    """Give what each box (T, 4) has in common with all others (B, 4) [m^2]."""
+    """Return what each box (T, 4) has in common with all others (B, 4) [m^2]."""
     sides = (np.minimum(tried[:, None, 2:], others[None, :, 2:])
              - np.maximum(tried[:, None, :2], others[None, :, :2]))
     return np.asarray(np.maximum(sides, 0.0).prod(axis=2).sum(axis=1))

@@ -84,13 +84,13 @@ def profiles_figure(record: RunRecord, moments: Sequence[Moment] = (),
 
 
 def log_times(record: RunRecord) -> FloatArray:
-    """Give the times of a log's rows since the start of the run (K) [s]."""
+    """Return the times of a log's rows since the start of the run (K) [s]."""
     scheduler = record.log.game.scheduler
     return np.asarray((record.log.ks - scheduler.k0) * scheduler.time_step_s)
 
 
 def values_of(record: RunRecord, column: StateColumn) -> FloatArray:
-    """Give what is drawn of a column of the states (K, V); a heading goes on beyond pi."""
+    """Return what is drawn of a column of the states (K, V); a heading goes on beyond pi."""
     values = record.log.vehicle_states[:, :, column]
     return np.asarray(np.unwrap(values, axis=0) if column is StateColumn.YAW else values)
 

@@ -76,7 +76,7 @@ def write_video(scene: FrameScene, path: Path,
 
 
 def video_path(path: Path) -> Path:
-    """Give the file that can be written here: a GIF where there is no ffmpeg."""
+    """Return the file that can be written here: a GIF where there is no ffmpeg."""
     lacks = path.suffix == '.mp4' and not FFMpegWriter.isAvailable()
     return path.with_suffix('.gif') if lacks else path
 

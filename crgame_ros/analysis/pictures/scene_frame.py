@@ -156,7 +156,7 @@ class FrameScene:
 
     def row(self, k: int) -> int:
         """
-        Give the row of the log that holds a scenario step.
+        Return the row of the log that holds a scenario step.
 
         :raises InputError: if there is none.
         """
@@ -167,13 +167,13 @@ class FrameScene:
         return int(k - ks[0])
 
     def k_at(self, time_s: float) -> int:
-        """Give the scenario step nearest to a time since the start of the run, within the log."""
+        """Return the scenario step nearest to a time since the start of the run, within the log."""
         scheduler = self.log.game.scheduler
         k = scheduler.k0 + round(time_s / scheduler.time_step_s)
         return int(np.clip(k, self.log.ks[0], self.log.ks[-1]))
 
     def _plan(self, av: str, time_s: float) -> FloatArray | None:
-        """Give what was left (S, 3) of the plan that an AV was following; None if nothing."""
+        """Return what was left (S, 3) of the plan that an AV was following; None if nothing."""
         number = int(np.searchsorted(self._starts[av], time_s + 1e-9, side='right')) - 1
         if number < 0:
             return None
@@ -183,7 +183,7 @@ class FrameScene:
 
     def _bodies(self, row: int, window: FrameWindow,
                 labelled: Collection[str] | None) -> tuple[FrameBody, ...]:
-        """Give who is at least partly in the window; driven vehicles are drawn last, on top."""
+        """Return who is at least partly in the window; driven vehicles are drawn last, on top."""
         poses = all_poses(self.log, [row])[0]
         bodies = []
         half = 0.5 * np.array((window.length, window.height))
@@ -207,7 +207,7 @@ class FrameScene:
 
 
 def front_mark(description: ObjectDescription, pose: FloatArray) -> FloatArray:
-    """Give the corners (3, 2) in the map of the mark at the front of a footprint [m]."""
+    """Return the corners (3, 2) in the map of the mark at the front of a footprint [m]."""
     shape = description.shape
     ahead = _FRONT * (shape.length, shape.width) + (description.rear_to_center, 0.0)
     cos, sin = np.cos(pose[2]), np.sin(pose[2])

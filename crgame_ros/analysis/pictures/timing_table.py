@@ -69,7 +69,7 @@ class TimingTable:
         self.summaries = tuple(_summary(run) for run in runs)
 
     def text(self) -> str:
-        """Give it for a terminal."""
+        """Return it for a terminal."""
         rows = [('', *self.labels), *(
             (row.name, *(_told(row, found) for found in self.summaries)) for row in TIMING_ROWS)]
         widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
@@ -79,7 +79,7 @@ class TimingTable:
             ).rstrip() + '\n' for row in rows)
 
     def csv(self) -> str:
-        """Give it with all digits, a row for each metric."""
+        """Return it with all digits, a row for each metric."""
         stream = StringIO()
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(('metric', 'unit', *self.labels))
@@ -89,7 +89,7 @@ class TimingTable:
         return stream.getvalue()
 
     def markdown(self) -> str:
-        """Give it as Markdown."""
+        """Return it as Markdown."""
         labels = [label.replace('\\', '\\\\').replace('|', '\\|') for label in self.labels]
         lines = ['| metric | ' + ' | '.join(labels) + ' |', '|---|' + '---:|' * len(labels)]
         lines += [f'| {row.name} | ' + ' | '.join(_told(row, found) for found in self.summaries)
@@ -97,7 +97,7 @@ class TimingTable:
         return '\n'.join(lines) + '\n'
 
     def latex(self) -> str:
-        """Give it as a `tabular` that needs no package."""
+        """Return it as a `tabular` that needs no package."""
         lines = [rf'\begin{{tabular}}{{l{"r" * len(self.labels)}}}', r'\hline',
                  ' & '.join((r'\textbf{Metric}', *(
                      rf'\textbf{{{"".join(_LATEX.get(each, each) for each in label)}}}'

@@ -36,7 +36,7 @@ def comparison_section(runs: Sequence[ReportRun]) -> Section:
 
 
 def letter(place: int) -> str:
-    """Give the letter of a run; after Z comes AA."""
+    """Return the letter of a run; after Z comes AA."""
     first, last = divmod(place, 26)
     return (letter(first - 1) if first else '') + chr(ord('A') + last)
 

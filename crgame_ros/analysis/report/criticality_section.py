@@ -48,7 +48,7 @@ def criticality_section(run: ReportRun) -> Section:
 
 
 def is_critical(name: str, value: float, limits: Thresholds) -> bool:
-    """Tell whether a measure's value is beyond its threshold."""
+    """Return whether a measure's value is beyond its threshold."""
     return name in ('ttc', 'ttc_2d') and value < limits.ttc_s \
         or name == 'drac' and value > limits.drac \
         or name in ('min_distance', 'gap') and value <= 0.0

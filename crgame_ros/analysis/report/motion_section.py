@@ -115,7 +115,7 @@ def _spans(run: ReportRun, i: int, vehicle: str, role: Role) -> Iterator[PlotSpa
 
 
 def stretches(holds: NDArray[np.bool_], times_s: FloatArray) -> list[tuple[float, float]]:
-    """Give from when to when something holds."""
+    """Return from when to when something holds."""
     edges = np.diff(np.concatenate(([False], holds, [False])).astype(int))
     return [(float(times_s[first]), float(times_s[end - 1])) for first, end in zip(
         np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True)]

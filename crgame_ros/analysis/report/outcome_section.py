@@ -13,13 +13,13 @@ from crgame_ros.analysis.report.story_section import moment
 
 
 def outcome_section(run: ReportRun) -> Section:
-    """Say who touched whom, who broke what, and which events took effect."""
+    """Return who touched whom, who broke what, and which events took effect."""
     html = _contacts(run) + _violations(run) + _events(run)
     return Section('outcome', 'Contacts, violations, events', html)
 
 
 def contacts_of_report(run: ReportRun) -> Sequence[Mapping[str, Any]] | None:
-    """Give the contacts as `timing.json` has them; None where nobody knows."""
+    """Return the contacts as `timing.json` has them; None where nobody knows."""
     return None if run.outcome is None else run.outcome['contacts']
 
 

@@ -101,7 +101,7 @@ def _cell(name: str, value: float | None) -> str:
 
 
 def _remarks(run: ReportRun, scores: VehicleScores) -> Iterator[str]:
-    """Say what its scores rest on, and what it fails."""
+    """Yield what its scores rest on, and what it fails."""
     who = named(run, scores.vehicle_id)
     if scores.nuplan is not None:
         yield (f'{who}: progress {number(scores.nuplan.own_progress, 0)} m, '

@@ -57,12 +57,12 @@ def _first(places: NDArray[np.intp], group: NDArray[np.intp]) -> NDArray[np.intp
 
 
 def columns_for(lines: int) -> int:
-    """Say into how many columns each of so many lines may be divided."""
+    """Return into how many columns each of so many lines may be divided."""
     return max(FEWEST_COLUMNS, min(MOST_COLUMNS, ALL_POINTS // max(_A_COLUMN * lines, 1)))
 
 
 def encoded(plot: Plot, columns: int) -> dict[str, Any]:
-    """Give a plot as the page reads it, its lines divided into so many columns."""
+    """Return a plot as the page reads it, its lines divided into so many columns."""
     return {
         'unit': plot.unit, 'plane': plot.plane,
         'bounds': plot.bounds,

@@ -70,7 +70,7 @@ class ReportRun:
 
     @property
     def outcome(self) -> Mapping[str, Any] | None:
-        """Give plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        """Return plans, violations and contacts as `timing.json` has them; None: nobody knows."""
         return self.timing if self.offline is None else self.offline
 
     @cached_property
@@ -80,12 +80,12 @@ class ReportRun:
 
     @property
     def log(self) -> RunLog:
-        """Give the run on its scenario's grid."""
+        """Return the run on its scenario's grid."""
         return self.record.log
 
     @property
     def times_s(self) -> FloatArray:
-        """Give the simulated times of the scenario steps since the run's start (K) [s]."""
+        """Return the simulated times of the scenario steps since the run's start (K) [s]."""
         scheduler = self.log.game.scheduler
         return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
 

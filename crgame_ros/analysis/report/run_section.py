@@ -16,7 +16,7 @@ _LONGEST_FILE = 20_000
 
 
 def run_section(run: ReportRun) -> Section:
-    """Say what was run."""
+    """Return what was run."""
     game = run.log.game
     html = table('The run', (), [(label, value) for label, value in _facts(run)], 'facts')
     html += table('Who was driven', ('vehicle', 'driven by', 'type', 'length × width [m]',
@@ -37,12 +37,12 @@ def run_section(run: ReportRun) -> Section:
 
 
 def title_of(run: ReportRun) -> str:
-    """Give a run's title for people, as it was written: not escaped."""
+    """Return a run's title for people, as it was written: not escaped."""
     return run.log.game.title or run.log.game.benchmark_id or run.name
 
 
 def began(run: ReportRun) -> str:
-    """Say when a run was recorded."""
+    """Return when a run was recorded."""
     if run.began_ns is None:
         return NOTHING
     when = datetime.fromtimestamp(run.began_ns // 1_000_000_000, UTC)
@@ -74,7 +74,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
 
 
 def _sound(run: ReportRun) -> Iterator[str]:
-    """Say what people in the cockpit's seats had on; nothing of recordings that do not tell."""
+    """Yield what people in the cockpit's seats had on; nothing of recordings that do not tell."""
     for seat, told in ((run.timing or {}).get('sound') or {}).items():
         words = 'off' if told['volume'] is None else \
             f'on for {_percent(told["on_share"])} of the time, volume {_percent(told["volume"])}'
@@ -82,7 +82,7 @@ def _sound(run: ReportRun) -> Iterator[str]:
 
 
 def _view(run: ReportRun) -> Iterator[str]:
-    """Say what people in the cockpit's seats saw, from when to when."""
+    """Yield what people in the cockpit's seats saw, from when to when."""
     for seat, periods in ((run.timing or {}).get('view') or {}).items():
         for period in periods:
             words = [f'{plain(period["shown"])} from {number(period["from_s"], 1)} to '
@@ -139,7 +139,7 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
 
 
 def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
-    """Say who was in the seats of cockpits, and whose device at the machine drove."""
+    """Yield who was in the seats of cockpits, and whose device at the machine drove."""
     last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
     for spell, delay_ms, _ in run.record.drivers:
         person = spell.person
@@ -163,7 +163,7 @@ def named(run: ReportRun, vehicle: str) -> str:
 
 def software_note(lines: tuple[tuple[str, str], ...], here: bool) -> str:
     """
-    Say which software on which machine wrote the report.
+    Return which software on which machine wrote the report.
 
     :param lines: what, and which.
     :param here: whether the run was driven there and then, too.

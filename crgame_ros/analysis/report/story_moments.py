@@ -63,12 +63,12 @@ def story_moments(record: RunRecord, criticality: Criticality,
 
 
 def is_told(measure: Measure, worst: Worst) -> bool:
-    """Tell whether a worst value says anything."""
+    """Return whether a worst value says anything."""
     return measure.unit != 's' or worst.value < TOLD_S
 
 
 def nearest_moment(moments: Sequence[Moment], time_s: float) -> int | None:
-    """Give the number of the moment that shows a time; None if there is none near it."""
+    """Return the number of the moment that shows a time; None if there is none near it."""
     near = min(range(len(moments)), key=lambda i: abs(moments[i].time_s - time_s), default=None)
     if near is None or abs(moments[near].time_s - time_s) > TOGETHER_S + 1e-6:
         return None

@@ -31,7 +31,7 @@ def story_section(run: ReportRun) -> Section | None:
 
 
 def frame_address(run: ReportRun, place: int) -> str:
-    """Give the address within the page of the frame of a moment."""
+    """Return the address within the page of the frame of a moment."""
     return f'{run.key}-frame-{place + 1}'
 
 

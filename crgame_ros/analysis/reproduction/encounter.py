@@ -52,12 +52,12 @@ class Encounter:
 
     @property
     def least_gap(self) -> float | None:
-        """Give the smallest gap to the human ahead, by bumpers; None: never behind it [m]."""
+        """Return the smallest gap to the human ahead, by bumpers; None: never behind it [m]."""
         return self._worst('gap')
 
     @property
     def least_distance(self) -> float | None:
-        """Give the smallest distance of the outlines of AV and human; None: never near [m]."""
+        """Return the smallest distance of the outlines of AV and human; None: never near [m]."""
         return self._worst('min_distance')
 
     @property
@@ -68,7 +68,7 @@ class Encounter:
             self.av in (item['vehicle'], item['with']) for item in found)
 
     def as_dict(self) -> dict[str, float | int | str | None]:
-        """Give the numbers as JSON has them."""
+        """Return the numbers as JSON has them."""
         return {
             'av': self.av, 'final_speed': float(self.speeds[-1]),
             'least_speed': float(self.speeds.min()), 'lane_deviation': self.deviation,
@@ -83,5 +83,5 @@ class Encounter:
 
 
 def human_states(log: RunLog) -> FloatArray:
-    """Give the states of the humans as they were published (K, H, 8)."""
+    """Return the states of the humans as they were published (K, H, 8)."""
     return log.published_states[:, :len(log.game.humans)]

@@ -55,7 +55,7 @@ class Judgement:
 
     @property
     def line(self) -> str:
-        """Tell it in one line."""
+        """Return it in one line."""
         return f'{"met" if self.is_met else "UNMET"}: {self.subject}: {self.name}: {self.found}'
 
 

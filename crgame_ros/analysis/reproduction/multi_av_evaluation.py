@@ -44,7 +44,7 @@ class MultiAvRun:
     alone: RunLog
 
     def reactions(self) -> dict[str, float]:
-        """Tell how far each AV got from where it would be without the human [m]."""
+        """Return how far each AV got from where it would be without the human [m]."""
         log, alone = self.run.log, self.alone
         _, here, there = np.intersect1d(log.ks, alone.ks, return_indices=True)
         places = {item.id: i for i, item in enumerate(log.vehicles)}
@@ -66,7 +66,7 @@ def run_alone(game: Path, planner: str, duration_s: float) -> RunLog:
 
 
 def jumps(log: RunLog) -> NDArray[np.float64]:
-    """Tell by how much each step's length differs from what its speeds say (K - 1, V) [m]."""
+    """Return by how much each step's length differs from what its speeds say (K - 1, V) [m]."""
     lengths = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[:, :, :2], axis=0), 2, 0))
     speeds = np.abs(log.vehicle_states[:, :, StateColumn.SPEED])
     expected = 0.5 * (speeds[1:] + speeds[:-1]) * log.game.scheduler.time_step_s

@@ -50,7 +50,7 @@ class NaiveLoop:
 
     @property
     def cycles(self) -> CycleTable:
-        """Give the cycles so far, as the graph publishes its own."""
+        """Return the cycles so far, as the graph publishes its own."""
         rows = np.array(self._rows).reshape(-1, len(TIMING_COLUMNS))
         return CycleTable(TIMING_COLUMNS, rows)
 

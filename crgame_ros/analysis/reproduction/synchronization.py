@@ -50,11 +50,11 @@ class Synchronization:
 
     @property
     def table(self) -> TimingTable:
-        """Give table I of them."""
+        """Return table I of them."""
         return TimingTable((self.proposed, self.naive))
 
     def rows(self) -> list[dict[str, Any]]:
-        """Give table I beside the paper's, as JSON has it."""
+        """Return table I beside the paper's, as JSON has it."""
         ours, naive = self.table.summaries
         return [{'metric': row.name, 'unit': row.unit,
                  'proposed': row.value(ours), 'naive': row.value(naive),

@@ -42,7 +42,7 @@ class JudgedCollision:
     at_fault: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {'with': self.other_id, 'group': self.other_kind, 'time_s': self.time_s,
                 'kind': self.kind, 'at_fault': self.at_fault}
 
@@ -69,7 +69,7 @@ def find_collisions(drive: ScoredDrive, lanes: LanesDriven) -> tuple[JudgedColli
 
 def angle_to(rear_axles: FloatArray, points: FloatArray) -> FloatArray:
     """
-    Give the angles (...) between headings and the directions to points, 0 straight ahead [rad].
+    Return the angles (...) between headings and the directions to points, 0 straight ahead [rad].
 
     :param rear_axles: (..., 3)
     :param points: (..., 2)

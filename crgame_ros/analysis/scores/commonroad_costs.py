@@ -38,7 +38,7 @@ class TrajectoryCost:
     reason: str = ''
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         if self.total is None:
             return {'total': None, 'reason': self.reason}
         return {'total': self.total, 'parts': self.parts}
@@ -81,7 +81,7 @@ def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajecto
 
 
 def _reason(error: BaseException) -> str:
-    """Say in a line what the checker stumbled over: the cause, where it names one."""
+    """Return in a line what the checker stumbled over: the cause, where it names one."""
     cause = error.__cause__ or error
     lacking = re.search(r"has no attribute '(\w+)'", str(cause))
     if isinstance(cause, AttributeError) and lacking:

@@ -54,7 +54,7 @@ class DriveComfort(NamedTuple):
                      if self.lowest[name] < bound.lowest or self.highest[name] > bound.highest)
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {name: {'lowest': self.lowest[name], 'highest': self.highest[name],
                        'unit': bound.unit, 'comfortable': name not in self.exceeded}
                 for name, bound in BOUNDS.items()}

@@ -32,7 +32,7 @@ class ChosenType(NamedTuple):
 
     @property
     def is_exact(self) -> bool:
-        """Tell whether the type has the vehicle's dimensions."""
+        """Return whether the type has the vehicle's dimensions."""
         return self.difference < _SAME
 
 
@@ -49,7 +49,7 @@ def choose_type(vehicle: VehicleParameters) -> ChosenType:
 
 def driven_states(log: RunLog, vehicle: int, kind: VehicleType) -> list[KSState]:
     """
-    Give a vehicle's states from time step 0 on, as the model KS has them.
+    Return a vehicle's states from time step 0 on, as the model KS has them.
 
     The rear axle is where it was; the model's centre lies the type's own distance ahead.
 
@@ -76,7 +76,7 @@ def goal_step(problem: PlanningProblem, states: list[KSState]) -> int | None:
 
 
 def is_reached(problem: PlanningProblem, state: KSState) -> bool:
-    """Tell whether a state meets the goal; one that asks for what the state lacks is not met."""
+    """Return whether a state meets the goal; one that asks for what the state lacks is not met."""
     try:
         return bool(problem.goal.is_reached(state))
     except (AttributeError, ValueError):
@@ -84,6 +84,6 @@ def is_reached(problem: PlanningProblem, state: KSState) -> bool:
 
 
 def until_goal(states: list[KSState], step: int | None) -> Trajectory:
-    """Give the trajectory that ends where the goal is reached, as a solution does."""
+    """Return the trajectory that ends where the goal is reached, as a solution does."""
     kept = states if step is None else states[:max(step, 1) + 1]
     return Trajectory(kept[0].time_step, kept)

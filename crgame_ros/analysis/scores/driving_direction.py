@@ -15,7 +15,7 @@ WINDOW_S, TOLERATED, VIOLATED = 1.0, 2.0, 6.0
 
 def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -> float:
     """
-    Give the longest way of the centre against its lane within any window of 1 s, 0 or more [m].
+    Return the longest way of the centre against its lane within any window of 1 s, 0 or more [m].
 
     The way of a step is measured along the lanelet in which it ends; off the lanes, and where cars
     may drive in both directions, there is no direction. nuPlan leaves out the steps at which
@@ -38,5 +38,5 @@ def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -
 
 
 def direction_score(against: float) -> float:
-    """Give 1, 0.5 or 0 for a way against the lane [m]."""
+    """Return 1, 0.5 or 0 for a way against the lane [m]."""
     return 1.0 if against < TOLERATED else 0.5 if against < VIOLATED else 0.0

@@ -65,7 +65,7 @@ def intersection_lanelets(network: LaneletNetwork) -> frozenset[int]:
 
 
 def is_two_way(network: LaneletNetwork, lanelet_id: int) -> bool:
-    """Tell whether cars may use a lanelet in both directions."""
+    """Return whether cars may use a lanelet in both directions."""
     return bool(network.find_lanelet_by_id(lanelet_id).user_bidirectional & _CARS)
 
 
@@ -81,7 +81,7 @@ def _inside(tree: shapely.STRtree, points: NDArray[np.float64],
 
 def _share_a_lane(network: LaneletNetwork, corners: Sequence[frozenset[int]],
                   length: float) -> bool:
-    """Tell whether one lane holds all corners."""
+    """Return whether one lane holds all corners."""
     if frozenset.intersection(*corners):
         return True
     return any(all(corner & chain for corner in corners)

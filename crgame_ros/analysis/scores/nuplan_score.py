@@ -85,12 +85,12 @@ class NuplanScore:
 
     @property
     def score(self) -> float:
-        """Give the product of the multipliers times the weighted mean, 0 to 1."""
+        """Return the product of the multipliers times the weighted mean, 0 to 1."""
         mean = sum(WEIGHTS[name] * value for name, value in self.weighted.items())
         return math.prod(self.multipliers.values()) * mean / sum(WEIGHTS.values())
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {
             'score': self.score, 'multipliers': self.multipliers,
             'weighted': {name: {'value': value, 'weight': WEIGHTS[name]}
@@ -151,14 +151,14 @@ class NuplanScorer:
             float(times.min()), speed, comfort, tuple(remarks))
 
     def _overhang(self, drive: ScoredDrive) -> float:
-        """Give how far the farthest corner was off the road [m]."""
+        """Return how far the farthest corner was off the road [m]."""
         off = drive.poses[self._boundary.are_off_road(drive.poses, drive.shape)]
         return max((self._boundary.overhang(x, y, yaw, drive.shape)
                     for x, y, yaw in off.tolist()), default=0.0)
 
     def _progress(self, drive: ScoredDrive, expert: Expert | None, problem: PlanningProblem | None,
                   remarks: list[str]) -> tuple[float, float | None]:
-        """Give the progress of a drive and of its expert [m]; None of one without a route."""
+        """Return the progress of a drive and of its expert [m]; None of one without a route."""
         if expert is None:
             return self._free_progress(drive, problem)
         steps = min(len(drive.poses), len(expert.poses))
@@ -196,7 +196,7 @@ class NuplanScorer:
 
 
 def collision_score(collisions: Sequence[JudgedCollision]) -> float:
-    """Give the multiplier of collisions at fault: 0.5 for one with an object, 0 for any other."""
+    """Return the multiplier of collisions at fault: 0.5 for one with an object, 0 for any other."""
     counts = {kind: sum(each.at_fault and each.other_kind == kind for each in collisions)
               for kind in FATAL}
     return math.prod(max(0.0, 1.0 - counts[kind] / fatal) for kind, fatal in FATAL.items())

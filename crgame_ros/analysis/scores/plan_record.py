@@ -51,7 +51,7 @@ class PlanRecord:
         return max(0, accepted - (self.fallbacks or 0)) / plans
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {'accepted_share': self.accepted_share, **self.counts,
                 'fallbacks': self.fallbacks, 'fallback_reasons': self.reasons,
                 'last_refusal': self.last_refusal, **self.spreads,
@@ -73,7 +73,7 @@ class GoalRecord:
     least_distance: float | None
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {'reached_s': self.reached_s, 'last_distance_m': self.last_distance,
                 'least_distance_m': self.least_distance}
 

@@ -37,7 +37,7 @@ class SolutionScores:
     feasibility: TrajectoryFeasibility
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {
             'planning_problem': self.solved.planning_problem_id,
             'vehicle': self.solved.vehicle_id, 'exact_vehicle_type': self.exact_type,
@@ -46,7 +46,7 @@ class SolutionScores:
             **self.checks.as_dict(), 'feasibility': self.feasibility.as_dict()}
 
     def solutions(self, scenario_id: ScenarioID) -> dict[str, Solution]:
-        """Give a solution for each cost function that the vehicle model may be judged by."""
+        """Return a solution for each cost function that the vehicle model may be judged by."""
         found = self.solved
         return {name: Solution(scenario_id, [PlanningProblemSolution(
             found.planning_problem_id, found.vehicle_model, found.vehicle_type,
@@ -70,7 +70,7 @@ class PlannerScores:
     remarks: tuple[str, ...] = REMARKS
 
     def as_dict(self) -> dict[str, Any]:
-        """Say what was found, as JSON has it: SI units, times since the start."""
+        """Return what was found, as JSON has it: SI units, times since the start."""
         return {'scenario': str(self.scenario_id), 'checker': checker_version(),
                 'vehicles': [each.as_dict() for each in self.vehicles],
                 'remarks': list(self.remarks)}

@@ -28,7 +28,7 @@ STANDS = 0.005
 def times_to_contact(drive: ScoredDrive, lanes: LanesDriven,
                      collisions: Sequence[JudgedCollision]) -> FloatArray:
     """
-    Give the time to collision of each step (K), inf where none is within the horizon [s].
+    Return the time to collision of each step (K), inf where none is within the horizon [s].
 
     Who is ahead counts, and who is beside while the vehicle is between lanes or in an
     intersection; nobody counts from the step on at which it was touched. 0 at the step of a

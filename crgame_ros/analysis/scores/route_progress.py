@@ -53,17 +53,17 @@ class ComparedRoute:
             self._blocks.append(_Block(lanelet, area, start))
 
     def __len__(self) -> int:
-        """Give the number of its parts."""
+        """Return the number of its parts."""
         return len(self._blocks)
 
     @property
     def lanelets(self) -> list[int]:
-        """Give its lanelets in driving order, one for each part."""
+        """Return its lanelets in driving order, one for each part."""
         return [block.lanelet for block in self._blocks]
 
     def progress(self, points: FloatArray) -> float:
         """
-        Give how far points (K, 2) in turn come along the route [m].
+        Return how far points (K, 2) in turn come along the route [m].
 
         A point counts where it is in the part of the one before, or in a later one; off the route
         nothing is gained.
@@ -84,7 +84,7 @@ class ComparedRoute:
         return 0.0 if last is None or first is None else last - first
 
     def way_to(self, point: FloatArray) -> float | None:
-        """Give where a point (2) is along the route; None beside it [m]."""
+        """Return where a point (2) is along the route; None beside it [m]."""
         for block in self._blocks:
             if shapely.intersects_xy(block.area, *point.tolist()):
                 return block.start + self._roads.locate(block.lanelet, *point.tolist())[0]
@@ -92,7 +92,7 @@ class ComparedRoute:
 
     def free_way(self, start: float, speed: float, duration_s: float, end: float) -> float:
         """
-        Give how far an unhindered vehicle comes at the speed limit [m].
+        Return how far an unhindered vehicle comes at the speed limit [m].
 
         It gains speed with `FREE_ACCELERATION` and loses it at once where a lower limit begins.
 
@@ -118,7 +118,7 @@ class ComparedRoute:
 
 
 def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
-    """Give the route that somebody took, by the poses (K, 3) of the centre."""
+    """Return the route that somebody took, by the poses (K, 3) of the centre."""
     if not roads.lanelet_ids:
         return ComparedRoute(roads, ())
     numbers = roads.lanelets_at(poses[np.isfinite(poses).all(axis=1)])
@@ -127,5 +127,5 @@ def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
 
 
 def progress_ratio(own: float, expert: float) -> float:
-    """Give the share of the expert's way that was driven, 0 to 1 (nuplan-devkit)."""
+    """Return the share of the expert's way that was driven, 0 to 1 (nuplan-devkit)."""
     return 0.0 if own < -NOISE else min(1.0, max(own, NOISE) / max(expert, NOISE))

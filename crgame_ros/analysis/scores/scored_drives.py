@@ -44,7 +44,7 @@ def score_drives(log: RunLog, *, expert: Expert | None = None,
 
 
 def first_ends(log: RunLog, put_back: Mapping[str, Sequence[int]]) -> dict[str, RunLog]:
-    """Give the run of each vehicle that was put back on its lane, up to just before that."""
+    """Return the run of each vehicle that was put back on its lane, up to just before that."""
     return {vehicle: log.until(min(ks)) for vehicle, ks in put_back.items()}
 
 

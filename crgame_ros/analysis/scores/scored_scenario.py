@@ -87,7 +87,7 @@ class ScoredScenario:
 
     def problem(self, number: int) -> PlanningProblem:
         """
-        Give a planning problem.
+        Return a planning problem.
 
         :raises InputError: if there is none of this number.
         """
@@ -104,7 +104,7 @@ class ScoredScenario:
         return ScenarioObstacles(self.loaded)
 
     def course(self, obstacle_id: int) -> FloatArray:
-        """Give the poses (n, 3) of an obstacle's centre from time step 0 on; NaN where absent."""
+        """Return the poses (n, 3) of an obstacle's centre from time step 0 on; NaN where absent."""
         column = self.obstacles.ids.index(f'o{obstacle_id}')
         poses = self.obstacles.poses[:, column]
         before = np.full((max(self.obstacles.first_k, 0), 3), np.nan)
@@ -112,7 +112,7 @@ class ScoredScenario:
 
     def without_own(self, numbers: Collection[int]) -> Scenario:
         """
-        Give the scenario without the vehicles that solve some problems.
+        Return the scenario without the vehicles that solve some problems.
 
         What comes later than time step 0 is a phantom obstacle in files, which the checker passes
         over; here it is an obstacle that begins later.

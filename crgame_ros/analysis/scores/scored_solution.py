@@ -110,7 +110,7 @@ def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
 
 def _has_rear_axles(found: PlanningProblemSolution, problem: PlanningProblem,
                     drive: ScoredDrive) -> bool:
-    """Tell whether a trajectory is feasible if its positions are of the rear axle."""
+    """Return whether a trajectory is feasible if its positions are of the rear axle."""
     if found.trajectory_type is not TrajectoryType.KS:
         return False
     moved = copy.deepcopy(found.trajectory.state_list)

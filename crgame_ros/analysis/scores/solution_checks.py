@@ -32,11 +32,11 @@ class SolutionChecks:
 
     @property
     def is_valid(self) -> bool:
-        """Tell whether all were passed."""
+        """Return whether all were passed."""
         return not self.failed
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {'valid': self.is_valid, 'failed': self.failed, 'passed': list(self.passed)}
 
 

@@ -58,7 +58,7 @@ def solution_name(solution: Solution, vehicle_id: str = '') -> str:
 
 
 def dated(solution: Solution, when: datetime | None) -> Solution:
-    """Give a solution the day and time at which it was made; None: without."""
+    """Return a solution the day and time at which it was made; None: without."""
     solution.date = None if when is None else when.replace(tzinfo=None, microsecond=0)
     return solution
 

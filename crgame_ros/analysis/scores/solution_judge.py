@@ -55,19 +55,19 @@ class SolutionJudge:
 
 
 def poses_of(states: list[TraceState]) -> FloatArray:
-    """Give the poses (K, 3) of the centre; a point mass is turned to where it moves."""
+    """Return the poses (K, 3) of the centre; a point mass is turned to where it moves."""
     return np.array([(*state.position, heading_of(state)) for state in states])
 
 
 def speeds_of(states: list[TraceState]) -> FloatArray:
-    """Give the speeds (K) of states; a point mass moves where it is turned to [m/s]."""
+    """Return the speeds (K) of states; a point mass moves where it is turned to [m/s]."""
     return np.array([np.hypot(state.velocity, state.velocity_y)
                      if getattr(state, 'orientation', None) is None else state.velocity
                      for state in states])
 
 
 def heading_of(state: TraceState) -> float:
-    """Give the direction of a state [rad]."""
+    """Return the direction of a state [rad]."""
     if getattr(state, 'orientation', None) is None:
         return float(np.arctan2(state.velocity_y, state.velocity))
     return float(state.orientation)

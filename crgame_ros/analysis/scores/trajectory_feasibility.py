@@ -61,7 +61,7 @@ class TrajectoryFeasibility:
     step_s: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {
             'feasible': self.feasible, 'first_step': self.first_step, 'reason': self.reason,
             'transitions': self.transitions, 'infeasible': self.infeasible,
@@ -145,7 +145,7 @@ def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, st
 def _apparently_made(start: FloatArray, end: FloatArray, dynamics: VehicleDynamics,
                      step_s: float) -> FloatArray | None:
     """
-    Give where the KS model comes with the inputs that speeds and steering angles ask for.
+    Return where the KS model comes with the inputs that speeds and steering angles ask for.
 
     :return: its state; None where it is not near, and better inputs have to be looked for.
     """
@@ -192,7 +192,7 @@ def _of_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
 def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
               dt_s: float) -> Trajectory:
     """
-    Give a solution's states: of inputs what the model makes of them, until one is beyond bounds.
+    Return a solution's states: of inputs what the model makes of them, until one is beyond bounds.
 
     :raises ValueError: if the model cannot be driven with them.
     """

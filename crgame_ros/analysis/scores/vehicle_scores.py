@@ -38,7 +38,7 @@ class VehicleScores:
     remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it."""
+        """Return it as JSON has it."""
         return {
             'vehicle': self.vehicle_id, 'role': self.role, 'planner': self.planner,
             **{name: None if part is None else part.as_dict() for name, part in (
@@ -47,7 +47,7 @@ class VehicleScores:
             'remarks': list(self.remarks)}
 
     def values(self) -> dict[str, float | None]:
-        """Give each score of `MEASURES`, of spreads the median; None where there is none."""
+        """Return each score of `MEASURES`, of spreads the median; None where there is none."""
         found: dict[str, float | None] = dict.fromkeys(MEASURES)
         if self.nuplan is not None:
             found |= {'nuplan_score': self.nuplan.score, **self.nuplan.multipliers,

@@ -42,7 +42,7 @@ class Column:
 
     @property
     def notes(self) -> dict[str, str]:
-        """Give what is said of it beside name and type, without what is empty."""
+        """Return what is said of it beside name and type, without what is empty."""
         given = {'unit': self.unit, 'description': self.definition,
                  'referencePoint': self.reference_point, 'variant': self.variant,
                  'emptyWhere': self.empty}

@@ -47,7 +47,7 @@ def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str)
 
 
 def table_schema(declaration: TableDeclaration) -> dict[str, Any]:
-    """Give the Table Schema of a table."""
+    """Return the Table Schema of a table."""
     schema: dict[str, Any] = {
         '$schema': PROFILE.format('tableschema'),
         'fields': [_field(column, column.name in declaration.key)

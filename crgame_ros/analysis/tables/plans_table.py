@@ -68,7 +68,7 @@ PLANS = TableDeclaration(
 
 def plan_rows(run: TabulatedRun) -> Iterator[dict[str, Any]]:
     """
-    Give the rows of a run, in pieces, and count the plans of each AV.
+    Yield the rows of a run, in pieces, and count the plans of each AV.
 
     :raises InputError: if the recording is damaged.
     """
@@ -109,7 +109,7 @@ def _row(run: TabulatedRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally)
 
 
 def _planned(run: TabulatedRun, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
-    """Give what is said of a plan's states."""
+    """Return what is said of a plan's states."""
     assert found.plan is not None
     log, states = run.record.log, found.plan.states.copy()
     states[:, :3] = av.transform.to_simulation(states[:, :3])

@@ -60,7 +60,7 @@ def tabulated_runs(paths: Sequence[Path], epoch: int | None,
 
 def own_id(name: str, taken: Iterable[str]) -> str:
     """
-    Give a run an id that no other has: folders in different places may be named alike.
+    Return a run an id that no other has: folders in different places may be named alike.
 
     :param taken: ids of the others.
     """

@@ -51,7 +51,7 @@ def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
 
 def tables_of(runs: Iterable[TabulatedRun]) -> dict[str, pa.Table]:
     """
-    Give the tables of runs, by name; memory is that of all of them.
+    Return the tables of runs, by name; memory is that of all of them.
 
     :param runs: ids must differ.
     :raises InputError: if a scenario cannot be used.

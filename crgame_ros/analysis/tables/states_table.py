@@ -85,7 +85,7 @@ STATES = TableDeclaration(
 def state_rows(run: TabulatedRun, progress: Callable[[float], object] = lambda _: None,
                ) -> Iterator[dict[str, Any]]:
     """
-    Give the rows of a run, in pieces: by time step, driven vehicles first.
+    Yield the rows of a run, in pieces: by time step, driven vehicles first.
 
     :param progress: is told how much has been given, 0 to 1.
     :raises InputError: if its scenario cannot be used.
@@ -117,7 +117,7 @@ class _StateRows:
         self._sizes = np.array([(item.shape.length, item.shape.width) for item in items])
 
     def rows(self, part: slice) -> dict[str, Any]:
-        """Give the columns of the steps in a part of the log."""
+        """Return the columns of the steps in a part of the log."""
         log = self._run.record.log
         states = log.vehicle_states[part]
         count = len(states)
@@ -153,7 +153,7 @@ class _StateRows:
         return found | self._lanes(poses, here)
 
     def _commands(self, part: slice, everybody: int) -> FloatArray:
-        """Give what led to each state (steps, everybody, 5), NaN where nothing did."""
+        """Return what led to each state (steps, everybody, 5), NaN where nothing did."""
         log, record = self._run.record.log, self._run.record
         found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
         wanted = self._run.steps_of(log.ks[part])
@@ -164,7 +164,7 @@ class _StateRows:
         return found
 
     def _lanes(self, poses: FloatArray, here: NDArray[np.bool_]) -> dict[str, Any]:
-        """Give lanelet, arc length and offset of all who are there."""
+        """Return lanelet, arc length and offset of all who are there."""
         avs = self._run.record.log.game.avs
         transforms = {item.id: item.transform for item in avs}
         on_road = poses.copy()
@@ -187,7 +187,7 @@ class _StateRows:
 
 
 def _consumed(commands: FloatArray) -> dict[str, Any]:
-    """Give the columns of what was consumed (R, 5)."""
+    """Return the columns of what was consumed (R, 5)."""
     # Being put back is an event (`events`).
     found: dict[str, Any] = {name: column for name, column in zip(
         COMMAND_COLUMNS, commands.T, strict=True) if name != 'put_back'}

@@ -52,7 +52,7 @@ class _Resource:
         self._schema = {name: _TYPES[field['type']] for name, field in self._fields.items()}
 
     def faults(self) -> Iterator[str]:
-        """Say what is wrong."""
+        """Yield what is wrong."""
         try:
             with self._path.open('rb') as stream:
                 digest = f'sha256:{hashlib.file_digest(stream, "sha256").hexdigest()}'

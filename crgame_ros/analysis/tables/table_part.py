@@ -32,7 +32,7 @@ def declare(name: str, row: str, key: tuple[str, ...],
 
 def part_rows(parts: Sequence[TablePart], run: TabulatedRun) -> dict[str, Any]:
     """
-    Give all columns of a run's rows.
+    Return all columns of a run's rows.
 
     :raises ValueError: if a part has other rows than the first, or a column of another part.
     """

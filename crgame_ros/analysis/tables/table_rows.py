@@ -61,7 +61,7 @@ class KeptTable(TableRows):
 
     @property
     def table(self) -> pa.Table:
-        """Give the table."""
+        """Return the table."""
         return pa.Table.from_batches(self._kept, self.declaration.schema).combine_chunks()
 
 
@@ -70,7 +70,7 @@ def _are_many(values: Any) -> bool:
 
 
 def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
-    """Give a column's values in its type; NaN becomes missing."""
+    """Return a column's values in its type; NaN becomes missing."""
     if values is None:
         return pa.nulls(rows, kind)
     if isinstance(values, pa.Array):
@@ -83,7 +83,7 @@ def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
 
 
 def _plain_text(value: Any) -> Any:
-    """Give text that every reader takes: no control characters but tabs and ends of lines."""
+    """Return text that every reader takes: no control characters but tabs and ends of lines."""
     if not isinstance(value, str) or value.isprintable():
         return value
     text = value.encode('utf-8', 'replace').decode('utf-8')

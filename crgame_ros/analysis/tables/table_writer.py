@@ -87,7 +87,7 @@ class TableWriter(TableRows):
 
 
 def _spelled(column: pa.Array) -> list[Any]:
-    """Give a column's values as CSV has them."""
+    """Return a column's values as CSV has them."""
     values: list[Any] = column.to_pylist()
     if column.type == NUMBER:
         # Full precision, and always with a point, an exponent or as inf: never an integer's look.

@@ -58,7 +58,7 @@ class TabulatedRun:
 
     @property
     def outcome(self) -> Mapping[str, Any] | None:
-        """Give plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        """Return plans, violations and contacts as `timing.json` has them; None: nobody knows."""
         return self.timing if self.offline is None else self.offline
 
     @cached_property
@@ -68,15 +68,15 @@ class TabulatedRun:
 
     @property
     def driven(self) -> tuple[DrivenVehicle, ...]:
-        """Give the driven vehicles, as the game has them, in the order of the log's."""
+        """Return the driven vehicles, as the game has them, in the order of the log's."""
         game = {item.id: item for item in self.record.log.game.vehicles}
         return tuple(game[item.id] for item in self.record.log.vehicles)
 
     def steps_of(self, ks: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Give the simulation steps n of scenario steps k."""
+        """Return the simulation steps n of scenario steps k."""
         scheduler = self.record.log.game.scheduler
         return np.asarray((ks - scheduler.k0) * scheduler.steps_per_tick)
 
     def times_s(self, ks: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Give the times of scenario steps k since the run's start, alike in all tables [s]."""
+        """Return the times of scenario steps k since the run's start, alike in all tables [s]."""
         return np.asarray(self.steps_of(ks) * self.record.log.game.scheduler.dt_s)

@@ -41,7 +41,7 @@ class PastRun:
 
     @property
     def name(self) -> str:
-        """Give what people call it: its session and, of a later run of that, its own folder."""
+        """Return what people call it: its session and, of a later run of that, its own folder."""
         return self.folder.relative_to(self.session.parent).as_posix()
 
     @property
@@ -61,7 +61,7 @@ class PastRun:
         return not (self.session / CLAIM).exists() or (self.folder / FINISHED_MARK).exists()
 
     def files(self) -> dict[str, Path]:
-        """Give its files by the names that pages know."""
+        """Return its files by the names that pages know."""
         return {path.relative_to(self.folder).as_posix(): path
                 for kind in RUN_FILES for found in sorted(self.folder.glob(kind))
                 for path in _plain_files(found)}
@@ -96,7 +96,7 @@ class RunArchive:
 
     def run(self, key: str) -> PastRun:
         """
-        Give a run by its id.
+        Return a run by its id.
 
         :raises InputError: if there is none.
         """
@@ -106,7 +106,7 @@ class RunArchive:
             raise InputError('there is no such run', 'id', 'load the page again') from None
 
     def listing(self) -> dict[str, Any]:
-        """Give the answer of /api/runs."""
+        """Return the answer of /api/runs."""
         return {'runs': [self._entry(run) for run in self.runs().values()]}
 
     def delete(self, key: str) -> str:
@@ -150,12 +150,12 @@ class RunArchive:
 
 
 def _is_run(folder: Path) -> bool:
-    """Tell whether this program has recorded a run there."""
+    """Return whether this program has recorded a run there."""
     return (folder / GAME).is_file() and (folder / 'bag').is_dir() and not folder.is_symlink()
 
 
 def _plain_files(path: Path) -> Iterator[Path]:
-    """Give a file, or those of a recording; nothing that leads elsewhere."""
+    """Yield a file, or those of a recording; nothing that leads elsewhere."""
     if path.is_symlink():
         return
     if path.is_file():

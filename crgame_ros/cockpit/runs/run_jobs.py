@@ -106,7 +106,7 @@ def _told(found: NuplanScore | None) -> dict[str, Any]:
 
 
 def _motion(log: RunLog, number: int) -> dict[str, Any]:
-    """Give how far and how fast a vehicle came [m, m/s]."""
+    """Return how far and how fast a vehicle came [m, m/s]."""
     states = log.vehicle_states[:, number]
     states = states[np.isfinite(states[:, 0])]
     ways = np.hypot(*np.diff(states[:, :2], axis=0).T)

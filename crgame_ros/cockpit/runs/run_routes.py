@@ -99,7 +99,7 @@ class RunRoutes:
         return web.json_response(await asyncio.to_thread(self._archive.listing))
 
     async def picture(self, request: web.Request) -> web.StreamResponse:
-        """Give how a run went, as a picture that is drawn once."""
+        """Return how a run went, as a picture that is drawn once."""
         run = await self._closed(request)
         path = run.folder / PICTURE
         if not path.is_file():
@@ -109,7 +109,7 @@ class RunRoutes:
             'Content-Security-Policy': _PICTURE, hdrs.CONTENT_TYPE: 'image/svg+xml'})
 
     async def score(self, request: web.Request) -> web.Response:
-        """Give how well everybody drove in a run."""
+        """Return how well everybody drove in a run."""
         run = await self._closed(request)
         if run.id not in self._scores:
             answer = await self._scorer.run('score', path=str(run.bag),

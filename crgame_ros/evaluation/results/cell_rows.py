@@ -65,7 +65,7 @@ TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
 
 
 def outcome_of(result: OfflineResult) -> dict[str, Any]:
-    """Give the columns of the cell's row that a run fills."""
+    """Return the columns of the cell's row that a run fills."""
     steps = len(result.vehicle_states) - 1
     return {'status': 'ok', 'simulated_s': steps * result.setup.scheduler.dt_s,
             'state_hash': result.state_hash, 'contacts': len(contacts_of(result)),
@@ -73,7 +73,7 @@ def outcome_of(result: OfflineResult) -> dict[str, Any]:
 
 
 def vehicle_rows(run: TabulatedRun, result: OfflineResult) -> list[dict[str, Any]]:
-    """Give the rows of a run's driven vehicles."""
+    """Return the rows of a run's driven vehicles."""
     columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
     ids = columns.pop('id')
     del columns['run']
@@ -91,5 +91,5 @@ def vehicle_rows(run: TabulatedRun, result: OfflineResult) -> list[dict[str, Any
 
 
 def _plain(value: Any) -> Any:
-    """Give a value as JSON has it."""
+    """Return a value as JSON has it."""
     return value.item() if hasattr(value, 'item') else value

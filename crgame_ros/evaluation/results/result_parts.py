@@ -105,7 +105,7 @@ class ResultParts:
         self._lock.close()
 
     def keys(self) -> Iterator[str]:
-        """Give the keys of all cells that are kept."""
+        """Yield the keys of all cells that are kept."""
         for path in sorted((self.folder / CELLS.name).glob('part-*.parquet')):
             yield from _column(path, 'cell')
         for rows in self._rows:
@@ -172,7 +172,7 @@ def _next_number(folder: Path) -> int:
 
 def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
     """
-    Give the rows that are only in a journal yet as a part of each table, as its file would be.
+    Return the rows that are only in a journal yet as a part of each table, as its file would be.
 
     :return: by the table's name; empty where there is no such row.
     """

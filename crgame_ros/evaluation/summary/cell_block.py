@@ -75,14 +75,14 @@ class CellBlocks:
         return [text for text in self.labels['planner'].texts if text]
 
     def clusters(self, block: CellBlock) -> IntArray:
-        """Give the number of each cell's scenario (N), or its game's where it names none."""
+        """Return the number of each cell's scenario (N), or its game's where it names none."""
         scenarios, games = (block.labels[:, TEXT_FACTORS.index(name)].astype(np.int64)
                             for name in ('scenario', 'game'))
         # The empty label is the first. Games below zero: the two are counted each for itself.
         return np.where(scenarios == 0, -1 - games, scenarios)
 
     def factors(self, block: CellBlock, row: int) -> tuple[str, ...]:
-        """Give the labels and the seed of a cell, in the order of `FACTORS`."""
+        """Return the labels and the seed of a cell, in the order of `FACTORS`."""
         texts = (self.labels[factor].texts[number] for factor, number in zip(
             TEXT_FACTORS, block.labels[row].tolist(), strict=True))
         return (*texts, str(block.seeds[row]))
@@ -132,7 +132,7 @@ def _told(rows: pa.RecordBatch) -> pa.RecordBatch:
 
 
 def _each_once(table: pa.Table) -> IntArray:
-    """Give the rows of a table of cells in the order of their keys, one of each."""
+    """Return the rows of a table of cells in the order of their keys, one of each."""
     order = pc.sort_indices(table, [(name, 'ascending') for name in table.column_names])
     keys = table['cell'].take(order)
     first = np.ones(len(keys), bool)
@@ -162,7 +162,7 @@ class CellGroups:
         self._numbers: dict[tuple[str, ...], int] = {}
 
     def of(self, block: CellBlock) -> IntArray:
-        """Give the number of each cell's group (N)."""
+        """Return the number of each cell's group (N)."""
         columns = [TEXT_FACTORS.index(factor) for factor in self._by]
         different, inverse = np.unique(block.labels[:, columns], axis=0, return_inverse=True)
         own = []

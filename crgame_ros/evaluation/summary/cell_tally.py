@@ -41,7 +41,7 @@ class CellTally:
 
     @property
     def scenarios(self) -> set[int]:
-        """Give the numbers of all scenarios."""
+        """Return the numbers of all scenarios."""
         return set().union(*(units.clusters for units in self.units.values()))
 
     def in_order(self, units: Mapping[int, DrawnUnits]) -> list[tuple[int, DrawnUnits]]:

@@ -89,7 +89,7 @@ def _together(batches: list[PartBatch]) -> PartBatch:
 
 
 def _wanted(batch: pa.RecordBatch, columns: Mapping[str, pa.DataType]) -> pa.RecordBatch:
-    """Give columns in the types in which they are wanted, empty where there are none."""
+    """Return columns in the types in which they are wanted, empty where there are none."""
     there = batch.schema.names
     return pa.RecordBatch.from_arrays(
         [batch[name].cast(kind) if name in there else pa.nulls(batch.num_rows, kind)

@@ -26,7 +26,7 @@ class FactorLabels:
 
     def numbers(self, column: pa.Array) -> NDArray[np.int32]:
         """
-        Give the numbers of a column's labels (N); an empty value is an empty label.
+        Return the numbers of a column's labels (N); an empty value is an empty label.
 
         :raises KeyError: if there is another label in it.
         """
@@ -36,12 +36,12 @@ class FactorLabels:
         return np.asarray(found.to_numpy(), np.int32)
 
     def digests(self, numbers: NDArray[np.int32]) -> NDArray[np.uint64]:
-        """Give what stands for the labels whichever others there are (N)."""
+        """Return what stands for the labels whichever others there are (N)."""
         return np.asarray(self._digests[numbers])
 
 
 def digest_of(text: str) -> int:
-    """Give 64 bits that stand for a text."""
+    """Return 64 bits that stand for a text."""
     content = text.encode('utf-8', 'surrogatepass')
     return int.from_bytes(hashlib.blake2b(content, digest_size=8).digest(), 'little')
 

@@ -47,7 +47,7 @@ class FailureReasons:
     def told(self, parts: EvaluatedParts,
              labels: Sequence[tuple[str, ...]]) -> tuple[FailureReason, ...]:
         """
-        Give the most frequent ones, and what is left in one of each status.
+        Return the most frequent ones, and what is left in one of each status.
 
         :param labels: of the groups, by number.
         :raises InputError: if a part cannot be read.

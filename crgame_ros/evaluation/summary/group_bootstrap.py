@@ -40,7 +40,7 @@ class DrawnUnits:
 
     @property
     def resampled(self) -> Literal['scenarios', 'cells']:
-        """Tell what is drawn."""
+        """Return what is drawn."""
         return 'scenarios' if len(self.clusters) >= FEWEST_SCENARIOS else 'cells'
 
 
@@ -95,7 +95,7 @@ class GroupBootstrap:
             self._draw(values, self._shares[:, block], self._random(block + 1))
 
     def estimates(self) -> tuple[Estimate, ...]:
-        """Give the mean and the interval of each measure."""
+        """Return the mean and the interval of each measure."""
         known = self._known
         if self._units.resampled == 'scenarios':
             values = np.array([sums for _, sums in sorted(self._clusters.items())])
@@ -133,7 +133,7 @@ def _ratios(sums: FloatArray, measures: int) -> FloatArray:
 
 
 def _percentiles(means: FloatArray) -> FloatArray:
-    """Give the lower and the upper bounds (2, measures); NaN where no resample has a value."""
+    """Return the lower and the upper bounds (2, measures); NaN where no resample has a value."""
     outside = (1.0 - CONFIDENCE) / 2.0
     found = np.full((2, means.shape[1]), np.nan)
     for column, values in enumerate(means.T):

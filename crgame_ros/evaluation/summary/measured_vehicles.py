@@ -81,7 +81,7 @@ def measured_vehicles(parts: EvaluatedParts, block: CellBlock,
 
 
 def _texts(column: pa.Array) -> NDArray[np.object_]:
-    """Give a column of texts (N), equal ones as one object."""
+    """Return a column of texts (N), equal ones as one object."""
     encoded = pc.fill_null(column, '').dictionary_encode()
     return np.array(encoded.dictionary.to_pylist(), object)[encoded.indices.to_numpy()]
 

@@ -34,7 +34,7 @@ class Estimate:
 
     @property
     def side(self) -> int:
-        """Give the side of zero on which the whole interval is; 0 where it is on both."""
+        """Return the side of zero on which the whole interval is; 0 where it is on both."""
         return 1 if self.low > 0.0 else -1 if self.high < 0.0 else 0
 
 
@@ -176,11 +176,11 @@ class Summary:
         return path if _KEY.fullmatch(key) and path.is_file() else None
 
     def report_command(self, key: str) -> str:
-        """Give the command that runs a cell again and writes its report."""
+        """Return the command that runs a cell again and writes its report."""
         return shlex.join(('crgame', 'evaluate', str(self.folder), '--cell', key))
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it: SI units, null for what is not known."""
+        """Return it as JSON has it: SI units, null for what is not known."""
         found = asdict(self)
         found['folder'] = str(self.folder)
         found['measures'] = {each.name: {'unit': each.unit, 'definition': each.definition}

@@ -69,5 +69,5 @@ def _plain(text: str) -> str:
 
 
 def relative(path: Path, folder: Path) -> str:
-    """Give the address of a file as pages in a folder link to it."""
+    """Return the address of a file as pages in a folder link to it."""
     return quote(Path(os.path.relpath(path, folder)).as_posix())

@@ -54,19 +54,19 @@ class SummaryMeasure(NamedTuple):
 
     @property
     def is_share(self) -> bool:
-        """Tell whether it is a share, from 0 to 1."""
+        """Return whether it is a share, from 0 to 1."""
         return bool(self.test) or not self.column
 
     @property
     def unit(self) -> str:
-        """Give the unit as tables write it; 1 of a share or a count."""
+        """Return the unit as tables write it; 1 of a share or a count."""
         if self.is_share or self.column not in _NUMERIC:
             return '1'
         return _NUMERIC[self.column].unit or '1'
 
     @property
     def definition(self) -> str:
-        """Say in a sentence what it is."""
+        """Return in a sentence what it is."""
         if self.what:
             return self.what
         column = _NUMERIC.get(self.column)
@@ -176,6 +176,6 @@ def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
 
 
 def _better(column: str) -> int:
-    """Tell which values of a column are better: those less critical, of criticality."""
+    """Return which values of a column are better: those less critical, of criticality."""
     measure = CRITICALITY.get(column.removeprefix('worst_'))
     return -measure.worst if measure is not None and column.startswith('worst_') else 0

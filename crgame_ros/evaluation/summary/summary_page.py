@@ -107,7 +107,7 @@ def _key(summary: Summary, key: str, folder: Path) -> str:
 
 
 def _commands(summary: Summary, content: SummaryTable) -> str:
-    """Give the commands that make the reports that are not there."""
+    """Return the commands that make the reports that are not there."""
     keys = dict.fromkeys(row[content.keys].text for row in content.rows)
     lines = [plain(summary.report_command(key)) for key in keys if summary.report(key) is None]
     if not lines:

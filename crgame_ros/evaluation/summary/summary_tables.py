@@ -70,7 +70,7 @@ def summary_title(summary: Summary) -> str:
 
 
 def summary_lead(summary: Summary) -> str:
-    """Say how much there is."""
+    """Return how much there is."""
     baseline = f', compared with {summary.baseline}' if summary.baseline else ''
     return (f'{summary.cells} cells finished, {summary.failed} of them failed; by '
             f'{" × ".join(summary.by)}: {len(summary.groups)}{baseline}; '
@@ -78,7 +78,7 @@ def summary_lead(summary: Summary) -> str:
 
 
 def summary_tables(summary: Summary) -> Iterator[SummaryTable]:
-    """Give the tables of a summary in their order."""
+    """Yield the tables of a summary in their order."""
     yield _means(summary)
     if summary.differences:
         yield _differences(summary)
@@ -94,7 +94,7 @@ def group_name(labels: Sequence[str]) -> str:
 
 
 def known_measures(summary: Summary) -> Iterator[tuple[int, SummaryMeasure]]:
-    """Give the measures of which something is known, with their places."""
+    """Yield the measures of which something is known, with their places."""
     for place, measure in enumerate(summary.measures):
         if any(group.estimates[place].n for group in summary.groups):
             yield place, measure
@@ -152,7 +152,7 @@ def _group(group: GroupMeans | PairedDifferences) -> str:
 
 
 def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterator[str]:
-    """Say what was drawn for intervals, and what they speak of."""
+    """Yield what was drawn for intervals, and what they speak of."""
     kinds: dict[str, list[str]] = {}
     for group in groups:
         kinds.setdefault(group.resampled, []).append(_group(group))

@@ -39,7 +39,7 @@ def _wrapped(text: str, indent: str) -> list[str]:
 
 
 def _reports(summary: Summary, table: SummaryTable) -> Iterator[str]:
-    """Say where the reports of single cells are, or how they are made."""
+    """Yield where the reports of single cells are, or how they are made."""
     keys = list(dict.fromkeys(row[table.keys].text for row in table.rows))
     there = [(key, path) for key in keys if (path := summary.report(key)) is not None]
     for _, path in there:
@@ -49,7 +49,7 @@ def _reports(summary: Summary, table: SummaryTable) -> Iterator[str]:
 
 
 def _rows(table: SummaryTable) -> Iterator[str]:
-    """Give the lines of a table; columns that do not fit stand below."""
+    """Yield the lines of a table; columns that do not fit stand below."""
     rows = [[_cut(text) for text in table.head],
             *([_cell(cell) for cell in row] for row in table.rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(table.head))]

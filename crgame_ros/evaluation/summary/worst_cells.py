@@ -50,5 +50,5 @@ class WorstCells:
         self._found = sorted(self._found, key=lambda each: each[:2])[:MOST_CELLS]
 
     def worst(self) -> tuple[WorstCell, ...]:
-        """Give the worst cells, the worst one first."""
+        """Return the worst cells, the worst one first."""
         return tuple(cell for _, _, cell in self._found)

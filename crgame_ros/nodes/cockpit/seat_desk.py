@@ -172,7 +172,7 @@ class SeatDesk:
 
     @property
     def cockpit_seats(self) -> list[str]:
-        """Give the seats that the game leaves to people at pages."""
+        """Return the seats that the game leaves to people at pages."""
         return [name for name, entry in self.table.seats.items()
                 if entry['driver'] == entry['source'] == COCKPIT]
 

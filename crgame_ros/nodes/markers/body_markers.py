@@ -163,7 +163,7 @@ def _box(header: Header, namespace: str, number: int, item: ObjectDescription,
 
 
 def _triangles(shape: Shape) -> FloatArray:
-    """Give the corners (3 n, 2) of triangles that fill a polygon, counter-clockwise."""
+    """Return the corners (3 n, 2) of triangles that fill a polygon, counter-clockwise."""
     polygon = shapely.make_valid(shapely.Polygon(shape.vertices))
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
     corners = [shapely.get_coordinates(shapely.orient_polygons(part))[:3] for part in parts]

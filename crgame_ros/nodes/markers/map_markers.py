@@ -71,7 +71,7 @@ def map_markers(loaded: LoadedScenario, problem_ids: Sequence[int] = ()) -> list
 
 
 def light_positions(network: LaneletNetwork) -> dict[int, FloatArray]:
-    """Give the place (x, y) of each traffic light: its own, or where its lane ends."""
+    """Return the place (x, y) of each traffic light: its own, or where its lane ends."""
     lights: list[TrafficLight] = network.traffic_lights
     found = {}
     for light in lights:
@@ -98,7 +98,7 @@ def _roads(network: LaneletNetwork) -> Iterator[Marker]:
 
 
 def _surface(lanelet: Lanelet) -> FloatArray:
-    """Give the corners (n, 2) of triangles between the bounds, counter-clockwise."""
+    """Return the corners (n, 2) of triangles between the bounds, counter-clockwise."""
     left, right = lanelet.left_vertices[:, :2], lanelet.right_vertices[:, :2]
     corners = np.stack((right[:-1], right[1:], left[:-1], right[1:], left[1:], left[:-1]), axis=1)
     return corners.reshape(-1, 2)
@@ -119,7 +119,7 @@ def _lane_lines(network: LaneletNetwork) -> Iterator[Marker]:
 
 
 def _bounds(network: LaneletNetwork) -> Iterator[tuple[FloatArray, str]]:
-    """Give each bound once: neighbours share theirs, and the one that knows its marking counts."""
+    """Yield each bound once: neighbours share theirs, and the one that knows its marking counts."""
     found: dict[bytes, tuple[FloatArray, str]] = {}
     for lanelet in network.lanelets:
         for vertices, marking in (

@@ -30,7 +30,7 @@ HEIGHT = 1.5
 
 
 def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
-    """Give a colour of the form #RRGGBB as a message."""
+    """Return a colour of the form #RRGGBB as a message."""
     red, green, blue = (int(code[place:place + 2], 16) / 255.0 for place in (1, 3, 5))
     return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
@@ -41,7 +41,7 @@ def body_colour(item: ObjectDescription) -> str:
 
 
 def body_height(item: ObjectDescription) -> float:
-    """Give the height of an object's box [m]."""
+    """Return the height of an object's box [m]."""
     return HEIGHTS.get(item.type, HEIGHT)
 
 
@@ -64,10 +64,10 @@ def blank(header: Header, namespace: str, number: int, kind: int, paint: ColorRG
 
 
 def map_header() -> Header:
-    """Give a header in frame map."""
+    """Return a header in frame map."""
     return Header(frame_id=MAP)
 
 
 def points(rows: Iterable[Iterable[float]], z: float) -> list[Point]:
-    """Give (x, y) points as messages, all at one height [m]."""
+    """Return (x, y) points as messages, all at one height [m]."""
     return [Point(x=x, y=y, z=z) for x, y in rows]

@@ -121,7 +121,7 @@ class SceneMarkers:
         self._paths[av_id].set_prediction(series)
 
     def message(self) -> MarkerArray:
-        """Give everything that moves or changes, at the time of the vehicles' states."""
+        """Return everything that moves or changes, at the time of the vehicles' states."""
         set_time(self._header.stamp, self._stamp_ns)
         self._place_objects()
         items: list[Item] = [*self._lights.values(), *self._bodies]
@@ -146,7 +146,7 @@ class SceneMarkers:
 
 
 def _speeds(objects: ObjectStates) -> FloatArray:
-    """Give signed speeds (M) [m/s]; NaN, which is never braking, where absent."""
+    """Return signed speeds (M) [m/s]; NaN, which is never braking, where absent."""
     yaw = objects.poses[:, 2]
     speeds: FloatArray = (objects.velocities[:, 0] * np.cos(yaw)
                           + objects.velocities[:, 1] * np.sin(yaw))
@@ -219,6 +219,6 @@ class AvPaths:
 
 
 def _edges(corners: FloatArray, pose: FloatArray) -> FloatArray:
-    """Give the ends (2 n, 2) of an outline's edges at a pose: x, y [m] and yaw [rad]."""
+    """Return the ends (2 n, 2) of an outline's edges at a pose: x, y [m] and yaw [rad]."""
     ends = placed(corners, pose)
     return np.stack((ends, np.roll(ends, -1, axis=0)), axis=1).reshape(-1, 2)

@@ -76,7 +76,7 @@ class LiveDiagnostics:
             *(partial(self._tell_seat, seat) for seat in self._inputs.seats.all)))
 
     def tell_next(self) -> bool:
-        """Tell what is next of the report, if there is anything left; tell whether there was."""
+        """Return what is next of the report, if there is anything left; tell whether there was."""
         if not self._waiting:
             return False
         self._waiting.popleft()()
@@ -109,7 +109,7 @@ class LiveDiagnostics:
 
 
 def _tracking(av: AutonomousVehicle) -> dict[str, object]:
-    """Give how far a tracked AV is from its route's lane and its plan, now and at worst."""
+    """Return how far a tracked AV is from its route's lane and its plan, now and at worst."""
     execution = av.execution
     if execution is None:
         return {}

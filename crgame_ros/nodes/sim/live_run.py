@@ -201,7 +201,7 @@ class LiveRun:
         self._reason = f'drivability of {vehicle_id}'
 
     def _answers(self, av_id: str, stamp_ns: int) -> bool:
-        """Tell whether a plan answers a request; others are refused, however many there are."""
+        """Return whether a plan answers a request; others are refused, however many there are."""
         reason = self.simulation.unasked_plan(av_id, stamp_ns)
         if reason is not None:
             self._diagnostics.refusal(av_id, reason)

@@ -16,7 +16,7 @@ class Outcome(Enum):
     STOPPED = auto()
 
     def reason(self, by_signal: bool) -> str:
-        """Say it in a word: duration, reset, stop, or signal."""
+        """Return it in a word: duration, reset, stop, or signal."""
         if self is Outcome.STOPPED:
             return SIGNAL if by_signal else 'stop'
         return 'duration' if self is Outcome.FINISHED else 'reset'

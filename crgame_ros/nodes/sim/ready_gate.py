@@ -30,7 +30,7 @@ class ReadyGate:
 
     def opens(self, now_ns: int, others_ready: bool) -> bool:
         """
-        Tell whether the run begins now.
+        Return whether the run begins now.
 
         :param now_ns: steady clock [ns]
         :param others_ready: whether planners, traffic and devices are.

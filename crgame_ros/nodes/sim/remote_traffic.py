@@ -42,12 +42,12 @@ class RemoteTraffic:
         self._waiting: dict[int, ObjectStates] = {}
 
     def wants(self, stamp_ns: int) -> bool:
-        """Tell whether states with such a stamp may be of use; those that are late are not."""
+        """Return whether states with such a stamp may be of use; those that are late are not."""
         n = self._scheduler.tick_of_stamp(stamp_ns)
         return n is not None and self._now <= self._scheduler.k(n) <= self._now + 2
 
     def states_for(self, k: int) -> tuple[ObjectStates, int]:
-        """Give the agents at tick k, and the tick of the latest states that have come."""
+        """Return the agents at tick k, and the tick of the latest states that have come."""
         self._now = k
         for series in self._take():
             self._keep(series, k)
@@ -60,7 +60,7 @@ class RemoteTraffic:
         return self._shown, self._k
 
     def is_ahead(self) -> bool:
-        """Tell whether the agents of the next tick have come."""
+        """Return whether the agents of the next tick have come."""
         for series in self._take():
             self._keep(series, self._k)
         return self._k + 1 in self._waiting

@@ -125,7 +125,7 @@ class SimInputs:
         return taken
 
     def frame_skip_order(self) -> bool | None:
-        """Give the supervisor's latest order to skip frames, None if there is no new one."""
+        """Return the supervisor's latest order to skip frames, None if there is no new one."""
         message = self._frame_skip.latest()
         return None if message is None else bool(message.data)
 
@@ -154,7 +154,7 @@ class SimInputs:
                 self._node.get_logger().warning(reason, throttle_duration_sec=1.0)
 
     def stop_request(self) -> tuple[str, str] | None:
-        """Give (vehicle, n) of a violation that asks for a stop, None if there is none."""
+        """Return (vehicle, n) of a violation that asks for a stop, None if there is none."""
         for vehicle_id, slot in self._drivability.items():
             while (message := slot.take()) is not None:
                 if from_time(message.header.stamp) < self._clock_offset_ns:

@@ -174,7 +174,7 @@ class SimOutputs:
         self._task_log.publish(String(data=log_document(self._epoch, result.tasks)))
 
     def shows_vehicles(self, simulation: Simulation) -> bool:
-        """Tell whether anybody is to see where the vehicles have moved to, each by itself."""
+        """Return whether anybody is to see where the vehicles have moved to, each by itself."""
         return not self.frames_skipped and any(item.wanted for item in self._vehicles) and (
             simulation.n % self.publish_every == 0 or simulation.scheduler.is_tick(simulation.n))
 
@@ -301,7 +301,7 @@ class SimOutputs:
         return found
 
     def _requests_as(self, name: str) -> dict[str, Publisher]:
-        """Give the publishers of requests that go out under a name."""
+        """Return the publishers of requests that go out under a name."""
         return {av: publisher for av, publisher in self._requests.items()
                 if self._request_topics[av] == name}
 
@@ -333,7 +333,7 @@ class SimOutputs:
 
 
 def _consumes(companion: str, consumers: Sequence[str], vehicle_id: str) -> bool:
-    """Tell whether a node, named after its executable and vehicle, consumes a topic."""
+    """Return whether a node, named after its executable and vehicle, consumes a topic."""
     stem, _, vehicle = companion.partition('_node_')
     executable = f'{stem}_node' if vehicle else companion
     return executable in consumers and (

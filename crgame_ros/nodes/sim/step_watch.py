@@ -95,7 +95,7 @@ class StepWatch:
     def explain(self, due_ns: int, late_s: float, factor: float
                 ) -> tuple[Causes, Phase | None]:
         """
-        Tell why a cycle is late whose first phase was marked last, and forget the one before.
+        Return why a cycle is late whose first phase was marked last, and forget the one before.
 
         :param due_ns: when it should have begun, on the monotonic clock [ns]
         :param late_s: its step error e_n, on the run's time line [s]
@@ -118,7 +118,7 @@ class StepWatch:
         return Causes(*(time_ns / NS_PER_S * factor for time_ns in causes)), longest_phase(uses)
 
     def _uses(self, due_ns: int) -> list[PhaseUse]:
-        """Give the phases of the cycle before."""
+        """Return the phases of the cycle before."""
         counts = [counts_of(raw) for raw in self._counts]
         asleep_ns = self._asleep_ns(counts)
         uses = []
@@ -143,7 +143,7 @@ class StepWatch:
 
     def _asleep_ns(self, counts: Sequence[ThreadCounts]) -> int:
         """
-        Tell how long the thread slept outside of its wait [ns].
+        Return how long the thread slept outside of its wait [ns].
 
         Its processor time is exact when it was put on a processor: after the wait before this
         cycle, and after the wait in it, unless there was no time for one.

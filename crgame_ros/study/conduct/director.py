@@ -57,7 +57,7 @@ class Director:
 
     @property
     def time_s(self) -> float:
-        """Give the run's clock [s]."""
+        """Return the run's clock [s]."""
         offset_ns = 0 if self.game is None else self.game.scheduler.clock_offset_ns
         return max(0, self._stamp_ns - offset_ns) / NS_PER_S
 

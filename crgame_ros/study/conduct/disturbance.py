@@ -31,7 +31,7 @@ class Disturbance:
 
     def look(self, lost: bool) -> str | None:
         """
-        Say why the drive does not count, None while it does.
+        Return why the drive does not count, None while it does.
 
         :param lost: whether nobody holds the participant's seat now.
         """

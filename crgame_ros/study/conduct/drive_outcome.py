@@ -15,7 +15,7 @@ _CUT_SHORT = {'stop': 'somebody stopped the run', RESET: 'somebody began the run
 
 def cut_short(reason: str) -> str:
     """
-    Say why a run is no whole drive; empty if it is one.
+    Return why a run is no whole drive; empty if it is one.
 
     :param reason: with which it ended, as sim_node gives it.
     """
@@ -26,7 +26,7 @@ def cut_short(reason: str) -> str:
 
 def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
     """
-    Tell what became of a drive.
+    Return what became of a drive.
 
     :param status: at its end, which was not cut short.
     :param seat: vehicle of the participant.
@@ -45,7 +45,7 @@ def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any
 
 
 def clean_s(status: RunStatus, seat: str, end_time_s: float) -> float:
-    """Give the longest time of a drive without a contact or leaving the road [s]."""
+    """Return the longest time of a drive without a contact or leaving the road [s]."""
     contacts, departures = _times(status, seat)
     times = [0.0, *sorted((*contacts, *departures)), end_time_s]
     return max(later - sooner for sooner, later in zip(times, times[1:], strict=False))

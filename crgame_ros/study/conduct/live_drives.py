@@ -132,7 +132,7 @@ class LiveDrives:
         return self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
     def _next(self) -> SessionItem | None:
-        """Give what is driven next, however much is asked before it."""
+        """Return what is driven next, however much is asked before it."""
         if self._session.next_item is None:
             return None
         done = self._session.done

@@ -16,7 +16,7 @@ from crgame_ros.whole_file import write_whole
 
 
 def settings_of(item: SessionItem) -> TrialSettings | None:
-    """Give the settings of an item that is driven; None of others."""
+    """Return the settings of an item that is driven; None of others."""
     if isinstance(item.what, PlannedTrial):
         return item.what.condition.settings
     return item.what.settings if isinstance(item.what, PracticeDrives) else None
@@ -40,7 +40,7 @@ class StudyDrive:
 
     def link(self, cockpit: str, language: str, key: str) -> str:
         """
-        Give the address of the cockpit's page as the participant sees it.
+        Return the address of the cockpit's page as the participant sees it.
 
         :param key: by which the cockpit knows the participant again, in whatever browser.
         """

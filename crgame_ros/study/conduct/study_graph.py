@@ -48,7 +48,7 @@ class StudyGraph:
 
     @property
     def pid(self) -> int:
-        """Give the process id of the launcher."""
+        """Return the process id of the launcher."""
         return self._process.pid
 
     @property
@@ -74,7 +74,7 @@ class StudyGraph:
                 self.cockpit = address.strip()
 
     def last_words(self) -> str:
-        """Give its last line that tells of an error, or its last one."""
+        """Return its last line that tells of an error, or its last one."""
         lines = [line for line in self._log.read_text('utf-8', 'replace').splitlines()
                  if line.strip()]
         errors = [line for line in lines if 'error' in line.lower() or ' died ' in line]

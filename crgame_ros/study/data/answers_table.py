@@ -41,7 +41,7 @@ ANSWERS = TableDeclaration('answers', 'a question that was put', (
 
 
 def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[dict[str, Any]]:
-    """Give the rows of a participant: each item's last answers."""
+    """Yield the rows of a participant: each item's last answers."""
     for answered in record.answered:
         scale = asked.of(answered.item)
         times = _times(record, answered)
@@ -58,7 +58,7 @@ def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[di
 
 
 def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, Any]:
-    """Tell when an item was shown, and of the run before it."""
+    """Return when an item was shown, and of the run before it."""
     run = answered.after
     folder = None if run is None else run.folder
     return {'shown_s': answered.told.get('shown_at'), 'taken_s': answered.told.get('taken_s'),

@@ -40,7 +40,7 @@ class AskedScale:
                 *score_columns(self.scale, self.prefix)]
 
     def values(self, answers: Mapping[str, Any]) -> dict[str, Any]:
-        """Give the values of its columns."""
+        """Return the values of its columns."""
         return {**{f'{self.prefix}{question.name}': plain_answer(answers.get(question.name))
                    for question in self.scale.questions},
                 **{f'{self.prefix}{name}': value
@@ -75,16 +75,16 @@ class AskedQuestions:
             self._by_item[item.id] = known.setdefault(prefix, AskedScale(prefix, scale))
 
     def of(self, item: SessionItem) -> AskedScale | None:
-        """Give the questionnaire of an item; None where none is."""
+        """Return the questionnaire of an item; None where none is."""
         return self._by_item.get(item.id)
 
     def scales(self) -> list[Questionnaire]:
-        """Give each questionnaire once."""
+        """Return each questionnaire once."""
         return list({asked.scale.name: asked.scale for asked in self._by_item.values()}.values())
 
 
 def plain_answer(answer: Any) -> Any:
-    """Give an answer as a table's cell: several choices as a JSON array."""
+    """Return an answer as a table's cell: several choices as a JSON array."""
     return json.dumps(answer, ensure_ascii=False) if isinstance(answer, list) else answer
 
 
@@ -94,7 +94,7 @@ def _place(item: str) -> str:
 
 
 def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]:
-    """Give the items with questionnaires, and how often each was asked there before."""
+    """Yield the items with questionnaires, and how often each was asked there before."""
     seen: dict[tuple[str, str], int] = {}
     for item in session_of(study, 0):
         if isinstance(item.what, Questions):
@@ -104,6 +104,6 @@ def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]
 
 
 def trials_by_number(items: Mapping[str, SessionItem]) -> dict[int, PlannedTrial]:
-    """Give the trials of a session by their numbers."""
+    """Return the trials of a session by their numbers."""
     return {item.what.number: item.what for item in items.values()
             if isinstance(item.what, PlannedTrial)}

@@ -90,7 +90,7 @@ def escaped(value: Any) -> str:
 
 def _events(record: ParticipantRecord,
             rows: Sequence[Mapping[str, Any]]) -> Iterator[list[Any]]:
-    """Give the rows: a driven trial with its duration, everything else as a moment."""
+    """Yield the rows: a driven trial with its duration, everything else as a moment."""
     ends = {(each.item, each.attempt): each for each in record.attempts}
     for row in rows:
         attempt = ends.get((row['item'], row['attempt']))
@@ -134,7 +134,7 @@ def _described(column: Column) -> dict[str, Any]:
 
 
 def _label(text: str) -> str:
-    """Give a label as BIDS has them: letters and digits."""
+    """Return a label as BIDS has them: letters and digits."""
     return re.sub(r'[^A-Za-z0-9]', '', text)
 
 

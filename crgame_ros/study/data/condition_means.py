@@ -80,7 +80,7 @@ def condition_means(values: Mapping[tuple[str, str], float],
 
 def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
     """
-    Give half of the widths of the 95 % intervals within participants.
+    Return half of the widths of the 95 % intervals within participants.
 
     :param table: (N, C) of N >= 2 participants in C >= 2 conditions, without gaps.
     :return: (C)

@@ -43,7 +43,7 @@ class ShownMeasure(NamedTuple):
 
 def shown_measures(data: StudyData, conditions: Sequence[str],
                    blocks: Sequence[str]) -> list[ShownMeasure]:
-    """Give the scores and measures of which some blocks have any value, with their means."""
+    """Return the scores and measures of which some blocks have any value, with their means."""
     measures = measure_columns()
     columns = [(_SCORES, column) for column in _scored(data)]
     columns += [(_DRIVING, measures[name]) for name in SHOWN if name in measures]
@@ -72,7 +72,7 @@ def condition_section(data: StudyData) -> str:
 
 
 def interval_note(means: Sequence[ConditionMeans]) -> str:
-    """Say which intervals these are, and of whom."""
+    """Return which intervals these are, and of whom."""
     if not means:
         return ''
     within = [each for each in means if each.within]
@@ -128,7 +128,7 @@ def _figure(shown: ShownMeasure) -> str:
 
 
 def _differs(means: ConditionMeans) -> bool:
-    """Tell whether there is anything to see in a picture."""
+    """Return whether there is anything to see in a picture."""
     return len({value for each in means.conditions for value in each.points.values()}) > 1
 
 
@@ -141,7 +141,7 @@ def _digits(value: float) -> int:
 
 
 def _scored(data: StudyData) -> list[Column]:
-    """Give the columns of scores; without scores those of the answers that are numbers."""
+    """Return the columns of scores; without scores those of the answers that are numbers."""
     columns: list[Column] = []
     language = data.folder.study.language
     for asked in data.asked.after_trials.values():

@@ -31,7 +31,7 @@ class ConductedStudy:
 
     @property
     def data(self) -> Path:
-        """Give the folder of what has been found."""
+        """Return the folder of what has been found."""
         return self.path / DATA
 
     def participants(self) -> list[ParticipantRecord]:

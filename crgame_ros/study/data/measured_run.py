@@ -46,7 +46,7 @@ class MeasuredRun:
         return pq.read_table(self.folder / f'{name}.parquet')
 
     def row(self, name: str, **equal: Any) -> dict[str, Any]:
-        """Give the first row of a table with such values; empty without one."""
+        """Return the first row of a table with such values; empty without one."""
         for row in self.table(name).to_pylist():
             if all(row[column] == value for column, value in equal.items()):
                 return dict(row)
@@ -67,7 +67,7 @@ class MeasuredRuns:
     def measured(self, run: Path, name: str,
                  progress: Callable[[str, float], object]) -> MeasuredRun:
         """
-        Give a run's tables; they are computed if nobody has before.
+        Return a run's tables; they are computed if nobody has before.
 
         :param run: folder of the run, complete.
         :param name: of it in the tables.

@@ -20,7 +20,7 @@ _GEOMETRY = (('view_across_deg', 'Angle across the picture', '°'),
 
 
 def paper_section(data: StudyData) -> str:
-    """Say which software and machine, delays, views, reference points and questionnaires."""
+    """Return which software and machine, delays, views, reference points and questionnaires."""
     told = provenance_of(data)
     html = note('The same stands in <code>provenance.json</code>, with the SHA-256 of every file '
                 'of the study, and the definition of every column in '

@@ -43,7 +43,7 @@ class TrialAttempt:
     told: Mapping[str, Any] | None = None
 
     def says(self, key: str) -> Any:
-        """Give what the entry of its end says under a key; None if nothing."""
+        """Return what the entry of its end says under a key; None if nothing."""
         return None if self.told is None else self.told.get(key)
 
 
@@ -88,13 +88,13 @@ class ParticipantRecord:
 
     @cached_property
     def attempts(self) -> tuple[TrialAttempt, ...]:
-        """Give all attempts at trials, in their order."""
+        """Return all attempts at trials, in their order."""
         return tuple(self._attempts())
 
     @cached_property
     def counted(self) -> dict[str, TrialAttempt]:
         """
-        Give the attempts that count, by item: the last that finished.
+        Return the attempts that count, by item: the last that finished.
 
         One that was left out in the end does not count, whatever was driven of it before.
         """
@@ -119,7 +119,7 @@ class ParticipantRecord:
 
     @cached_property
     def answered(self) -> tuple[AnsweredItem, ...]:
-        """Give what was answered, each item's last answers, in the order of the session."""
+        """Return what was answered, each item's last answers, in the order of the session."""
         found: dict[str, AnsweredItem] = {}
         driven: dict[int, int] = {}
         ended: dict[int, TrialAttempt | None] = {}
@@ -141,12 +141,12 @@ class ParticipantRecord:
 
     @property
     def begun_at(self) -> float:
-        """Give when the session began [s since 1970]."""
+        """Return when the session began [s since 1970]."""
         return float(self.entries[0]['at'])
 
     @property
     def software(self) -> list[dict[str, Any]]:
-        """Tell with which programs the session was run, each once, in their order."""
+        """Return with which programs the session was run, each once, in their order."""
         found: list[dict[str, Any]] = []
         for entry in self.entries:
             if entry['entry'] == SessionEvent.OPENED and entry.get('software') not in (
@@ -156,12 +156,12 @@ class ParticipantRecord:
 
     @property
     def ended_at(self) -> float:
-        """Give when the last entry was made [s since 1970]."""
+        """Return when the last entry was made [s since 1970]."""
         return float(self.entries[-1]['at'])
 
     @property
     def complete(self) -> bool:
-        """Tell whether every item is finished or left out."""
+        """Return whether every item is finished or left out."""
         done: set[str] = set()
         for entry in self.entries:
             if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
@@ -172,7 +172,7 @@ class ParticipantRecord:
 
     @property
     def language(self) -> str | None:
-        """Give the language that the participant chose last; None where nobody told."""
+        """Return the language that the participant chose last; None where nobody told."""
         return next((entry['language'] for entry in reversed(self.entries)
                      if isinstance(entry.get('language'), str)), None)
 
@@ -204,7 +204,7 @@ class ParticipantRecord:
             yield openly
 
     def _run(self, entry: Mapping[str, Any]) -> Path | None:
-        """Give the folder of a recording, if it is one of the participant's."""
+        """Return the folder of a recording, if it is one of the participant's."""
         name = entry.get('run')
         if not isinstance(name, str) or not name or '..' in Path(name).parts \
                 or Path(name).is_absolute():

@@ -52,11 +52,11 @@ class ParticipantsTable:
 
     @property
     def fields(self) -> list[Column]:
-        """Give the columns of what is asked of each participant first."""
+        """Return the columns of what is asked of each participant first."""
         return list(self._fields.values())
 
     def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, Any]:
-        """Give a participant's row."""
+        """Return a participant's row."""
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
                 if isinstance(entry.get('run'), str) and entry['run']}
         row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,

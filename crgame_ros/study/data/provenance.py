@@ -21,7 +21,7 @@ _VIEWS = ('view_across_deg', 'screen_width_m', 'eye_distance_m', 'view_rate_hz')
 
 def provenance_of(data: StudyData) -> dict[str, Any]:
     """
-    Tell where the data come from: nothing in it changes while the data do not.
+    Return where the data come from: nothing in it changes while the data do not.
 
     :raises InputError: if a file of the study cannot be read.
     """
@@ -55,7 +55,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
 
 
 def spread(values: list[float | None]) -> dict[str, float] | None:
-    """Give least, median and greatest of what is known; None where nothing is."""
+    """Return least, median and greatest of what is known; None where nothing is."""
     known = [value for value in values if value is not None]
     return {'min': min(known), 'median': statistics.median(known), 'max': max(known),
             'of': len(known)} if known else None
@@ -70,7 +70,7 @@ def _digest(path: Path) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Give values as JSON has them."""
+    """Return values as JSON has them."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

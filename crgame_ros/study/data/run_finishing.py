@@ -13,7 +13,7 @@ from crgame_ros.study.session_journal import JOURNAL
 
 
 def session_goes_on(participant: Path) -> bool:
-    """Tell whether a process has a participant's session open."""
+    """Return whether a process has a participant's session open."""
     try:
         with (participant / JOURNAL).open('rb') as stream:
             # Shared and let go of at once: who opens the session now is not refused.

@@ -82,7 +82,7 @@ def _add(trial: CountedTrial, name: str, writer: TableWriter) -> None:
 
 
 def _earlier(out: Path, made_of: list[list[Any]]) -> dict[str, int] | None:
-    """Give the rows of tables that are there already, made of the same runs; else None."""
+    """Return the rows of tables that are there already, made of the same runs; else None."""
     try:
         package = json.loads(read_text(out / PACKAGE_FILE, 'data dictionary'))
         if package[MADE_OF] != made_of:

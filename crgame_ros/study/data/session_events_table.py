@@ -48,7 +48,7 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
 def event_rows(record: ParticipantRecord,
                runs: Mapping[str, MeasuredRun]) -> list[dict[str, Any]]:
     """
-    Give everything that happened in a participant's session.
+    Return everything that happened in a participant's session.
 
     :param runs: measures of the trials that count, by item.
     """
@@ -120,7 +120,7 @@ def _of_run(attempt: TrialAttempt, run: MeasuredRun,
 
 
 def drive_start_s(attempt: TrialAttempt) -> float:
-    """Give when the run's clock began [s since 1970]."""
+    """Return when the run's clock began [s since 1970]."""
     told = attempt.says('start_at')
     return float(told) if isinstance(told, int | float) and told else attempt.started_at
 

@@ -26,13 +26,13 @@ def with_unit(column: Column, prefix: str = '') -> Column:
 
 
 def plain_name(name: str) -> str:
-    """Give a name as columns have it: small letters, digits and _."""
+    """Return a name as columns have it: small letters, digits and _."""
     return re.sub(r'[^a-z0-9]+', '_', name.lower()).strip('_')
 
 
 def unlike(name: str, taken: Iterable[str], ending: str = '') -> str:
     """
-    Give a name that no other column has.
+    Return a name that no other column has.
 
     :param taken: names of the others.
     :param ending: that is tried before numbers.

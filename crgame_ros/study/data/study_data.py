@@ -69,13 +69,13 @@ class StudyData:
 
     @property
     def declarations(self) -> tuple[TableDeclaration, ...]:
-        """Give the declarations of the tables, in their order."""
+        """Return the declarations of the tables, in their order."""
         return (self.trials_table.declaration, self.people_table.declaration, ANSWERS,
                 EVENTS_OF_SESSIONS)
 
     @property
     def problems(self) -> list[str]:
-        """Say which trials have no measures, and why."""
+        """Return which trials have no measures, and why."""
         return [f'{each.record.id}, trial {each.attempt.trial.number}: {each.row["problem"]}'
                 for each in self.trials if each.row['problem']]
 

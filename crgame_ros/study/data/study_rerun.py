@@ -83,7 +83,7 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
 
 
 def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
-    """Tell whether everything that a person did in a trial is known; say why not."""
+    """Return whether everything that a person did in a trial is known; say why not."""
     reason = trial.row['problem']
     if trial.run is not None and not trial.run.summary['humans']:
         reason = 'nobody drove in it'

@@ -61,7 +61,7 @@ def _value(value: Any, kind: pa.DataType) -> Any:
 
 
 def _spelled(column: pa.ChunkedArray) -> list[Any]:
-    """Give a column's values as the tables of `crgame export` have them in CSV."""
+    """Return a column's values as the tables of `crgame export` have them in CSV."""
     values: list[Any] = column.to_pylist()
     if column.type == NUMBER:
         return [NOT_A_NUMBER if value is None else value for value in values]

@@ -28,7 +28,7 @@ class TimingBounds:
     input_delay_s: float = 0.1
 
     def as_dict(self) -> dict[str, float]:
-        """Say them as JSON does."""
+        """Return them as JSON does."""
         return asdict(self)
 
 
@@ -45,7 +45,7 @@ _WORDS = {
 
 def timing_faults(row: Mapping[str, Any], bounds: TimingBounds = BOUNDS) -> list[str]:
     """
-    Say what of a trial's timing is beyond the bounds, one text each; none if all is within.
+    Return what of a trial's timing is beyond the bounds, one text each; none if all is within.
 
     :param row: values by the bounds' names; what is missing is not judged.
     """
@@ -63,7 +63,7 @@ def timing_faults(row: Mapping[str, Any], bounds: TimingBounds = BOUNDS) -> list
 
 
 def bounds_told(bounds: TimingBounds = BOUNDS) -> list[tuple[str, str]]:
-    """Give each bound for people: what of, and how much."""
+    """Return each bound for people: what of, and how much."""
     return [(words, f'{"at least" if name == "real_time_ratio_final" else "at most"} '
                     f'{factor * getattr(bounds, name):g}{f" {unit}" if unit else ""}')
             for name, (words, unit, factor, _) in _WORDS.items()]

@@ -25,7 +25,7 @@ TASK_COLUMNS = (
 def task_values(scores: Sequence[Mapping[str, Any]],
                 requests: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """
-    Give the values of the columns.
+    Return the values of the columns.
 
     :param scores: rows of the table `detection_scores` of the trial's run.
     :param requests: likewise of `take_over_requests`.

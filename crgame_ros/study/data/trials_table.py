@@ -93,7 +93,7 @@ _PLANNING = ('plan', 'fallbacks', 'latency', 'requests', 'skipped', 'timed_out',
 
 
 def measure_columns() -> dict[str, Column]:
-    """Give the measures of the participant's vehicle, by their names in the table `vehicles`."""
+    """Return the measures of the participant's vehicle, by their names in the table `vehicles`."""
     return {column.name: with_unit(column) for column in VEHICLES.columns
             if column.name not in _LEFT_OUT and not column.name.startswith(_PLANNING)
             and column.type in (NUMBER, INTEGER, FLAG)
@@ -133,7 +133,7 @@ class TrialsTable:
     def row(self, record: ParticipantRecord, attempt: TrialAttempt, run: MeasuredRun | None,
             problem: str) -> dict[str, Any]:
         """
-        Give the row of a trial.
+        Return the row of a trial.
 
         :param run: its measures; None where there are none.
         :param problem: why there are none.
@@ -228,7 +228,7 @@ def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, An
 
 def _apart(columns: list[Column], taken: set[str]) -> list[Column]:
     """
-    Give the columns of questions.
+    Return the columns of questions.
 
     :raises InputError: if one of them is called like another column.
     """

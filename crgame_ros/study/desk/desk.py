@@ -47,27 +47,27 @@ class Desk:
 
     @property
     def language(self) -> str:
-        """Give the language of the participant's page."""
+        """Return the language of the participant's page."""
         return self.session.language or self.session.study.language
 
     @property
     def asks_language(self) -> bool:
-        """Tell whether the participant has to choose a language first."""
+        """Return whether the participant has to choose a language first."""
         return self.session.language is None and len(self.session.study.all_languages) > 1
 
     @property
     def is_driving(self) -> bool:
-        """Tell whether a drive is under way, from its countdown until it is recorded."""
+        """Return whether a drive is under way, from its countdown until it is recorded."""
         return self.drives.state.phase in UNDER_WAY
 
     @property
     def can_abort(self) -> bool:
-        """Tell whether a drive is under way that has not ended by itself."""
+        """Return whether a drive is under way that has not ended by itself."""
         return self.is_driving and self.drives.state.phase != DrivePhase.ENDED
 
     @property
     def waits(self) -> bool:
-        """Tell whether the experimenter holds the session before its present item."""
+        """Return whether the experimenter holds the session before its present item."""
         held_at, item = self.session.held_at, self.session.next_item
         if held_at is None or item is None or self.is_driving:
             return False
@@ -75,7 +75,7 @@ class Desk:
 
     @property
     def break_left_s(self) -> float:
-        """Give how long the present break lasts at least [s]; 0 where there is none."""
+        """Return how long the present break lasts at least [s]; 0 where there is none."""
         item = self.session.next_item
         if item is None or not isinstance(item.what, Break):
             return 0.0
@@ -180,7 +180,7 @@ class Desk:
         self._moved()
 
     def moment(self) -> dict[str, Any]:
-        """Give the run and its clock [s]; None between drives."""
+        """Return the run and its clock [s]; None between drives."""
         state = self.drives.state
         run = next((entry.get('run', '') for entry in reversed(self.session.journal.entries)
                     if entry['entry'] == SessionEvent.STARTED and entry['item'] == state.item),
@@ -224,5 +224,5 @@ class Desk:
 
 
 def is_driven(item: SessionItem) -> bool:
-    """Tell whether an item is a drive, or several."""
+    """Return whether an item is a drive, or several."""
     return isinstance(item.what, PlannedTrial | PracticeDrives)

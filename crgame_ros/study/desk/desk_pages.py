@@ -61,12 +61,12 @@ class DeskPages:
 
     @property
     def clients(self) -> list[Client]:
-        """Give all pages."""
+        """Return all pages."""
         return [*self._participants, *self._experimenters]
 
     @property
     def page(self) -> dict[str, Any]:
-        """Give what is known of the participant's page: connected, delays [ms], seat."""
+        """Return what is known of the participant's page: connected, delays [ms], seat."""
         return {'connected': self._used is not None, 'open': len(self._participants),
                 **self._told}
 
@@ -80,7 +80,7 @@ class DeskPages:
 
     @property
     def is_due(self) -> bool:
-        """Tell whether something has changed since the experimenter's pages were told."""
+        """Return whether something has changed since the experimenter's pages were told."""
         return self._is_due
 
     def participant_says(self, client: Client, message: Mapping[str, Any]) -> None:

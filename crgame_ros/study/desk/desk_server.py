@@ -196,7 +196,7 @@ def _frames(request: web.Request, desk: Desk) -> str:
 
 
 def _telling(pages: DeskPages) -> Callable[[web.Application], AsyncIterator[None]]:
-    """Tell experimenters what has changed, some times a second, and drop who never reads."""
+    """Yield experimenters what has changed, some times a second, and drop who never reads."""
     async def tell() -> None:
         loop = asyncio.get_running_loop()
         checked_s = loop.time()

@@ -63,7 +63,7 @@ def _items(desk: Desk) -> list[dict[str, Any]]:
 
 
 def kind_of(item: SessionItem) -> str:
-    """Say in a few words what an item is."""
+    """Return in a few words what an item is."""
     what = item.what
     if isinstance(what, PlannedTrial):
         return f'drive {what.number}'
@@ -81,7 +81,7 @@ def kind_of(item: SessionItem) -> str:
 
 
 def _log(desk: Desk) -> list[dict[str, Any]]:
-    """Give the last entries of the journal, without answers: the file has them."""
+    """Return the last entries of the journal, without answers: the file has them."""
     return [{name: value[:LONGEST] if isinstance(value, str) else value
              for name, value in entry.items()
              if name not in ('answers', 'items', 'after_s') and not isinstance(value, dict)}

@@ -129,7 +129,7 @@ def _link(node: SyntaxTreeNode) -> Node:
 
 
 def _source(given: str) -> str:
-    """Give the name of a picture beside the page; empty for one from elsewhere."""
+    """Return the name of a picture beside the page; empty for one from elsewhere."""
     parts = urlsplit(given)
     name = unquote(parts.path)
     return '' if parts.scheme or parts.netloc or name.startswith('/') \

@@ -15,7 +15,7 @@ STANDARD = 'en'
 
 def words_of(study: StudyFile, language: str) -> dict[str, str]:
     """
-    Give the words in a language; English ones where it has none.
+    Return the words in a language; English ones where it has none.
 
     :param study: `words.fr.yaml` beside its file is that for French, or goes before ours.
     :return: by their key.

@@ -49,7 +49,7 @@ def participant_document(desk: Desk) -> dict[str, Any]:
 
 
 def how_over(desk: Desk) -> str:
-    """Say how a session is over: done, declined or ended."""
+    """Return how a session is over: done, declined or ended."""
     ended = next((entry for entry in reversed(desk.session.journal.entries)
                   if entry['entry'] == SessionEvent.ENDED), None)
     if ended is None and not desk.ending:

@@ -46,7 +46,7 @@ class Taking(ScriptedDriver):
     """Somebody who has the AV from 3 s on, and presses the throttle at 3.5 s."""
 
     def drives(self, n: int) -> bool:
-        """Tell whether the AV is obeying."""
+        """Return whether the AV is obeying."""
         return n >= 300
 
 
@@ -63,7 +63,7 @@ def record() -> RunRecord:
 
 
 def light(n: int, what: str, number: int, by: str = '', **times: float) -> TaskEntry:
-    """Give an entry of the task `light`."""
+    """Return an entry of the task `light`."""
     return TaskEntry(n, 'light', 'detection_response', 'hv0', what, number, by,  # type: ignore
                      PageTimes(**times))
 
@@ -92,7 +92,7 @@ LIGHTS = (
 
 @pytest.fixture(scope='module')
 def events(record: RunRecord) -> Sequence[TaskEvent]:
-    """Give the rows of the lights."""
+    """Return the rows of the lights."""
     return task_events(replace(record, tasks=LIGHTS))
 
 

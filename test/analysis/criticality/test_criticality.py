@@ -49,7 +49,7 @@ class Placement:
         return (-yaw if self.mirrored else yaw) + self.angle
 
     def number(self, lanelet: int | None) -> int | None:
-        """Give a lanelet its id."""
+        """Return a lanelet its id."""
         return lanelet if lanelet is None or not self.renumbered else 1_000_000 - lanelet
 
     def network(self, network: LaneletNetwork) -> LaneletNetwork:

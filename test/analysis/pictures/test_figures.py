@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 
 
 def _line(axes: Axes, name: str) -> tuple[FloatArray, FloatArray]:
-    """Give a line's data by its label or name."""
+    """Return a line's data by its label or name."""
     (line,) = [each for each in axes.lines if name in (each.get_label(), each.get_gid())]
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
 

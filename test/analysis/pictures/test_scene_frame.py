@@ -34,7 +34,7 @@ def _in_map(points: FloatArray, window: FrameWindow) -> FloatArray:
 
 
 def _expected(log: RunLog, row: int) -> dict[str, FloatArray]:
-    """Give the outlines of all who are there, from the log."""
+    """Return the outlines of all who are there, from the log."""
     found = {}
     for i, item in enumerate(log.vehicles):
         pose = shifted(log.vehicle_states[row, i, :3], item.rear_to_center)

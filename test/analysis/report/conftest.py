@@ -45,7 +45,7 @@ TIMING: dict[str, Any] = {
 
 @pytest.fixture(scope='session')
 def game() -> Game:
-    """Give the cut-in."""
+    """Return the cut-in."""
     return load_game(scenarios_directory() / 'cut_in.yaml')
 
 

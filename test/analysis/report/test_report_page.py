@@ -243,7 +243,7 @@ def test_how_people_drove_is_told_with_its_variants(page: Page, run: ReportRun) 
 
 
 def _rows(page: Page, caption: str) -> dict[str, list[str]]:
-    """Give the cells of a table that hold anything, by the names of its rows."""
+    """Return the cells of a table that hold anything, by the names of its rows."""
     rows: dict[str, list[str]] = {}
     inside, name = False, ''
     for path, text in page.texts:

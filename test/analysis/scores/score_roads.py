@@ -22,7 +22,7 @@ CAR = Shape.rectangle(LENGTH, WIDTH)
 
 def road(limit: float | None = LIMIT) -> LoadedScenario:
     """
-    Give a road of 400 m along x: lane 1 at y = 0, 2 left of it, 3 beyond in the other direction.
+    Return a road of 400 m along x: lane 1 at y = 0, 2 left of it, 3 beyond in the other direction.
 
     Each lane is 3.5 m wide.
     """
@@ -49,7 +49,7 @@ def road(limit: float | None = LIMIT) -> LoadedScenario:
 
 def straight(speed: Array | float, steps: int = 51, start: float = 20.0, y: float = 0.0,
              yaw: float = 0.0) -> tuple[Array, Array]:
-    """Give poses (K, 3) and speeds (K) of who drives straight on along its yaw."""
+    """Return poses (K, 3) and speeds (K) of who drives straight on along its yaw."""
     speeds = np.broadcast_to(np.asarray(speed, dtype=float), steps).copy()
     way = np.concatenate(([0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * DT_S)))
     return np.column_stack((start + way * np.cos(yaw), y + way * np.sin(yaw),
@@ -58,13 +58,13 @@ def straight(speed: Array | float, steps: int = 51, start: float = 20.0, y: floa
 
 def drive(speed: Array | float = LIMIT, *tracks: Track, rear_to_center: float = 0.0,
           steps: int = 51, start: float = 20.0, y: float = 0.0, yaw: float = 0.0) -> ScoredDrive:
-    """Give a drive straight on."""
+    """Return a drive straight on."""
     poses, speeds = straight(speed, steps, start, y, yaw)
     return ScoredDrive('av0', DT_S, CAR, rear_to_center, poses, speeds, tracks)
 
 
 def track(speed: Array | float, start: float, y: float = 0.0, yaw: float = 0.0, steps: int = 51,
           kind: TrackKind = 'vehicle', name: str = 'o1') -> Track:
-    """Give somebody else who drives straight on."""
+    """Return somebody else who drives straight on."""
     poses, speeds = straight(speed, steps, start, y, yaw)
     return Track(name, kind, CAR, poses, np.abs(speeds))

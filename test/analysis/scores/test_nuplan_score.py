@@ -26,7 +26,7 @@ def scorer() -> NuplanScorer:
 
 
 def _expert(way: float, steps: int = 51) -> Expert:
-    """Give an expert who drives so far along the lane [m]."""
+    """Return an expert who drives so far along the lane [m]."""
     return Expert('human', straight(way / ((steps - 1) * DT_S), steps)[0])
 
 
@@ -143,7 +143,7 @@ def test_without_a_limit_there_is_no_excess() -> None:
 
 def _turning(speed: float, rate: float = 0.0, bend: float = 0.0, gain: float = 0.0,
              jerk: float = 0.0, steps: int = 5) -> ScoredDrive:
-    """Give a drive with constant derivatives of speed and yaw; where it is does not matter."""
+    """Return a drive with constant derivatives of speed and yaw; where it is does not matter."""
     time_s = DT_S * np.arange(steps)
     yaw = rate * time_s + 0.5 * bend * time_s ** 2
     speeds = speed + gain * time_s + 0.5 * jerk * time_s ** 2

@@ -50,7 +50,7 @@ STEPS = 21
 
 
 def _problem(number: int = 1, x: float = 20.0, y: float = 0.0) -> PlanningProblem:
-    """Give a problem: 20 m on within 3 s, from 10 m/s."""
+    """Return a problem: 20 m on within 3 s, from 10 m/s."""
     start = InitialState(time_step=0, position=np.array([x, y]), orientation=0.0, velocity=10.0,
                          acceleration=0.0, yaw_rate=0.0, slip_angle=0.0)
     area = Rectangle(4.0, 3.0, np.array([x + 20.0, y]))

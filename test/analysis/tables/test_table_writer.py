@@ -54,7 +54,7 @@ def same_numbers(found: list[float | None]) -> bool:
 
 
 def guarded(texts: list[str | None]) -> list[str | None]:
-    """Give the texts as CSV is to have them, spelled out."""
+    """Return the texts as CSV is to have them, spelled out."""
     return [{'=1+1': "'=1+1", '@x': "'@x", '-': "'-"}.get(text or '', text) for text in texts]
 
 

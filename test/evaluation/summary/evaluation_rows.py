@@ -17,7 +17,7 @@ Row = dict[str, Any]
 
 
 def key_of(factors: Mapping[str, Any]) -> str:
-    """Give the key of a cell."""
+    """Return the key of a cell."""
     return hashlib.blake2b(repr(sorted(factors.items())).encode(), digest_size=16).hexdigest()
 
 

@@ -57,7 +57,7 @@ def _evaluation(folder: Path, cells: int) -> Path:
 
 
 def _peak_mb(folder: Path, block_cells: int) -> tuple[float, float]:
-    """Give what a process takes before it sums up, and at most [MB]."""
+    """Return what a process takes before it sums up, and at most [MB]."""
     done = subprocess.run([sys.executable, '-c', PROGRAM, str(folder), str(block_cells)],
                           capture_output=True, text=True, check=True)
     _, before, peak = map(int, done.stdout.split())
