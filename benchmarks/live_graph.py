@@ -56,7 +56,7 @@ class LiveGraph:
             r'^(\S+): process (\d+)$', text, re.MULTILINE)}
 
     def cpu_seconds(self) -> dict[str, float]:
-        """Return the processor time that each node has used so far [s], of those that still run."""
+        """Return the processor time of each node that still runs [s]."""
         used = {}
         for name, pid in self.node_pids().items():
             try:

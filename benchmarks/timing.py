@@ -17,7 +17,7 @@ import time
 from typing import Any
 
 from bare_loop import BareLoop
-from crgame_ros.analysis.reproduction.naive_loop import NaiveLoop
+from crgame_ros.analysis.reproduction.synchronization import NaiveLoop
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.paths import scenarios_directory

@@ -10,7 +10,7 @@ from pathlib import Path
 import tempfile
 
 from cockpit_person import Browser, open_browser
-from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_file import report_html
 from crgame_ros.analysis.report.report_run import measured_run
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory, share_directory

@@ -36,7 +36,7 @@ class Piece(NamedTuple):
     opposite: int | None = None
 
     def poses(self, aside: float = 0.0) -> NDArray[np.float64]:
-        """Return (N, 3) x [m], y [m], yaw [rad] so far to the left of it [m], 1 m apart or less."""
+        """Return (N, 3) x [m], y [m], yaw [rad] so far to its left [m], 1 m apart or less."""
         x, y, yaw = (*self.start[:2], np.radians(self.start[2]))
         s = np.linspace(0.0, self.length, max(2, int(np.ceil(self.length)) + 1))
         half = 0.5 * np.radians(self.bend) * s / self.length

@@ -22,9 +22,10 @@ from crgame_ros.doctor import (
     check_profile,
     check_python,
     check_ros,
+    DEVELOPMENT,
     format_checks,
+    read_pins,
 )
-from crgame_ros.requirements import DEVELOPMENT, read_pins
 from crgame_ros.ros.environment import loopback_profile, PROFILE_VARIABLES
 from crgame_ros.ros.talk_probe import DISCOVERY_TIMEOUT_S
 import pytest

@@ -26,7 +26,7 @@ JUMP = 0.3
 
 
 def lateral(history: History) -> FloatArray:
-    """Return the lateral accelerations (T - 2, A) at rows 1 … T - 2; NaN for who stands [m/s^2]."""
+    """Return the lateral accelerations (T - 2, A) at rows 1 … T - 2; NaN at rest [m/s^2]."""
     poses, two = history.poses[:, :history.agents], 2.0 * history.time_step_s
     moved = np.hypot(*np.moveaxis(poses[2:, :, :2] - poses[:-2, :, :2], -1, 0)) / two
     rate = wrapped(poses[2:, :, 2] - poses[:-2, :, 2]) / two

@@ -142,7 +142,7 @@ def _compare(planner: str, log: RunLog, recorded: RunLog,
 
 def _differs_s(log: RunLog, recorded: RunLog, found: NDArray[np.float64],
                expected: NDArray[np.float64]) -> float | None:
-    """Return the time from which on poses (K, N, 3) of two runs differ; None where they never do."""
+    """Return the time at which poses (K, N, 3) of two runs begin to differ, None if never."""
     ks, here, there = np.intersect1d(log.ks, recorded.ks, return_indices=True)
     apart = np.abs(found[here] - expected[there]) > SAME
     absent = np.isnan(found[here]) != np.isnan(expected[there])

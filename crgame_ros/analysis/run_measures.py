@@ -5,9 +5,8 @@
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.behaviour.detection_score import detection_scores, DetectionScore
 from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
-from crgame_ros.analysis.behaviour.task_events import task_events
+from crgame_ros.analysis.behaviour.task_events import detection_scores, DetectionScore, task_events
 from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded_criticality import measure_log

@@ -82,7 +82,7 @@ class HeldSeat:
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """
-        Return the command of cycle n; while nobody is there it is released, but for the indicators.
+        Return the command of cycle n; while the seat is empty, released but for the indicators.
 
         :param dt_s: length of a cycle in simulation time [s]
         """

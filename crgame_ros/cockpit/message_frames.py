@@ -11,8 +11,13 @@ from crgame_ros.analysis.criticality.criticality_rows import (
     read_criticality_rows,
 )
 from crgame_ros.cockpit import frames
-from crgame_ros.cockpit.perception_frames import estimate_frame, occupancy_frame, Place, scan_frame
-from crgame_ros.cockpit.sensor_mounts import SensorMounts
+from crgame_ros.cockpit.perception_frames import (
+    estimate_frame,
+    occupancy_frame,
+    Place,
+    scan_frame,
+    SensorMounts,
+)
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import ObjectDescription

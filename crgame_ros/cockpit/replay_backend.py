@@ -12,9 +12,8 @@ from typing import Any, Literal, TYPE_CHECKING
 
 from aiohttp import web
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
-from crgame_ros.cockpit.replay_criticality import measured_criticality, recorded_criticality
 from crgame_ros.cockpit.replay_index import index_run, RunIndex
-from crgame_ros.cockpit.replay_marks import Mark
+from crgame_ros.cockpit.replay_tracks import Mark
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import CrgameError
@@ -26,6 +25,54 @@ from crgame_ros.scenario.loading import parse_scenario
 if TYPE_CHECKING:
     from crgame_ros.cockpit.client import Client
     from crgame_ros.cockpit.hub import Hub
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.criticality_rows import criticality_rows, CRITICALITY_TOPIC
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.cockpit.message_frames import MessageFrames
+from crgame_ros.cockpit.replay_outline import pack
+from crgame_ros.errors import InputError
+from crgame_ros.recording.run_log import read_run_log
+
+
+def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
+    """
+    Return the frames of the whole run, each after its length in bytes; None if none were recorded.
+
+    :param reader: the recording.
+    :param run: in it.
+    """
+    if CRITICALITY_TOPIC not in reader.topics:
+        return None
+    frames, found = MessageFrames(run.game, run.descriptions), []
+    for message in reader.readable([CRITICALITY_TOPIC]):
+        try:
+            frame = frames.criticality(message.message)
+        except (InputError, IndexError, OverflowError):
+            # Anybody may have published on it.
+            continue
+        if frame is not None:
+            found.append(frame.data)
+    return pack(found) if found else None
+
+
+def measured_criticality(run: Epoch, path: Path) -> bytes:
+    """
+    Measure a run and give its frames, each after its length in bytes; takes seconds for minutes.
+
+    :param path: of the recording.
+    :raises InputError: if the run cannot be measured.
+    """
+    frames = MessageFrames(run.game, run.descriptions)
+    found: list[bytes] = []
+
+    def take(criticality: Criticality) -> None:
+        rows = criticality_rows(criticality, run.game.epoch, criticality.n)
+        if (frame := frames.criticality_of(rows)) is not None:
+            found.append(frame.data)
+
+    measure_log(read_run_log(path, run.game.epoch), on_tick=take)
+    return pack(found)
+
 
 Progress = Callable[[float], None]
 

@@ -70,7 +70,7 @@ class Places:
         return np.array(self._first, dtype=np.int64)
 
     def span(self, low: int, high: int) -> tuple[int, int] | None:
-        """Return the first and the last log time of what concerns low <= n < high; None if none."""
+        """Return the first and last log time of what concerns low <= n < high; None if none."""
         if not self._log_ns:
             return None
         first, last = np.frombuffer(self._first, np.int64), np.frombuffer(self._last, np.int64)

@@ -4,10 +4,9 @@
 
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from crgame_ros.cockpit.replay_marks import Mark, MarkList
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import (
@@ -17,12 +16,62 @@ from crgame_ros.game.documents import (
     parse_signals_document,
 )
 from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.seat_documents import parse_tenants
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status, Status
 from crgame_ros.recording.reader import DecodedMessage
 import numpy as np
 from numpy.typing import NDArray
+
+# Of one kind and subject, what comes so soon after the one before is counted with it [s].
+MERGED_WITHIN_S = 1.0
+
+
+@dataclass(frozen=True)
+class Mark:
+    """
+    Something that happened.
+
+    :param n: simulation step of the first of its kind.
+    :param last_n: of the last that is counted with it.
+    :param kind: collision, off_road, stale_plan, refused_plan, fallback, lost_device, reset,
+        trigger, stop, late, recording or gap.
+    :param subject: vehicle or event of the game, empty where it concerns the run.
+    :param text: for people.
+    :param count: how many are counted together.
+    """
+
+    n: int
+    last_n: int
+    kind: str
+    subject: str
+    text: str
+    count: int = 1
+
+
+class MarkList:
+    """Collects marks as a recording brings them; of one kind and subject in the order of n."""
+
+    def __init__(self, scheduler: ScenarioScheduler) -> None:
+        self._within = round(MERGED_WITHIN_S / scheduler.dt_s)
+        self._marks: list[Mark] = []
+        self._newest: dict[tuple[str, str], int] = {}
+
+    def add(self, n: int, kind: str, subject: str, text: str) -> None:
+        """Add a mark, or count it with the one before of its kind and subject."""
+        place = self._newest.get((kind, subject))
+        if place is not None and 0 <= n - self._marks[place].last_n <= self._within:
+            known = self._marks[place]
+            self._marks[place] = replace(known, last_n=n, count=known.count + 1)
+            return
+        self._newest[kind, subject] = len(self._marks)
+        self._marks.append(Mark(n, n, kind, subject, text))
+
+    def marks(self) -> tuple[Mark, ...]:
+        """Return all marks in the order of n."""
+        return tuple(sorted(self._marks, key=lambda mark: mark.n))
+
 
 _DIAGNOSTICS = '/diagnostics'
 _LATCHED = {'/scenario/signals': 'signals', '/scenario/events': 'events', '/seats': 'seats'}

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene document: all that the page draws and lists and that stays as it is during a run."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 import math
 from typing import Any
@@ -10,23 +10,169 @@ from typing import Any
 from commonroad.geometry.shape import Circle, ShapeGroup
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.planning.planning_problem import PlanningProblem
-from commonroad.scenario.lanelet import LaneletNetwork
-from crgame_ros.cockpit.flat_points import flat, rounded, TOLERANCE
-from crgame_ros.cockpit.map_lanelets import gap_outlines, lanelet_entries, stop_line_entries
-from crgame_ros.cockpit.road_furniture import light_entries, sign_entries
+from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
+from commonroad.scenario.traffic_light import TrafficLight
+from commonroad.scenario.traffic_sign import TrafficSign
+from crgame_ros.cockpit.flat_points import flat, Points, rounded, simplified, TOLERANCE
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.task_spec import TaskSpec
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.road_surface import lanelet_areas
+from crgame_ros.roads.signs import stop_line_ends
+from crgame_ros.scenario.heights import LaneletHeights
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import group_outline, LoadedScenario
 from crgame_ros.vehicle.driver_place import driver_place
 import numpy as np
+from numpy.typing import NDArray
 import shapely
 
 Document = dict[str, Any]
+
+# Of what a sign says beside its kind: no plate has room for more characters.
+_MOST_TEXT = 40
+# A hole in the road that is narrower is a gap of the map [m].
+_GAP_WIDTH = 0.8
+
+
+def light_entries(network: LaneletNetwork) -> list[Document]:
+    """Describe the lights that have a place: where, for which lanelets and movement."""
+    lanelets: dict[int, list[Lanelet]] = {}
+    for lanelet in network.lanelets:
+        for light_id in lanelet.traffic_lights or ():
+            lanelets.setdefault(light_id, []).append(lanelet)
+    return [entry for light in network.traffic_lights
+            if (entry := _light(light, lanelets.get(light.traffic_light_id, []))) is not None]
+
+
+def _light(light: TrafficLight, lanelets: list[Lanelet]) -> Document | None:
+    """Place a light; one that neither has a position nor a lanelet cannot be shown."""
+    position, yaw = light.position, 0.0
+    if lanelets:
+        along = lanelets[0].center_vertices[-1, :2] - lanelets[0].center_vertices[-2, :2]
+        yaw = math.atan2(along[1], along[0])
+        if position is None:
+            position = lanelets[0].center_vertices[-1]
+    if position is None:
+        return None
+    direction = light.direction
+    return {'id': int(light.traffic_light_id), 'x': rounded(position[0]),
+            'y': rounded(position[1]), 'yaw': yaw,
+            'direction': 'all' if direction is None else str(direction.value),
+            'lanelets': [int(lanelet.lanelet_id) for lanelet in lanelets]}
+
+
+def sign_entries(network: LaneletNetwork) -> list[Document]:
+    """Describe what each sign says, where it stands, and which way its readers drive."""
+    lanelets: dict[int, list[Lanelet]] = {}
+    for lanelet in network.lanelets:
+        for sign_id in lanelet.traffic_signs or ():
+            lanelets.setdefault(sign_id, []).append(lanelet)
+    return [entry for sign in network.traffic_signs if sign.position is not None
+            for entry in _sign(sign, lanelets.get(sign.traffic_sign_id, []), network)]
+
+
+def _sign(sign: TrafficSign, own: list[Lanelet], network: LaneletNetwork) -> list[Document]:
+    position = np.asarray(sign.position, dtype=float)[:2]
+    readers = own or network.lanelets
+    yaw = min((_heading_near(lanelet.center_vertices[:, :2], position) for lanelet in readers),
+              default=(0.0, 0.0))[1]
+    return [
+        {'id': int(sign.traffic_sign_id), 'x': rounded(position[0]), 'y': rounded(position[1]),
+         'yaw': yaw, 'lanelets': [int(lanelet.lanelet_id) for lanelet in own],
+         'virtual': bool(sign.virtual),
+         'kind': str(element.traffic_sign_element_id.name),
+         'value': str(next(iter(element.additional_values or ()), ''))[:_MOST_TEXT]}
+        for element in sign.traffic_sign_elements]
+
+
+def _heading_near(line: Points, point: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the distance [m] of a point to a polyline (N, 2), and its heading there [rad]."""
+    starts, along = line[:-1], np.diff(line, axis=0)
+    squares = np.maximum((along ** 2).sum(axis=1), 1e-12)
+    share = np.clip(((point - starts) * along).sum(axis=1) / squares, 0.0, 1.0)
+    gaps = np.hypot(*(starts + share[:, None] * along - point).T)
+    nearest = int(np.argmin(gaps))
+    return float(gaps[nearest]), math.atan2(along[nearest, 1], along[nearest, 0])
+
+
+def lanelet_entries(network: LaneletNetwork,
+                    heights: Mapping[int, LaneletHeights]) -> list[Document]:
+    """
+    Describe the lanelets in their order: bounds, markings, neighbours.
+
+    :param heights: of those lanelets that have any
+    """
+    roads = RoadNetwork(network)
+    crossing = {
+        int(lanelet_id) for intersection in network.intersections
+        for incoming in intersection.incomings
+        for successors in (incoming.successors_left, incoming.successors_straight,
+                           incoming.successors_right)
+        for lanelet_id in successors or ()}
+    return [_lanelet(lanelet, roads, crossing, heights.get(int(lanelet.lanelet_id)))
+            for lanelet in network.lanelets]
+
+
+def _lanelet(lanelet: Lanelet, roads: RoadNetwork, crossing: set[int],
+             heights: LaneletHeights | None) -> Document:
+    lanelet_id = int(lanelet.lanelet_id)
+    types = sorted(kind.value for kind in lanelet.lanelet_type)
+    left = simplified(_raised(lanelet.left_vertices, None if heights is None else heights.left))
+    right = simplified(_raised(lanelet.right_vertices, None if heights is None else heights.right))
+    return {
+        'id': lanelet_id,
+        'left': flat(left[:, :2]), 'right': flat(right[:, :2]),
+        'center': flat(simplified(lanelet.center_vertices[:, :2])), 'types': types,
+        'left_z': _heights(left), 'right_z': _heights(right),
+        'left_line': marking_name(lanelet.line_marking_left_vertices),
+        'right_line': marking_name(lanelet.line_marking_right_vertices),
+        'one_way': not lanelet.user_bidirectional,
+        'speed_limit': roads.speed_limit(lanelet_id),
+        'intersection': lanelet_id in crossing or 'intersection' in types,
+        'adj_left': lanelet.adj_left, 'adj_left_same': bool(lanelet.adj_left_same_direction),
+        'adj_right': lanelet.adj_right, 'adj_right_same': bool(lanelet.adj_right_same_direction),
+        'successors': [int(number) for number in lanelet.successor]}
+
+
+def _raised(vertices: Points, heights: Points | None) -> Points:
+    """Return the vertices their heights, if they have any: (N, 3), else (N, 2) [m]."""
+    return vertices[:, :2] if heights is None else np.column_stack((vertices[:, :2], heights))
+
+
+def _heights(vertices: Points) -> list[float] | None:
+    """Return a bound's heights [m]; None of a lanelet that is flat."""
+    return flat(vertices[:, 2]) if vertices.shape[1] > 2 else None
+
+
+def gap_outlines(network: LaneletNetwork) -> list[list[float]]:
+    """
+    Return the slits between lanelets that are no ground to the eye, only cracks in the map.
+
+    They are for display alone: whether a vehicle is on the road is not decided with them.
+    """
+    road = shapely.union_all(lanelet_areas(network.lanelets))
+    holes = [shapely.Polygon(ring) for part in getattr(road, 'geoms', [road])
+             if part.geom_type == 'Polygon' for ring in part.interiors]
+    return [flat(np.asarray(hole.exterior.coords)[:-1, :2]) for hole in holes
+            if hole.buffer(-0.5 * _GAP_WIDTH).is_empty]
+
+
+def stop_line_entries(network: LaneletNetwork) -> list[Document]:
+    """Describe the stop lines: their ends, how they are painted, and whose they are."""
+    return [{'points': flat(stop_line_ends(lanelet)), 'lanelet': int(lanelet.lanelet_id),
+             'line': marking_name(lanelet.stop_line.line_marking)}
+            for lanelet in network.lanelets if lanelet.stop_line is not None]
+
+
+def marking_name(marking: LineMarking | None) -> str:
+    """Name a line marking as CommonRoad's files do."""
+    return 'no_marking' if marking is None else str(marking.value)
+
 
 # Shown around the vehicles where a scenario has no roads at all [m].
 _EMPTY_MARGIN = 50.0

@@ -6,11 +6,12 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 import contextlib
 import errno
+import json
 from pathlib import Path
 from typing import cast
 
 from aiohttp import web
-from crgame_ros.cockpit import invite_routes, library_routes, page_files
+from crgame_ros.cockpit import library_routes, page_files
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.backend import Backend, ReplayControls
 from crgame_ros.cockpit.doorkeeper import Doorkeeper, server_log, WatchedSite
@@ -18,8 +19,44 @@ from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_files import PageFile
 from crgame_ros.cockpit.request_guard import ACCESS, file_answer, guard, header_writer, KEEPER
+from crgame_ros.cockpit.request_rights import actor
+from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.cockpit.session import Session
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.driven_vehicle import VEHICLE_ID
+
+
+def _add_invite_routes(app: web.Application, access: Access, hub: Hub) -> None:
+    """
+    Add the route.
+
+    :param access: whose links they are; it may have none.
+    :param hub: knows the page that asks.
+    """
+    async def invite(request: web.Request) -> web.Response:
+        try:
+            actor(request, hub, 'invite')
+            return web.json_response({'link': _link(access, request, await request.read())})
+        except CrgameError as error:
+            return web.json_response({'error': str(error)}, status=400)
+
+    app.router.add_post('/api/invite', invite)
+
+
+def _link(access: Access, request: web.Request, body: bytes) -> str:
+    if access.invitations is None:
+        raise CrgameError('links are made where the cockpit was started with --open-cockpit')
+    try:
+        content = json.loads(body)
+        role, seat = content['role'], content.get('seat', '')
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise CrgameError('name a role') from error
+    if role not in ROLES or not isinstance(seat, str) \
+            or (seat and not VEHICLE_ID.fullmatch(seat)):
+        raise CrgameError('there is no such role or seat')
+    port = request.get_extra_info('sockname')[1]
+    return access.at_port(port).link(access.invitations.make(role, seat))
+
 
 HUB = web.AppKey('hub', Hub)
 PORTS_TRIED = 20
@@ -63,7 +100,7 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
     app.router.add_get('/ws', connect)
     _add_page(app, page_files.read_page(page))
     library_routes.add_routes(app, library, backend, hub)
-    invite_routes.add_routes(app, access, hub)
+    _add_invite_routes(app, access, hub)
     if backend.mode == 'replay':
         app.add_routes(cast(ReplayControls, backend).routes())
     return app

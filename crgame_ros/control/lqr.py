@@ -17,8 +17,7 @@ from crgame_ros.vehicle.control_settings import (
 )
 from crgame_ros.vehicle.models import clipped
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.standstill import REST
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import REST, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are

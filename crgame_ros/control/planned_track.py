@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.curve import arc_length
-from crgame_ros.vehicle.standstill import PLANNED_REST
-from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn, VehicleState
+from crgame_ros.vehicle.state import PLANNED_REST, STATE_WIDTH, StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 

@@ -8,8 +8,7 @@ from crgame_ros.control.tracker import Reference
 from crgame_ros.vehicle.control_settings import control_settings, SpeedSettings, with_options
 from crgame_ros.vehicle.models import clipped
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.standstill import STANDING
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import STANDING, VehicleState
 
 # The stop's own law takes over so many acceleration lags before it.
 STOPPING_LAGS = 2.0

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from crgame_ros.control.planned_track import PlannedTrack
+from crgame_ros.registry import ModelRegistry
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
@@ -82,3 +83,10 @@ class Tracker(ABC):
         :param pose: the state that the controller believes, rear axle
         :param reference: the plan, not used up; may be another one than at the last call
         """
+
+
+TRACKERS = ModelRegistry(
+    'trackers', 'tracker',
+    {'lqr': 'crgame_ros.control.lqr:LqrTracker',
+     'pure-pursuit': 'crgame_ros.control.pure_pursuit:PurePursuitTracker'},
+    Tracker, 'docs/control.md')

@@ -13,7 +13,7 @@ import math
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.geometry.footprint import Footprint, Primitive
+from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.rigid_transform import Pose
 from crgame_ros.geometry.shape import Shape
 import numpy as np

@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.vehicle.standstill import REST
+from crgame_ros.vehicle.state import REST
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -10,7 +10,7 @@ exact as the map.
 from collections.abc import Sequence
 import math
 
-from crgame_ros.geometry.footprint import Footprint
+from crgame_ros.geometry.outline import Footprint
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.occupancy import OccupancyGrid, OccupancyMap
 import numpy as np

@@ -7,19 +7,283 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 import re
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
 
-from crgame_ros.driver.device_file import DeviceFile, REMEDY
 from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.keyboard import KeyState
-from crgame_ros.driver.wheel import ControlBindings
+from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons
 from crgame_ros.errors import InputError
 from crgame_ros.paths import config_directory
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Listed, OnlyWith, Special, Within, Wording
 from crgame_ros.schema.reading import read
 from crgame_ros.vehicle.lights import Light
 from crgame_ros.yaml_text import parse_yaml, read_yaml
 from evdev import ecodes
+
+REMEDY = 'see docs/driving.md, section "Add a device"'
+_FORM = Form(REMEDY)
+Index = Annotated[int, Within(0, 999)]
+Finite = Annotated[float, Within()]
+_PEDALS = ('throttle', 'pedals')
+_AXES = OnlyWith(_PEDALS, needed=True)
+
+
+class Code(Special):
+    """
+    The name of an evdev code.
+
+    :param prefix: with which its kind begins.
+    """
+
+    def __init__(self, prefix: str) -> None:
+        self._prefix = prefix
+
+    def read(self, given: Any, where: str, key: str, base: Path) -> int:
+        """Look the code up."""
+        code = ecodes.ecodes.get(given) if isinstance(given, str) else None
+        if code is None or not given.startswith(self._prefix):
+            raise InputError(f'"{key}" is {given!r:.80}', where, f'give {self}')
+        return int(code)
+
+    def json_schema(self) -> dict[str, Any]:
+        """Name all of the kind."""
+        return {'enum': sorted(name for name in ecodes.ecodes if name.startswith(self._prefix))}
+
+    def __str__(self) -> str:
+        """Return where the names come from."""
+        return f'evdev codes ({self._prefix}...) as `evtest` prints them'
+
+
+Keys = Annotated[tuple[Annotated[int, Code('KEY_')], ...], Listed(1)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxisEntry:
+    """An axis; see `AxisBinding`."""
+
+    FORM: ClassVar[Form] = _FORM
+
+    min: Finite | None = None  # noqa: A003
+    max: Finite | None = None  # noqa: A003
+    rest: Finite | None = None
+    inverted: bool = False
+
+    def check(self) -> None:
+        """Refuse a range that is none, and a rest outside of it."""
+        if self.min is not None and self.max is not None and not self.min < self.max:
+            raise InputError(f'"max" is {self.max:g}', '', 'let min be less than max')
+        if self.rest is not None and not (
+                (self.min is None or self.min <= self.rest)
+                and (self.max is None or self.rest <= self.max)):
+            raise InputError(f'"rest" is {self.rest:g}', '', 'let it lie between min and max')
+
+    def binding(self, axis: int, centred: bool, deadzone: float) -> AxisBinding:
+        """Return it as the program has it."""
+        return AxisBinding(axis, self.min, self.max, self.rest, self.inverted, centred, deadzone)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvdevAxis(AxisEntry):
+    """
+    An axis as evdev has it.
+
+    :param axis: its code.
+    :param min: smallest raw value; without it what the device reports.
+    :param max: largest raw value; without it what the device reports.
+    :param rest: raw value when nobody touches it; without it the middle of steering, and the end
+        from which a pedal starts.
+    :param inverted: whether it falls while the command rises.
+    """
+
+    axis: Annotated[int, Code('ABS_')]
+
+
+@dataclass(frozen=True, kw_only=True)
+class JoyAxis(AxisEntry):
+    """
+    An axis as a `joy` node has it.
+
+    :param axis: its index.
+    :param min: smallest value.
+    :param max: largest value.
+    :param rest: value when nobody touches it; without it the middle of steering, and the end
+        from which a pedal starts.
+    :param inverted: whether it falls while the command rises.
+    """
+
+    axis: Index
+    min: Finite = -1.0  # noqa: A003
+    max: Finite = 1.0  # noqa: A003
+
+
+@dataclass(frozen=True)
+class AxisPair:
+    """
+    One control, in both ways of reading the device.
+
+    :param evdev: its axis in evdev.
+    :param joy: its axis in a `joy` node.
+    :param deadzone: share of the travel around the rest that counts as rest [-]
+    """
+
+    FORM: ClassVar[Form] = _FORM
+
+    evdev: EvdevAxis
+    joy: JoyAxis
+    deadzone: Annotated[float, Within(0.0, 0.5)] = 0.0
+
+    def bindings(self, centred: bool) -> tuple[AxisBinding, AxisBinding]:
+        """Return it as the program has it: evdev, joy."""
+        return (self.evdev.binding(self.evdev.axis, centred, self.deadzone),
+                self.joy.binding(self.joy.axis, centred, self.deadzone))
+
+
+@dataclass(frozen=True)
+class ButtonPair:
+    """
+    One button, in both ways of reading the device.
+
+    :param evdev: its code.
+    :param joy: its index.
+    """
+
+    FORM: ClassVar[Form] = _FORM
+
+    evdev: Annotated[int, Code('BTN_')]
+    joy: Index
+
+
+@dataclass(frozen=True)
+class ButtonEntry:
+    """
+    Buttons of the gear, the indicators, the horn, and of being put back.
+
+    :param reverse_on: a press selects reverse.
+    :param reverse_off: a press selects forward.
+    :param reverse_toggle: a press changes between the two.
+    :param reverse_held: reverse exactly while held (the gate of a shifter).
+    :param left_indicator: a press switches the left indicator on or off.
+    :param right_indicator: a press switches the right indicator on or off.
+    :param hazard: a press switches the hazard lights on or off.
+    :param horn: it sounds while held.
+    :param put_back: after a contact the vehicle is put back on its lane.
+    """
+
+    FORM: ClassVar[Form] = _FORM
+
+    reverse_on: tuple[ButtonPair, ...] = ()
+    reverse_off: tuple[ButtonPair, ...] = ()
+    reverse_toggle: tuple[ButtonPair, ...] = ()
+    reverse_held: tuple[ButtonPair, ...] = ()
+    left_indicator: tuple[ButtonPair, ...] = ()
+    right_indicator: tuple[ButtonPair, ...] = ()
+    hazard: tuple[ButtonPair, ...] = ()
+    horn: tuple[ButtonPair, ...] = ()
+    put_back: tuple[ButtonPair, ...] = ()
+
+    def gears(self, way: Literal['evdev', 'joy']) -> GearButtons:
+        """Return those of the gear as the program has them, in one way of reading the device."""
+        return GearButtons(*(_codes(pairs, way) for pairs in (
+            self.reverse_on, self.reverse_off, self.reverse_toggle, self.reverse_held)))
+
+    def lights(self, way: Literal['evdev', 'joy']) -> LightButtons:
+        """Return those of indicators and horn as the program has them."""
+        return LightButtons(*(_codes(pairs, way) for pairs in (
+            self.left_indicator, self.right_indicator, self.hazard, self.horn)))
+
+
+def _codes(pairs: tuple[ButtonPair, ...], way: str) -> frozenset[int]:
+    return frozenset(getattr(pair, way) for pair in pairs)
+
+
+@dataclass(frozen=True)
+class KeyEntry:
+    """
+    The keys that do the same.
+
+    :param throttle: accelerate.
+    :param brake: brake.
+    :param left: steer to the left.
+    :param right: steer to the right.
+    :param reverse: change the gear.
+    :param left_indicator: a press switches the left indicator on or off.
+    :param right_indicator: a press switches the right indicator on or off.
+    :param hazard: a press switches the hazard lights on or off.
+    :param horn: it sounds while held.
+    :param put_back: after a contact the vehicle is put back on its lane.
+    """
+
+    FORM: ClassVar[Form] = _FORM
+
+    throttle: Keys
+    brake: Keys
+    left: Keys
+    right: Keys
+    reverse: Keys
+    left_indicator: Keys = ()
+    right_indicator: Keys = ()
+    hazard: Keys = ()
+    horn: Keys = ()
+    put_back: Keys = ()
+
+
+@dataclass(frozen=True)
+class DeviceFile:
+    """
+    A device map.
+
+    :param title: one line for people.
+    :param kind: in this order `auto` prefers devices.
+    :param match: regular expressions, one of which is found in the device's name.
+    :param steering: positive to the left.
+    :param throttle: throttle pedal.
+    :param brake: brake pedal.
+    :param pedals: one axis for both pedals, throttle on its positive side.
+    :param buttons: for the gear, the indicators and the horn.
+    :param keys: of a keyboard.
+    :param force_feedback: motor of a wheel; without it the wheel is not moved.
+    """
+
+    FORM: ClassVar[Form] = Form(REMEDY, by='kind', one_of={
+        'wheel': _PEDALS, 'gamepad': _PEDALS, 'keyboard': ('keys',)})
+
+    title: Annotated[str, Wording(r'[\s\S]+', 'give a text')]
+    kind: Literal['wheel', 'gamepad', 'keyboard']
+    match: Annotated[tuple[str, ...], Listed(1)]
+    steering: Annotated[AxisPair | None, _AXES] = None
+    throttle: Annotated[AxisPair | None, OnlyWith(('throttle',))] = None
+    brake: Annotated[AxisPair | None, OnlyWith(('throttle',), needed=True)] = None
+    pedals: Annotated[AxisPair | None, OnlyWith(('pedals',))] = None
+    buttons: Annotated[ButtonEntry | None, _AXES] = None
+    keys: Annotated[KeyEntry | None, OnlyWith(('keys',))] = None
+    force_feedback: Annotated[ForceLimits | None, OnlyWith(_PEDALS)] = None
+
+    def check(self) -> None:
+        """Refuse what is no regular expression."""
+        for pattern in self.match:
+            try:
+                re.compile(pattern)
+            except re.error as error:
+                raise InputError(f'"match": {pattern!r:.80} is no regular expression: {error}', '',
+                                 'mend it') from error
+
+    def controls(self) -> tuple[ControlBindings, ControlBindings] | None:
+        """Return the controls as the program has them, in evdev and joy; None for a keyboard."""
+        if self.steering is None or self.buttons is None:
+            return None
+        none = (None, None)
+        steering = self.steering.bindings(True)
+        throttle = none if self.throttle is None else self.throttle.bindings(False)
+        brake = none if self.brake is None else self.brake.bindings(False)
+        pedals = none if self.pedals is None else self.pedals.bindings(True)
+        return (ControlBindings(steering[0], throttle[0], brake[0], pedals[0],
+                                self.buttons.gears('evdev'), self.buttons.lights('evdev'),
+                                _codes(self.buttons.put_back, 'evdev')),
+                ControlBindings(steering[1], throttle[1], brake[1], pedals[1],
+                                self.buttons.gears('joy'), self.buttons.lights('joy'),
+                                _codes(self.buttons.put_back, 'joy')))
 
 
 class DeviceKind(IntEnum):

@@ -4,13 +4,15 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 import errno
+import fcntl
 import math
 from pathlib import Path
 import re
+import struct
+import time
 from typing import Any
 
 from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
-from crgame_ros.driver.event_clock import stamp_by_steady_clock
 from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons, NO_LIGHTS
 from crgame_ros.driver.keyboard import KeyState
@@ -24,6 +26,26 @@ from crgame_ros.driver.wheel import (
 )
 from crgame_ros.errors import InputError
 from evdev import AbsInfo, ecodes, InputDevice, InputEvent
+
+# EVIOCSCLOCKID of <linux/input.h>: _IOW('E', 0xa0, int).
+_SET_CLOCK = 0x400445A0
+
+
+def stamp_by_steady_clock(descriptor: int) -> bool:
+    """
+    Let a device's events be stamped by the clock of `time.monotonic`.
+
+    The kernel's own choice is the time of day, which somebody may set.
+
+    :param descriptor: of an opened event device.
+    :return: whether the kernel does; Linux since 3.4.
+    """
+    try:
+        fcntl.ioctl(descriptor, _SET_CLOCK, struct.pack('i', time.CLOCK_MONOTONIC))
+    except OSError:
+        return False
+    return True
+
 
 RESCAN_PERIOD_S = 1.0
 
@@ -154,7 +176,7 @@ class EvdevDevice:
 
     @property
     def joy(self) -> JoyState:
-        """Return what the `joy` node would publish; for a keyboard, its driving keys as buttons."""
+        """Return what the `joy` node would publish; a keyboard's driving keys as buttons."""
         if self.device_map is not None and self.device_map.keys is not None:
             return JoyState((), tuple(map(int, self.keys)))
         rests = {axis.code: axis.rest for axis in self.layout.ranges} if self.layout else {}

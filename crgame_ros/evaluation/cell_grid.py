@@ -26,7 +26,7 @@ from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
 from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
-from crgame_ros.simulation.adapted_game import OWN
+from crgame_ros.simulation.cast import OWN
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A process of its own for cells: one that hangs, eats memory or dies takes nobody along."""
 
+from collections.abc import Mapping
 from contextlib import suppress
 import json
 import os
@@ -16,9 +17,13 @@ import tempfile
 import threading
 import time
 import traceback
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, BinaryIO, NamedTuple, NoReturn
 
 from crgame_ros.errors import CrgameError
+from crgame_ros.evaluation.cell import cell_of
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.source_digest import engine_digest
+from distributed import get_worker
 
 _LENGTH = struct.Struct('<Q')
 # Results do not depend on how many threads a library takes, and workers share the processors.
@@ -27,6 +32,8 @@ _ONE_THREAD = dict.fromkeys((
 # Of what a cell printed, so much is told when it died.
 _TOLD_BYTES = 2000
 _STARTS_S, _ENDS_S = 120.0, 5.0
+# Of each thread of the worker its own: a worker of several computes several cells at once.
+_OF_THREAD = threading.local()
 
 
 class CellProcess:
@@ -203,3 +210,55 @@ def _messages() -> Any:
 
 if __name__ == '__main__':
     main()
+
+
+def dask_setup(_worker: Any) -> None:
+    """Let Ctrl-C be for the command alone, which ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class Limits(NamedTuple):
+    """
+    What a cell may take.
+
+    :param timeout_s: of wall time.
+    :param memory_bytes: of data.
+    """
+
+    timeout_s: float
+    memory_bytes: int
+
+
+def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
+    """Return a content: as a task, so that workers hand it on and lost ones come back."""
+    return packed
+
+
+def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
+            limits: Limits) -> dict[str, Any]:
+    """
+    Compute a cell in the process of this worker's thread.
+
+    :param text: the cell as JSON.
+    :param contents: what it names, packed, by digest.
+    :return: its rows.
+    :raises CrgameError: if this worker has another version than who asked.
+    """
+    worker = get_worker()
+    if cell_of(text).code[0] != engine_digest():
+        raise CrgameError(f'worker {worker.address} has another crgame_ros than this one: install '
+                          'the same there')
+    store = ContentStore(Path(worker.local_directory) / 'crgame-contents')
+    for digest, packed in contents.items():
+        store.unpack(digest, packed)
+    kept: dict[Any, CellProcess] = vars(_OF_THREAD).setdefault('processes', {})
+    place = (store.folder, limits.memory_bytes)
+    if place not in kept:
+        for other in kept.values():
+            other.close()
+        kept.clear()
+        kept[place] = CellProcess(*place)
+    rows = kept[place].compute(text, limits.timeout_s)
+    rows['work']['worker'] = worker.address
+    # Text is small on its way, and no object of ours has to be known to the scheduler.
+    return {'rows': json.dumps(rows)}

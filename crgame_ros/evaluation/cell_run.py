@@ -26,7 +26,7 @@ from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.adapted_game import adapt_game, OWN
+from crgame_ros.simulation.cast import adapt_game, OWN
 from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np

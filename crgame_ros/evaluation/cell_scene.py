@@ -11,9 +11,8 @@ from typing import Any
 
 from crgame_ros.driver.source import parse_source
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.code_neighbours import code_neighbours, MOST_BYTES
 from crgame_ros.evaluation.content import Content, ContentStore
-from crgame_ros.evaluation.source_digest import planner_digest
+from crgame_ros.evaluation.source_digest import code_neighbours, MOST_BYTES, planner_digest
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import load_game
 from crgame_ros.occupancy.occupancy_map_file import read_map_file

@@ -15,7 +15,7 @@ INSTALL = "pip install 'crgame_ros[evaluate]'"
 ALLOWED_FAILURES = 5
 _CONNECT_S = 8.0
 # Our own workers load it as they start.
-PRELOAD = 'crgame_ros.evaluation.worker_task'
+PRELOAD = 'crgame_ros.evaluation.cell_process'
 
 
 def require_dask() -> None:

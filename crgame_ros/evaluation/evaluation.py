@@ -137,7 +137,7 @@ class _Flight:
     """Keeps so many cells out that no worker waits, and takes them in as they end."""
 
     def __init__(self, client: Any, store: ContentStore, computing: Computing) -> None:
-        from crgame_ros.evaluation.worker_task import Limits
+        from crgame_ros.evaluation.cell_process import Limits
         self._client, self._store = client, store
         self._limits = Limits(computing.timeout_s, computing.memory_bytes)
         self._out: dict[Any, tuple[Cell, int]] = {}
@@ -181,7 +181,7 @@ class _Flight:
                    self._client.scheduler_info(n_workers=-1)['workers'].values())
 
     def _send(self, cell: Cell, rounds: int) -> Any:
-        from crgame_ros.evaluation.worker_task import compute
+        from crgame_ros.evaluation.cell_process import compute
         contents = {}
         for digest in sorted(cell.contents):
             contents[digest] = self._content(digest)
@@ -193,7 +193,7 @@ class _Flight:
         return future
 
     def _content(self, digest: str) -> Any:
-        from crgame_ros.evaluation.worker_task import packed_content
+        from crgame_ros.evaluation.cell_process import packed_content
         if digest not in self._contents:
             self._contents[digest] = self._client.submit(
                 packed_content, self._store.packed(digest), key=f'content-{digest}')

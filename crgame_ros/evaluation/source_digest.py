@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which code a cell depends on: a change of one planner is no change of the others."""
 
+import ast
+from collections.abc import Iterator
 from functools import cache
 import hashlib
 import inspect
@@ -10,6 +12,45 @@ from pathlib import Path
 import crgame_ros
 from crgame_ros import __version__
 from crgame_ros.planner.planner_registry import BUILT_IN, EXTERNAL, planner_class
+
+# More of one planner would better be installed where the workers are [bytes].
+MOST_BYTES = 512 * 1024 * 1024
+
+
+def code_neighbours(file: Path) -> list[Path]:
+    """
+    Find the files in the folder of a Python file whose names stand in its source as texts.
+
+    `Path(__file__).with_name('weights.npz')` names one so. Python files among them are read in
+    the same way; a file that is no Python has no neighbours.
+
+    :return: in alphabetical order, without the file itself.
+    """
+    found, to_read = {file}, [file]
+    while to_read:
+        for name in _texts(to_read.pop()):
+            path = file.with_name(name)
+            if path not in found and path.is_file():
+                found.add(path)
+                to_read.append(path)
+    return sorted(found - {file})
+
+
+def _texts(file: Path) -> Iterator[str]:
+    """Yield the texts in a Python file that can be the name of a file in the same folder."""
+    if file.suffix != '.py':
+        return
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        # Whoever loads it says why it cannot be used.
+        return
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) \
+                and 0 < len(node.value) < 256 and '\0' not in node.value \
+                and '/' not in node.value and node.value not in ('.', '..'):
+            yield node.value
+
 
 # Folders and modules whose code no offline run and no measure executes.
 WITHOUT = ('cockpit', 'nodes', 'ros', 'launcher', 'evaluation/summary', 'analysis/pictures',

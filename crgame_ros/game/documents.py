@@ -22,10 +22,9 @@ from crgame_ros.game.driven_vehicle import (
     read_human,
     VEHICLE_ID,
 )
-from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.event_file import parse_document_entries
 from crgame_ros.game.events import EventSpec, FiredBy, FiredEvent
-from crgame_ros.game.game import DrivabilitySpec, MAX_VEHICLES, TimingSpec
+from crgame_ros.game.game import DrivabilitySpec, EnvironmentSpec, MAX_VEHICLES, TimingSpec
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.task_spec import TaskList, TaskSpec

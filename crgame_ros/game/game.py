@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.environment_spec import EnvironmentSpec
 from crgame_ros.game.events import EventList
 from crgame_ros.game.object_spec import ObjectList
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -27,6 +26,27 @@ from crgame_ros.schema.marks import (
     Wording,
 )
 from crgame_ros.vehicle.parameters import DEFAULT_VEHICLE
+
+Light = Literal['day', 'dusk']
+# On a clear day [m].
+CLEAR_M = 30_000.0
+
+
+@dataclass(frozen=True)
+class EnvironmentSpec:
+    """
+    Light and air, as people see the world; no sensor of an AV knows of them.
+
+    :param light: day or dusk; None takes what the scenario says, else day.
+    :param visibility: meteorological visibility, at which 5 % of a contrast is left (Koschmieder)
+        [m]; None takes what the scenario says, else 30 km.
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/games.md for the keys')
+
+    light: Light | None = None
+    visibility: Annotated[float, Within(10.0, 100_000.0)] | None = None
+
 
 DEFAULT_PLANNER = 'idm'
 # Humans and AVs together.

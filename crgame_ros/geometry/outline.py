@@ -3,7 +3,10 @@
 """The outline of a shape: its corners, around its centre and placed in the map."""
 
 import math
+from typing import TypeAlias
 
+from commonroad_dc import pycrcc
+from crgame_ros.errors import InputError
 from crgame_ros.geometry.reference_point import joined
 from crgame_ros.geometry.shape import Shape
 import numpy as np
@@ -13,6 +16,7 @@ import shapely
 # Corners of the polygon that stands for a circle in tests of containment; it lies outside the
 # circle by less than 0.2 % of the radius.
 CIRCLE_CORNERS = 64
+Primitive: TypeAlias = pycrcc.RectOBB | pycrcc.Circle | pycrcc.Triangle
 
 
 def outline(shape: Shape, circle_corners: int = CIRCLE_CORNERS,
@@ -70,3 +74,75 @@ def half_extents(lengths: NDArray[np.float64], widths: NDArray[np.float64],
 def placed_polygon(shape: Shape, x: float, y: float, yaw: float) -> shapely.Polygon:
     """Place a shape as a polygon; a circle becomes one that encloses it."""
     return shapely.Polygon(placed_at(outline(shape), x, y, yaw))
+
+
+class Footprint:
+    """
+    A shape prepared to be placed at many poses.
+
+    :param shape: the shape around its centre.
+    :raises InputError: if a polygon has no area.
+    """
+
+    def __init__(self, shape: Shape) -> None:
+        self.shape = shape
+        self.radius = shape.radius
+        self._half_length = 0.5 * shape.length
+        self._half_width = 0.5 * shape.width
+        self._kind = shape.kind
+        self._triangles = _triangulate(shape) if shape.kind == 'polygon' else []
+        self._outline = outline(shape)
+
+    def at(self, x: float, y: float, yaw: float) -> list[Primitive]:
+        """
+        Place the shape as collision objects, of which any that is hit is a hit.
+
+        :param x: centre [m]
+        :param y: centre [m]
+        :param yaw: [rad]
+        :return: one rectangle or circle, or the triangles of a polygon.
+        """
+        if self._kind == 'rectangle':
+            return [pycrcc.RectOBB(self._half_length, self._half_width, yaw, x, y)]
+        if self._kind == 'circle':
+            return [pycrcc.Circle(self._half_length, x, y)]
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return [pycrcc.Triangle(x + cos * ax - sin * ay, y + sin * ax + cos * ay,
+                                x + cos * bx - sin * by, y + sin * bx + cos * by,
+                                x + cos * cx - sin * cy, y + sin * cx + cos * cy)
+                for ax, ay, bx, by, cx, cy in self._triangles]
+
+    def polygon(self, x: float, y: float, yaw: float) -> shapely.Polygon:
+        """Place the shape as a polygon; a circle becomes one that encloses it."""
+        return shapely.Polygon(placed_at(self._outline, x, y, yaw))
+
+    def outlines(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Place the shape's outline many times.
+
+        :param poses: (S, 3) x [m], y [m] and yaw [rad] of its centre
+        :return: (S, C, 2) corners [m]
+        """
+        return placed(self._outline, poses)
+
+
+def triangle_corners(polygons: shapely.Geometry | NDArray[np.object_]) -> NDArray[np.float64]:
+    """
+    Cut polygons into triangles that cover exactly the same area.
+
+    :param polygons: one valid geometry, or an array of them.
+    :return: (n, 3, 2) corners of the triangles.
+    """
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons))
+    # The ring of a triangle is closed: its first corner comes again.
+    return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+
+
+def _triangulate(shape: Shape) -> list[list[float]]:
+    polygon = shapely.make_valid(shapely.Polygon(shape.vertices)) \
+        if len(shape.vertices) > 2 else shapely.Polygon()
+    if polygon.area == 0.0:
+        raise InputError(f'a polygon of {len(shape.vertices)} corners has no area', 'shape',
+                         'give at least three corners that are not in one line')
+    corners: list[list[float]] = triangle_corners(polygon).reshape(-1, 6).tolist()
+    return corners

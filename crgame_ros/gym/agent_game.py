@@ -12,10 +12,8 @@ from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game
 from crgame_ros.gym.driving_game import AgentSeat, DrivingGame
-from crgame_ros.gym.episode_setups import EpisodeSetups, StartVariation
-from crgame_ros.gym.game_choice import chosen_game
-from crgame_ros.gym.goal_watch import GoalWatch
-from crgame_ros.gym.reward import Decision, Reward, USUAL_REWARD
+from crgame_ros.gym.episode_setups import chosen_game, EpisodeSetups, StartVariation
+from crgame_ros.gym.reward import Decision, GoalWatch, Reward, USUAL_REWARD
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
 from crgame_ros.policy.observation import Observation, Observed
 from crgame_ros.policy.observation_spec import ObservationSpec

@@ -24,7 +24,7 @@ from crgame_ros.ros.environment import (
 )
 from crgame_ros.ros.place import held
 from crgame_ros.ros.shared_memory import remove_stale
-from crgame_ros.traffic.cache import compile_now
+from crgame_ros.traffic.compiled import compile_now
 
 
 def launch(arguments: Sequence[str] | None = None) -> int:

@@ -4,13 +4,25 @@
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
+import math
+import struct
 
 from crgame_ros.errors import InputError
-from crgame_ros.messages.joints import object_joint_names, OBJECT_JOINTS, vehicle_joint_names
+from crgame_ros.messages.cdr import Reader
+from crgame_ros.messages.joints import (
+    JointSeries,
+    object_joint_names,
+    OBJECT_JOINTS,
+    vehicle_joint_names,
+    VEHICLE_JOINTS,
+)
+from crgame_ros.vehicle.lights import ALL_LIGHTS, Light
 import numpy as np
 from numpy.typing import NDArray
 
 Index = NDArray[np.intp]
+_JOINT = '/lights'
+JOINTS = len(VEHICLE_JOINTS)
 
 
 @dataclass(frozen=True)
@@ -68,3 +80,71 @@ class RequestLayout:
         kept = [number for number, object_id in enumerate(self.ids) if object_id in known]
         return RequestLayout(tuple(self.ids[number] for number in kept), self.columns[kept],
                              self.where)
+
+
+def with_lights(series: JointSeries, lights: Mapping[str, float]) -> JointSeries:
+    """
+    Add what vehicles show now: nobody's future lights are known, which is NaN.
+
+    :param series: a request without lights.
+    :param lights: bits of `Light` by vehicle; NaN where they are not seen.
+    """
+    shape = (len(series.positions), len(lights))
+    shown, nothing = np.full(shape, math.nan), np.full(shape, math.nan)
+    shown[0] = [*lights.values()]
+    return JointSeries(
+        series.stamp_ns, (*series.names, *(name + _JOINT for name in lights)), series.times_ns,
+        *(np.concatenate((array, new), axis=1) for array, new in (
+            (series.positions, shown), (series.velocities, nothing),
+            (series.accelerations, nothing))))
+
+
+def without_lights(series: JointSeries) -> tuple[JointSeries, dict[str, float]]:
+    """Take a request apart: what `with_lights` was given."""
+    columns = light_columns(series.names)
+    if not columns:
+        return series, {}
+    lights = {name: float(series.positions[0, column]) for name, column in columns.items()}
+    kept = [column for column in range(len(series.names)) if column not in columns.values()]
+    return JointSeries(
+        series.stamp_ns, tuple(series.names[column] for column in kept), series.times_ns,
+        *(array[:, kept] for array in (
+            series.positions, series.velocities, series.accelerations))), lights
+
+
+def light_columns(names: tuple[str, ...]) -> dict[str, int]:
+    """Find the columns that hold lights, by vehicle."""
+    return {name.removesuffix(_JOINT): column for column, name in enumerate(names)
+            if name.endswith(_JOINT)}
+
+
+def light_of(value: float) -> Light | None:
+    """Read a position of such a joint, whoever sent it; None if it tells nothing."""
+    return Light(int(value) & ALL_LIGHTS) if math.isfinite(value) else None
+
+
+def request_head(data: bytes, where: str) -> JointSeries:
+    """
+    Read stamp and first vehicle of a request's point 0.
+
+    :param data: a serialised trajectory_msgs/JointTrajectory.
+    :param where: topic for messages.
+    :return: one point of four joints
+    :raises InputError: if it is something else.
+    """
+    try:
+        reader = Reader(data)
+        stamp_ns = reader.stamp_ns()
+        reader.skip_text()
+        names = reader.number()
+        if names < JOINTS:
+            raise ValueError('too few joints')
+        own = tuple(reader.text() for _ in range(JOINTS))
+        for _ in range(names - JOINTS):
+            reader.skip_text()
+        if not reader.number():
+            raise ValueError('no points')
+        rows = [np.array([reader.doubles(JOINTS)]) for _ in range(3)]
+    except (ValueError, struct.error, UnicodeDecodeError) as error:
+        raise InputError(f'cannot be read ({error})', where) from error
+    return JointSeries(stamp_ns, own, np.zeros(1, dtype=np.int64), *rows)

@@ -14,7 +14,7 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import dump_game
 from crgame_ros.nodes.sim.live_run import LiveRun
-from crgame_ros.nodes.sim.outcome import Outcome
+from crgame_ros.nodes.sim.run_state import Outcome
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -22,8 +22,7 @@ from crgame_ros.ros.other_simulation import refuse_another
 from crgame_ros.ros.place import held
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
-from crgame_ros.timing.locked_memory import lock_memory
-from crgame_ros.timing.time_slice import shorten_time_slice
+from crgame_ros.timing.time_slice import lock_memory, shorten_time_slice
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 

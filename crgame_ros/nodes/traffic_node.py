@@ -22,8 +22,8 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import trust_code
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.simulation.traffic_orders import TrafficOrders
 from crgame_ros.simulation.traffic_setup import make_traffic
+from crgame_ros.simulation.world import TrafficOrders
 from crgame_ros.simulation.world_reader import WorldReader
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.warm_up import drive_everything

@@ -84,7 +84,7 @@ class SensedBodies:
         return self._poses
 
     def near(self, x: float, y: float, reach: float) -> tuple[Edges, Discs]:
-        """Return what may be within `reach` of a point: the outlines of the bodies around it [m]."""
+        """Return the outlines of bodies that may be within `reach` of a point [m]."""
         distance = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
         # False where absent: a comparison with NaN.
         close = distance <= self.radii + reach

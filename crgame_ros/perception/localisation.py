@@ -17,8 +17,7 @@ import math
 from crgame_ros.game.perception_spec import LocalisationSpec
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.perception.noise import KeyedNoise
-from crgame_ros.vehicle.standstill import ENCODER_REST
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import ENCODER_REST, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 

@@ -2,17 +2,104 @@
 # SPDX-License-Identifier: Apache-2.0
 """Line tracing with a constant horizon (FS II-B2), in closed form and for all rays at once."""
 
+import math
+
 from crgame_ros.game.perception_spec import SensorSpec
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.perception.bodies import Discs, Edges, SensedBodies
-from crgame_ros.perception.grid_cells import BorderCells
-from crgame_ros.perception.ray_fan import RayFan
 from crgame_ros.perception.sensors import NOTHING, PERMANENT, Pose, Scan, Sensor
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+
+# Of the spacing of rays: takes in a ray that only rounding keeps out of a sector.
+_ROUNDING = 1e-9
+
+
+class RayFan:
+    """
+    Rays over a field of view, the first and the last on its borders.
+
+    Over a full circle the rays are spaced evenly, so that the last does not double the first.
+
+    :param field_of_view: full angle [rad]
+    :param rays: number of rays
+    """
+
+    def __init__(self, field_of_view: float, rays: int) -> None:
+        full = field_of_view > 2.0 * math.pi - 1e-9
+        gaps = rays if full else rays - 1
+        self._last = rays - 1
+        # A single ray points ahead.
+        self._first = -0.5 * field_of_view if gaps else 0.0
+        self._spacing = field_of_view / gaps if gaps else 1.0
+        self.angles: Array = self._first + self._spacing * np.arange(rays, dtype=np.float64)
+
+    def within(self, start: Array, width: Array) -> tuple[Index, Index]:
+        """
+        Pair rays and the sectors that they lie in.
+
+        :param start: (K) direction at which each sector begins, any representation [rad]
+        :param width: (K) angle that it covers counter-clockwise [rad]
+        :return: (Q) rays and (Q) sectors, of every pair
+        """
+        begin = np.mod(start - self._first, 2.0 * np.pi)
+        # A sector beyond a full turn from the first ray covers rays at the beginning again.
+        begin = np.concatenate((begin, begin - 2.0 * np.pi)) / self._spacing
+        end = begin + np.concatenate((width, width)) / self._spacing
+        low = np.maximum(np.ceil(begin - _ROUNDING), 0.0).astype(np.intp)
+        high = np.minimum(np.floor(end + _ROUNDING), self._last).astype(np.intp)
+        counts = np.maximum(high - low + 1, 0)
+        sectors = np.repeat(np.tile(np.arange(len(start)), 2), counts)
+        before = np.cumsum(counts) - counts
+        rays = np.arange(len(sectors)) - np.repeat(before - low, counts)
+        return rays, sectors
+
+
+class BorderCells:
+    """
+    The occupied cells with a free side, or on the border, of the grid last asked about.
+
+    A ray that enters an occupied region from outside does so through one of them. They are found
+    once for each grid: maps give the same object as long as the same part of them is needed.
+    """
+
+    def __init__(self) -> None:
+        self._grid: OccupancyGrid | None = None
+        self._corners: Array = np.empty((0, 2))
+
+    def near(self, grid: OccupancyGrid, x: float, y: float, reach: float) -> Array:
+        """
+        List those around a point.
+
+        :param x: of the point [m]
+        :param y: of the point [m]
+        :param reach: radius [m]
+        :return: (C, 2) lower left corners, relative to the point [m]
+        """
+        if grid is not self._grid:
+            self._grid, self._corners = grid, _border(grid)
+        corners = self._corners - (x, y)
+        middle = corners + 0.5 * grid.resolution
+        close = np.einsum('ij,ij->i', middle, middle) <= (reach + grid.resolution) ** 2
+        near: Array = corners[close]
+        return near
+
+
+def _border(grid: OccupancyGrid) -> Array:
+    """Return the lower left corners (C, 2) of all cells of a grid's occupied borders [m]."""
+    occupied = grid.occupied
+    covered = np.zeros(occupied.shape, dtype=bool)
+    covered[1:-1, 1:-1] = (occupied[:-2, 1:-1] & occupied[2:, 1:-1]
+                           & occupied[1:-1, :-2] & occupied[1:-1, 2:])
+    rows, columns = np.nonzero(occupied & ~covered)
+    cells = np.stack((columns, rows), axis=1).astype(np.float64)
+    corners: Array = grid.resolution * cells + grid.origin
+    return corners
+
+
 # Of pairs of a ray and something in its sector: rays, distances, bodies.
 Pairs = tuple[Index, Array, Index]
 # Sine of the angle below which a ray runs along an edge.

@@ -3,12 +3,19 @@
 """The interface of virtual sensors (FS II-B2), and those that a game may name."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+import math
+from typing import NamedTuple
 
+from crgame_ros.errors import InputError
 from crgame_ros.game.perception_spec import SensorSpec
+from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.perception.bodies import SensedBodies
+from crgame_ros.perception.noise import KeyedNoise
 from crgame_ros.registry import ModelRegistry
+from crgame_ros.vehicle.parameters import VehicleParameters
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +23,10 @@ Pose = tuple[float, float, float]
 
 NOTHING = -1
 PERMANENT = -2
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+# Random numbers for each thing: x, y, yaw and two components of velocity.
+_PER_THING = 5
 
 
 @dataclass(frozen=True)
@@ -73,3 +84,84 @@ def create_sensor(spec: SensorSpec, where: str = '') -> Sensor:
     """
     made: Sensor = SENSORS.create(spec.model, spec.options, where, spec=spec)
     return made
+
+
+class Detections(NamedTuple):
+    """
+    The things that a scan reached.
+
+    :param things: (D) which
+    :param pose_errors: (D, 3) of x, y [m] and yaw [rad]
+    :param velocity_errors: (D, 2) of the velocity's components [m/s]
+    """
+
+    things: Index
+    pose_errors: Array
+    velocity_errors: Array
+
+
+class MountedSensor:
+    """
+    One sensor of an AV.
+
+    :param spec: what it is and where it sits
+    :param vehicle: that carries it
+    :param count: number of things that can appear
+    :param seed: of its noise
+    :param name: of the vehicle, which makes its noise its own
+    :param dt_s: simulation step [s]
+    """
+
+    def __init__(self, spec: SensorSpec, vehicle: VehicleParameters, count: int, seed: int,
+                 name: str, dt_s: float) -> None:
+        self.spec = spec
+        self.period = max(1, round(1.0 / (spec.rate * dt_s)))
+        self.latency = round(spec.latency / dt_s)
+        self.mount = spec.mount(vehicle.rear_to_center, vehicle.length)
+        self._count = count
+        self._sensor = create_sensor(spec, f'sensor {spec.name} of {name}')
+        # Scans are rare: a block would draw rows that nobody asks for.
+        self._noise = KeyedNoise(seed, f'{name}/sensor/{spec.name}',
+                                 _PER_THING * count + spec.rays, block=1)
+
+    def fires(self, n: int) -> bool:
+        """Return whether it scans at step n."""
+        return n % self.period == 0
+
+    def pose(self, carrier: VehicleState) -> Pose:
+        """Return its x, y [m] and yaw [rad] on a vehicle in some state."""
+        x, y, yaw = self.mount
+        cos, sin = math.cos(carrier.yaw), math.sin(carrier.yaw)
+        return (carrier.x + cos * x - sin * y, carrier.y + sin * x + cos * y,
+                wrap_pi(carrier.yaw + yaw))
+
+    def scan(self, n: int, carrier: VehicleState, bodies: SensedBodies,
+             grid: OccupancyGrid | None) -> tuple[Scan, Detections]:
+        """
+        Scan the world at step n.
+
+        :param carrier: the true state of its vehicle
+        :raises InputError: if a model of the user's own gives no proper scan.
+        """
+        spec = self.spec
+        pose = self.pose(carrier)
+        scan = self._sensor.scan(pose, bodies, grid)
+        self._check(scan)
+        noise = self._noise.normal(n)
+        ranges = np.maximum(
+            scan.ranges + spec.range_noise * noise[_PER_THING * self._count:], 0.0)
+        counts = np.bincount(scan.hits[scan.hits >= 0], minlength=self._count)
+        things = np.flatnonzero(counts >= spec.min_rays)
+        drawn = noise[:_PER_THING * self._count].reshape(-1, _PER_THING)[things]
+        deviations = (spec.position_noise, spec.position_noise, spec.yaw_noise)
+        return (replace(scan, ranges=ranges, pose=pose),
+                Detections(things, drawn[:, :3] * deviations, drawn[:, 3:] * spec.velocity_noise))
+
+    def _check(self, scan: Scan) -> None:
+        shape = (self.spec.rays,)
+        if not (scan.angles.shape == scan.ranges.shape == scan.hits.shape == shape):
+            raise InputError('gives a scan of another length than its rays',
+                             f'sensor {self.spec.name}', f'give {self.spec.rays} of each')
+        if scan.hits.min() < PERMANENT or scan.hits.max() >= self._count:
+            raise InputError('hits a body that does not exist', f'sensor {self.spec.name}',
+                             f'use 0 to {self._count - 1}, -1 for nothing, -2 for the map')

@@ -10,10 +10,10 @@ import traceback
 
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.messages.plan import Plan, PlanRequest
-from crgame_ros.planner.braking import braking_plan
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.plan_check import check_start
 from crgame_ros.planner.road_limit import RoadLimit
+from crgame_ros.planner.rollout import braking_plan
 from crgame_ros.vehicle.stopping import FIRM_BRAKING
 
 Clock = Callable[[], float]

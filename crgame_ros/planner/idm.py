@@ -8,19 +8,17 @@ from typing import ClassVar, NamedTuple
 
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.lane_gap import has_gap
 from crgame_ros.planner.path_following import Longitudinal, PathPosition
 from crgame_ros.planner.path_obstacles import Corridor, ObstacleProjector, PathObstacles
 from crgame_ros.planner.path_planner import check_positive, PathPlanner
 from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.planner.route_lane_change import LaneChange, Verdict
+from crgame_ros.planner.route_lane_change import has_gap, LaneChange, Verdict
 from crgame_ros.planner.side_lanes import OWN_LANE, SideLane
 from crgame_ros.planner.speed_profile import admissible_speeds, default_speed, desired_speeds
 from crgame_ros.planner.stop_lines import StopLines
 from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.standstill import STANDING
-from crgame_ros.vehicle.state import StateColumn, VehicleState
+from crgame_ros.vehicle.state import STANDING, StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 

@@ -59,7 +59,7 @@ from crgame_ros.planner.speed_profile import (  # noqa: E402
     desired_speeds,
 )
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
-from crgame_ros.vehicle.standstill import STANDING  # noqa: E402
+from crgame_ros.vehicle.state import STANDING  # noqa: E402
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 

@@ -16,7 +16,7 @@ from crgame_ros.planner.reactive_core import configuration, ReactiveCore
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.planner.road_limit import TOLERANCE
 from crgame_ros.planner.side_lanes import OWN_LANE, road_bounds, side_lanes, SideLane
-from crgame_ros.vehicle.standstill import REST
+from crgame_ros.vehicle.state import REST
 import numpy as np
 from numpy.typing import NDArray
 

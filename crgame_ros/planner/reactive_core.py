@@ -25,8 +25,10 @@ from crgame_ros.planner.interface import PlannerContext  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
-from crgame_ros.vehicle.standstill import REST  # noqa: E402
-from crgame_ros.vehicle.state import STATE_WIDTH  # noqa: E402
+from crgame_ros.vehicle.state import (
+    REST,  # noqa: E402
+    STATE_WIDTH,  # noqa: E402
+)
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 

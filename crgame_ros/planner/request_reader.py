@@ -10,8 +10,7 @@ from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.messages.joints import JointSeries, vehicles_from_joints
 from crgame_ros.messages.plan import PlanRequest
-from crgame_ros.messages.request_layout import RequestLayout
-from crgame_ros.messages.request_lights import light_columns, light_of
+from crgame_ros.messages.request_layout import light_columns, light_of, RequestLayout
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 

@@ -5,7 +5,7 @@
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.speed_envelope import SpeedEnvelope
+from crgame_ros.vehicle.stopping import SpeedEnvelope
 import numpy as np
 from numpy.typing import NDArray
 

@@ -8,7 +8,7 @@ from commonroad.scenario.scenario import Scenario
 from crgame_ros.planner.reference_path import DrivingPath
 from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.roads.signs import has_stop_sign, lights_for, lights_of, stop_line_middle
-from crgame_ros.vehicle.standstill import STANDING
+from crgame_ros.vehicle.state import STANDING
 
 TURN = 0.45
 SIGN_REACH = 4.0

@@ -9,9 +9,8 @@ from commonroad.scenario.scenario import Scenario
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.policy.actions import checked_action, pedals, wanted_motion
+from crgame_ros.policy.actions import checked_action, PedalInverse, pedals, wanted_motion
 from crgame_ros.policy.observation import Observation
-from crgame_ros.policy.pedal_inverse import PedalInverse
 from crgame_ros.policy.policy_file import Policy
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.policy.seat_view import SeatView

@@ -113,7 +113,7 @@ def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if it cannot be read.
     """
-    from crgame_ros.analysis.tables.recorded_run import run_name
+    from crgame_ros.analysis.tables.tabulated_run import run_name
     place = as_path(path, 'run')
     bag = recording_in(place)
     return RecordedRun(run_name(place), bag, read_run_log(bag, epoch))

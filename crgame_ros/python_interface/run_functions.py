@@ -60,9 +60,9 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
     :return: the folder.
     :raises InputError: if a run cannot be read, or the folder not be written.
     """
-    from crgame_ros.analysis.tables.recorded_run import own_id
     from crgame_ros.analysis.tables.run_tables import write_tables
     from crgame_ros.analysis.tables.table_writer import FORMATS
+    from crgame_ros.analysis.tables.tabulated_run import own_id
     out = as_path(folder, 'folder')
     file_format = next((name for name in FORMATS if name == to), None)
     if file_format is None:

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple, Self
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import BIG_ENDIAN, HEADER_BYTES, LITTLE_ENDIAN
-from crgame_ros.recording.contract_types import is_foreign
 from crgame_ros.recording.mcap_file import McapFile
 from crgame_ros.recording.metadata import METADATA_FILE, read_metadata
 from crgame_ros.recording.run_folder import parts_of
+from crgame_ros.recording.schemas import is_foreign
 from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError

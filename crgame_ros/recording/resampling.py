@@ -23,7 +23,7 @@ IntArray = NDArray[np.int64]
 def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: float,
              wanted_ns: IntArray) -> FloatArray:
     """
-    Return the states of vehicles at the time n dt of their own motion: at the sum of its intervals.
+    Return the states of vehicles at time n dt of their motion: at the sum of its intervals.
 
     Where that sum is n dt exactly, so without any measured interval, it is the state n itself.
     Between two states positions and heading are cubic by their rates at both ends, all else is

@@ -251,7 +251,7 @@ def _vehicle_states(points: Mapping[int, FloatArray], ns: IntArray, vehicles: Se
 
 def _published(points: Mapping[int, FloatArray], ticks: IntArray,
                resampled: FloatArray) -> FloatArray:
-    """Return the states (K, V, 8) as they were published; the resampled ones where none is known."""
+    """Return the states (K, V, 8) as published; the resampled ones where none is known."""
     published = resampled.copy()
     for row, n in enumerate(ticks.tolist()):
         if (point := points.get(n)) is not None:

@@ -2,21 +2,184 @@
 # SPDX-License-Identifier: Apache-2.0
 """All of a run that measures need beside its motion: what its drivers did, and its events."""
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+import json
 from pathlib import Path
+import re
+import statistics
+from typing import NamedTuple
 
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import MALFORMED
+from crgame_ros.game.driven_vehicle import VEHICLE_ID
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.game.task_documents import TaskEntry
-from crgame_ros.recording.recorded_drivers import read_drivers, RecordedDriver
+from crgame_ros.game.seat_documents import DRIVERS_TOPIC, DrivingSpell, parse_spells
+from crgame_ros.game.task_documents import LOG_TOPIC, parse_log, TaskEntry
+from crgame_ros.messages.cdr import header_stamp_ns
+from crgame_ros.messages.status_values import read_status
+from crgame_ros.messages.world_messages import VEHICLES_TOPIC
+from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
-from crgame_ros.recording.recorded_tasks import read_task_entries
 from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 import numpy as np
 from numpy.typing import NDArray
+
+SEAT_ORDER_TOPIC = '/seats/order'
+_DIAGNOSTICS = '/diagnostics'
+# Of people at pages, and of devices at the machine of the game.
+_DRIVER = re.compile('(?:cockpit|driver)_node: (.+) driver')
+_DELAYS = ('input_delay_ms', 'round_trip_ms')
+
+
+def read_task_entries(path: Path, epoch: int) -> tuple[TaskEntry, ...]:
+    """
+    Read what happened in the tasks of one run, in order; nothing of a game without tasks.
+
+    :param epoch: which run.
+    :raises InputError: if the recording cannot be read.
+    """
+    found: list[TaskEntry] = []
+    with BagReader(path, parts=True) as reader:
+        for _, _, _, message in reader.readable([LOG_TOPIC]):
+            try:
+                number, entries = parse_log(message.data)
+            except InputError:
+                # Anybody may have published on this topic.
+                continue
+            if number == epoch:
+                found += entries
+    return tuple(found)
+
+
+class SeatOrder(NamedTuple):
+    """
+    That somebody asked for a seat, or gave it back.
+
+    :param n: simulation step of the newest state then.
+    :param seat: the vehicle.
+    :param source: whose commands it shall obey; `game` and `planner` give it back.
+    """
+
+    n: int
+    seat: str
+    source: str
+
+
+def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, ...]:
+    """
+    Read the orders of a run from its recording.
+
+    They carry no stamp: each belongs to the newest state that was recorded before it.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there is no such run in it.
+    """
+    with BagReader(path, parts=True) as reader:
+        topic = reader.topics.get(SEAT_ORDER_TOPIC)
+        if topic is None or not topic.message_count:
+            return ()
+        run = read_epoch(reader, epoch)
+        found: list[SeatOrder] = []
+        newest: int | None = None
+        for message in reader.messages([SEAT_ORDER_TOPIC, VEHICLES_TOPIC]):
+            if message.topic == VEHICLES_TOPIC:
+                stamp_ns = header_stamp_ns(message.data)
+                held = run.holds(stamp_ns, message.log_time_ns)
+                newest = run.game.scheduler.step_of_stamp(stamp_ns) if held else None
+                continue
+            if newest is None:
+                # Before the run's first state, or of another run.
+                continue
+            try:
+                found.append(_order(newest, str(reader.decode(message).message.data)))
+            except InputError:
+                # Anybody may have published on this topic.
+                continue
+        return tuple(found)
+
+
+def _order(n: int, text: str) -> SeatOrder:
+    try:
+        content = json.loads(text)
+        order = SeatOrder(n, content['seat'], content['source'])
+        if not VEHICLE_ID.fullmatch(order.seat) or not isinstance(order.source, str):
+            raise ValueError('no seat, or no source')
+    except MALFORMED as error:
+        raise InputError('is no order', SEAT_ORDER_TOPIC) from error
+    return order
+
+
+class RecordedDriver(NamedTuple):
+    """
+    One stretch of a run that somebody drove.
+
+    :param spell: who, which seat, from which step to which.
+    :param input_delay_ms: median from the hand to the first later state, at the page (drawing is
+        more) or at the machine of a device [ms]; None if not measured.
+    :param round_trip_ms: median from the page to the simulation and back [ms]; likewise.
+    """
+
+    spell: DrivingSpell
+    input_delay_ms: float | None
+    round_trip_ms: float | None
+
+
+def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
+    """
+    Read who drove in a run from its recording; nobody, in one that does not say it.
+
+    :param epoch: which run, where a recording holds several; None for the last.
+    :raises InputError: if there is no such run in it.
+    """
+    with BagReader(path, parts=True) as reader:
+        topic = reader.topics.get(DRIVERS_TOPIC)
+        if topic is None or not topic.message_count:
+            return ()
+        wanted = read_epoch(reader, epoch).game.epoch
+        spells: tuple[DrivingSpell, ...] = ()
+        # By seat, person and name of the value.
+        delays_ms: dict[tuple[str, str, str], list[float]] = defaultdict(list)
+        for message in reader.messages([DRIVERS_TOPIC, _DIAGNOSTICS]):
+            content = reader.decode(message).message
+            if message.topic == DRIVERS_TOPIC:
+                spells = _newer(spells, str(content.data), wanted)
+            else:
+                for status in map(read_status, content.status):
+                    if found := _DRIVER.fullmatch(status.name):
+                        for name in _DELAYS:
+                            _note(delays_ms[found[1], status.values.get('person', ''), name],
+                                  status.values.get(name, ''))
+    return tuple(RecordedDriver(item, *(_median(delays_ms.get(
+        (item.seat, '' if item.person is None else item.person.id, name)))
+        for name in _DELAYS)) for item in spells)
+
+
+def _newer(spells: tuple[DrivingSpell, ...], text: str,
+           wanted: int) -> tuple[DrivingSpell, ...]:
+    """Take what a message says of the wanted run: each says all so far."""
+    try:
+        epoch, newer = parse_spells(text)
+    except InputError:
+        # Anybody may have published on this topic.
+        return spells
+    return newer if epoch == wanted else spells
+
+
+def _note(delays_ms: list[float], text: str) -> None:
+    try:
+        delays_ms.append(float(text))
+    except ValueError:
+        # Not measured yet.
+        return
+
+
+def _median(values: list[float] | None) -> float | None:
+    return statistics.median(values) if values else None
 
 
 @dataclass(frozen=True)

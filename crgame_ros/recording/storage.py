@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from crgame_ros.errors import InputError
-from crgame_ros.recording.contract_types import is_foreign
 from crgame_ros.recording.mcap_file import McapFile, Segment
 from crgame_ros.recording.metadata import BagTopic, parse_qos, TopicQos
+from crgame_ros.recording.schemas import is_foreign
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 

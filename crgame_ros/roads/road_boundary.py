@@ -9,7 +9,7 @@ import math
 
 from commonroad.scenario.lanelet import LaneletNetwork
 from commonroad_dc import pycrcc
-from crgame_ros.geometry.footprint import Footprint, triangle_corners
+from crgame_ros.geometry.outline import Footprint, triangle_corners
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.road_surface import (
     lanelet_polygons,

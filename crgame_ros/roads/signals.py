@@ -37,7 +37,7 @@ class LightCycle:
         return self.states[index], self.ends[index] - phase
 
     def states_over(self) -> NDArray[np.str_]:
-        """Return the states over one period from time step 0 on; one where nothing ever changes."""
+        """Return the states over one period from time step 0; one where nothing ever changes."""
         if not self.ends:
             return np.array(self.states)
         return np.roll(np.repeat(self.states, np.diff(self.ends, prepend=0)), self.offset)
@@ -59,7 +59,7 @@ class TrafficLights:
 
     def states_at(self, k: int) -> dict[int, str]:
         """
-        Return the state of each light in its XML spelling: red, yellow, redYellow, green, inactive.
+        Return each light's state in its XML spelling: red, yellow, redYellow, green, inactive.
 
         While no light changes, the same dictionary object is returned: comparing it with `is`
         tells cheaply whether anything may have changed since the previous call.

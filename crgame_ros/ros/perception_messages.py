@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import LaserScan
 
 Array = NDArray[np.float64]
-
 # Places of x, y and yaw in the 6 x 6 covariance of a pose.
 POSE_PLACES = (0, 1, 5)
 

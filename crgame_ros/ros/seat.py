@@ -138,7 +138,7 @@ class Seat:
         return self.recording is not None and self.repeats_recording and self.recording.drives(n)
 
     def awaits_driver(self, now_ns: int) -> bool:
-        """Return whether the seat is the cockpit's by the game, and no hands are on its controls."""
+        """Return whether the game gives the seat to the cockpit and its controls are untouched."""
         if self.home != COCKPIT or self.source != COCKPIT:
             return False
         self.listen(now_ns)

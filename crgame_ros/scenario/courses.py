@@ -146,7 +146,7 @@ class ObstacleCourses:
         return sorted(self._courses)
 
     def states_at(self, k: int) -> ObjectStates:
-        """Return all states at a time step, as far as events have happened; do not write to them."""
+        """Return all states at a time step, given the events so far; do not write to them."""
         states = self._obstacles.states_at(k)
         if not self._courses:
             return states

@@ -3,7 +3,7 @@
 """Light and air of a run: what its game says, else what its scenario says."""
 
 from commonroad.scenario.scenario import Environment, Scenario, TimeOfDay, Weather
-from crgame_ros.game.environment_spec import CLEAR_M, EnvironmentSpec
+from crgame_ros.game.game import CLEAR_M, EnvironmentSpec
 
 # By definition fog is less than 1 km [m]; a rear fog lamp is allowed below 50 m.
 FOG_M = 200.0

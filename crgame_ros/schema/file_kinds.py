@@ -43,7 +43,7 @@ FILE_KINDS = {
     'vehicle': FileKind('crgame_ros.vehicle.parameters', 'VehicleParameters', 'Vehicle'),
     'steering': FileKind('crgame_ros.vehicle.steering', 'SteeringRatioTable',
                          'Table of steering ratios'),
-    'device': FileKind('crgame_ros.driver.device_file', 'DeviceFile', 'Device map'),
+    'device': FileKind('crgame_ros.driver.device_map', 'DeviceFile', 'Device map'),
     'timeline': FileKind('crgame_ros.driver.timeline_file', 'TimelineFile', 'Scripted driver'),
     'occupancy': FileKind('crgame_ros.occupancy.occupancy_map_file', 'MapEntry', 'Occupancy map'),
     'study': FileKind('crgame_ros.study.study_file', 'StudyFile', 'Study'),

@@ -9,12 +9,11 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.object_spec import MoverType, ObjectSpec
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.outline import half_extents
-from crgame_ros.scripted.object_motion import ABSENT, Integrated
+from crgame_ros.scripted.object_motion import ABSENT, Integrated, ObjectSurroundings
 from crgame_ros.scripted.object_path import ObjectPath
-from crgame_ros.scripted.object_surroundings import ObjectSurroundings
 from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
-from crgame_ros.vehicle.speed_envelope import SpeedEnvelope
-from crgame_ros.vehicle.standstill import STANDING
+from crgame_ros.vehicle.state import STANDING
+from crgame_ros.vehicle.stopping import SpeedEnvelope
 import numpy as np
 from numpy.typing import NDArray
 

@@ -10,10 +10,14 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scripted.object_bicycle import BicycleMotion, check_bends
-from crgame_ros.scripted.object_motion import ObjectMotion, Predetermined, Standstill
+from crgame_ros.scripted.object_motion import (
+    ObjectMotion,
+    ObjectSurroundings,
+    Predetermined,
+    Standstill,
+)
 from crgame_ros.scripted.object_particle import ParticleMotion
 from crgame_ros.scripted.object_path import ObjectPath
-from crgame_ros.scripted.object_surroundings import ObjectSurroundings
 from crgame_ros.waypoints.waypoint_lanelets import graded, lane_of_chain, lanelet_chain
 from crgame_ros.waypoints.waypoints import WaypointLane
 import numpy as np

@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 
 from crgame_ros.control.tracked_execution import TrackedExecution
-from crgame_ros.control.trackers import TRACKERS
+from crgame_ros.control.tracker import TRACKERS
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec, ModelSpec
 from crgame_ros.game.objects import ObjectDescription, Role

@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which planning problems of a scenario are driven, by which AV."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 import math
+from typing import Any, Final
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec, Game
+from crgame_ros.game.perception_spec import PerceptionSpec
+from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.spawn import problem_pose
@@ -21,6 +25,8 @@ _ON_ONE_SPOT_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 
 # So many alternatives are named in a notice; of five hundred nobody reads them all.
 NAMED = 8
+# Leaves what the game says.
+OWN: Final = 'own'
 
 
 def cast_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
@@ -116,3 +122,27 @@ def _placed(problem: PlanningProblem, time_s: float) -> shapely.Polygon:
     x, y = state.center(vehicle.rear_to_center)
     return placed_polygon(vehicle.shape, x + time_s * state.speed * math.cos(state.yaw),
                           y + time_s * state.speed * math.sin(state.yaw), state.yaw)
+
+
+def adapt_game(game: Game, loaded: LoadedScenario, *, seed: int, planner: str = OWN,
+               options: Mapping[str, Any] | None = None,
+               perception: PerceptionSpec | str | None = OWN,
+               traffic: TrafficSpec | str | None = OWN) -> Game:
+    """
+    Let a game's AVs and traffic be others.
+
+    :param seed: of everything random.
+    :param planner: of all AVs, or OWN.
+    :param options: of that planner.
+    :param perception: of all AVs; None is perfect, OWN the game's.
+    :param traffic: None is none, OWN the game's.
+    :raises InputError: if the scenario has no planning problems for the game's AVs.
+    """
+    specs = [spec for spec, _ in cast_avs(game, loaded)[0]]
+    if planner != OWN:
+        specs = [replace(spec, planner=planner, options=dict(options or {})) for spec in specs]
+    if not isinstance(perception, str):
+        specs = [replace(spec, perception=perception) for spec in specs]
+    if not isinstance(traffic, str):
+        game = replace(game, traffic=traffic)
+    return replace(game, avs=tuple(specs), seed=seed)

@@ -177,7 +177,7 @@ def _contact(motions: Motions, touch: _Touch) -> Contact:
 
 
 def _unstopped(course: Course, n: int, dt_s: float) -> Course:
-    """Return the course of who was stopped at a step, as if it had gone on into what it touched."""
+    """Return the course of a vehicle stopped at a step, as if it had gone on into the contact."""
     before = max(n - 1, 0)
     poses, speeds = course.poses.copy(), course.speeds.copy()
     yaw = float(poses[before, 2])

@@ -15,7 +15,7 @@ from crgame_ros.game.task_documents import OpenPrompt, TaskEntry, TaskReport
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.planner.planner_registry import EXTERNAL
 from crgame_ros.planner.road_limit import RoadLimit
-from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
+from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle, RouteLane
 from crgame_ros.simulation.av_models import (
     ego_of,
     make_execution,
@@ -25,7 +25,6 @@ from crgame_ros.simulation.av_models import (
 )
 from crgame_ros.simulation.plan_indicator import PlanIndicators
 from crgame_ros.simulation.plan_requests import PlanRequests
-from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.run_tasks import RunTasks
 from crgame_ros.simulation.setup import AvSetup, Setup

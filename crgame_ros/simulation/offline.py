@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crgame_ros.control.tracked_execution import TrackingErrors
-from crgame_ros.drivability.monitor import VehicleDrivability
-from crgame_ros.driver.source import DriverSource
+from crgame_ros.drivability.monitor import road_transforms, VehicleDrivability
+from crgame_ros.driver.source import DriverSource, IdleDriver, parse_source, ScriptedDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.task_documents import TaskEntry
@@ -21,13 +21,39 @@ from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.av_models import make_perception, published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import drivability_monitor, ObservedRun, RunObserver
-from crgame_ros.simulation.offline_driver import offline_driver
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import COMMAND_WIDTH, RELEASED
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 import numpy as np
 from numpy.typing import NDArray
+
+
+def offline_driver(setup: Setup, index: int) -> DriverSource:
+    """
+    Make the driver that a game names for a human.
+
+    :param index: of the human.
+    :raises InputError: if it needs a person, a device or a recording that isn't at hand.
+    """
+    human = setup.humans[index]
+    source = parse_source(human.driver)
+    if human.timeline:
+        return ScriptedDriver.from_text(human.timeline, f'{human.id}: {human.driver}')
+    if source.kind in ('idle', 'auto'):
+        return IdleDriver()
+    if source.kind == 'policy':
+        # Few games have one, and others should not wait for what it needs.
+        from crgame_ros.policy.policy_driver import DrivenSeat, PolicyDriver
+        from crgame_ros.policy.policy_file import load_policy
+        transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
+        return PolicyDriver(load_policy(source.argument, human.id), DrivenSeat(
+            index, setup.vehicle_descriptions, setup.obstacles.descriptions,
+            setup.loaded.scenario, human.vehicle, human.state, transforms[index],
+            setup.scheduler.steps_per_tick))
+    raise InputError(f'driver "{human.driver}" needs a person or a device', human.id,
+                     'offline, use keys:FILE, joy:FILE, policy:FILE.py:load, replay:BAG or idle')
+
 
 DEFAULT_DURATION_S = 20.0
 

@@ -218,7 +218,7 @@ class PlanIndicators:
             (ticks * self._steps_in_tick + max(0, rest - 1)) % self._period)
 
     def _coming(self, n: int, av: AutonomousVehicle) -> NDArray[np.float64]:
-        """Return where an AV is, and where its plan leads from now on, in the roads' coordinates."""
+        """Return where an AV is and where its plan leads, in the roads' coordinates."""
         poses = [av.state[:3]]
         for step in range(n + self._apart, n + round(LOOK_AHEAD_S / self._scheduler.dt_s) + 1,
                           self._apart):

@@ -13,7 +13,7 @@ from crgame_ros.messages.joints import (
     vehicle_to_joints,
     without_absent,
 )
-from crgame_ros.messages.request_lights import with_lights
+from crgame_ros.messages.request_layout import with_lights
 from crgame_ros.planner.planner_registry import PLANNERS
 from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.prediction import (

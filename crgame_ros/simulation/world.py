@@ -9,13 +9,95 @@ from crgame_ros.game.events import TrafficOrder
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.simulation.surroundings import Surroundings
-from crgame_ros.simulation.traffic_orders import TrafficOrders
 from crgame_ros.vehicle.state import VehicleState
 
 if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
     from crgame_ros.traffic.traffic import Traffic
     from crgame_ros.traffic.world_view import WorldView
+from typing import TYPE_CHECKING
+
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.simulation.world_reader import (
+    driven_centers,
+    FloatArray,
+    joints_of,
+    WorldReader,
+)
+import numpy as np
+
+if TYPE_CHECKING:
+    from crgame_ros.traffic.world_view import WorldView
+from typing import TYPE_CHECKING
+
+from crgame_ros.game.events import EventSpec, SpeedLimit
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
+from crgame_ros.scenario.loading import LoadedScenario
+
+if TYPE_CHECKING:  # Imports numba: only runs with agents should wait for that.
+    from crgame_ros.traffic.traffic import Traffic
+
+
+class TrafficOrders:
+    """
+    Passes orders on to agents, with the roads of the run as they know them.
+
+    :param loaded: the scenario, which stays as it is.
+    :param events: of the game; without one about speed limits nothing is copied.
+    """
+
+    def __init__(self, loaded: LoadedScenario, events: Sequence[EventSpec]) -> None:
+        self._scenario = loaded.scenario
+        if any(isinstance(event.action, SpeedLimit) for event in events):
+            self._scenario = with_own_roads(loaded.scenario)
+
+    def obey(self, order: TrafficOrder, traffic: 'Traffic') -> None:
+        """Let agents do as they are told from their next decision on."""
+        if isinstance(order, SpeedLimit):
+            set_speed_limit(self._scenario, order.speed, order.lanelets)
+            traffic.read_speed_limits(RoadNetwork(self._scenario.lanelet_network))
+        else:
+            traffic.change(order)
+
+
+class Surroundings:
+    """
+    The world as agents and as objects of the game see it.
+
+    Agents see all that is no agent; the game's own objects see all that is none of them.
+
+    :param setup: the run.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._reader = WorldReader(setup.descriptions, TrafficLights(setup.loaded.scenario))
+        self._ahead = [vehicle.vehicle.rear_to_center for vehicle in setup.vehicles]
+        mine = set(setup.scripted_columns.tolist())
+        self._columns = [column for column in range(len(setup.obstacles.descriptions))
+                         if column not in mine]
+        shapes = [item.shape for item in (
+            *setup.vehicle_descriptions,
+            *(setup.obstacles.descriptions[column] for column in self._columns))]
+        self._sizes = (np.array([shape.length for shape in shapes]),
+                       np.array([shape.width for shape in shapes]))
+        self._joints = joints_of([vehicle.state for vehicle in setup.vehicles])
+        self._objects = setup.obstacles.states_at(setup.scheduler.k0)
+
+    def see(self, states: Sequence[VehicleState], objects: ObjectStates) -> None:
+        """Take the present states of the driven vehicles and of all objects."""
+        self._joints = joints_of(states)
+        self._objects = objects
+
+    def of_agents(self, k: int) -> 'WorldView':
+        """Return what agents react to at tick k."""
+        return self._reader.view(k, *self._joints, self._objects)
+
+    def of_scripted(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return poses and velocities (O, 3), lengths and widths (O) that objects react to."""
+        poses, rates = driven_centers(*self._joints, self._ahead)
+        return (np.concatenate((poses, self._objects.poses[self._columns])),
+                np.concatenate((rates, self._objects.velocities[self._columns])),
+                *self._sizes)
 
 
 class TrafficFeed(Protocol):

@@ -155,7 +155,7 @@ class CycleTable:
         return values
 
     def drove(self, vehicle_id: str) -> NDArray[np.bool_]:
-        """Return for each row (R) whether somebody drove a vehicle, which may have taken no part."""
+        """Return for each row (R) whether a vehicle was driven; it may have taken no part."""
         place = self._place.get(f'{vehicle_id}/{COMMAND_COLUMNS[0]}')
         return np.zeros(len(self.rows), dtype=bool) if place is None \
             else np.isfinite(self.rows[:, place])

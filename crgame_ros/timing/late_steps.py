@@ -52,7 +52,7 @@ class LateStep:
 
     @property
     def split_s(self) -> Mapping[str, float]:
-        """Return the time by cause, with what is unexplained; together they are the lateness [s]."""
+        """Return the time by cause, and unexplained; together they are the lateness [s]."""
         return {**self.causes._asdict(), UNEXPLAINED: max(0.0, self.late_s - sum(self.causes))}
 
     @property

@@ -14,6 +14,20 @@ import os
 import platform
 import struct
 
+# Of sys/mman.h: what is there, what will be, each from its first use on.
+MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
+
+
+def lock_memory() -> bool:
+    """
+    Ask for the pages of this process, as it comes to use them, to stay in memory.
+
+    :return: whether the system does; it asks for CAP_IPC_LOCK, or for a limit `memlock` in
+        /etc/security/limits.d above the whole address space.
+    """
+    return bool(ctypes.CDLL(None).mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0)
+
+
 # Numbers of sched_setattr and sched_getattr; glibc has no names for them before 2.41.
 _CALLS = {'x86_64': (314, 315), 'aarch64': (274, 275)}
 # struct sched_attr: size, policy, flags, nice, priority, runtime (the slice), deadline, period.

@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.registry import ModelRegistry
 from crgame_ros.traffic.compiled import compiled, vectorized
 from crgame_ros.vehicle.idm_model import free_acceleration, IdmParameters, interaction
-from crgame_ros.vehicle.standstill import STANDING
+from crgame_ros.vehicle.state import STANDING
 import numpy as np
 from numpy.typing import NDArray
 
@@ -256,7 +256,7 @@ class AdaptiveCruise(CarFollowing):
         self._speed_time = speed_time
 
     def follow(self, speed: Array, desired_speed: Array, gap: Array, lead_speed: Array) -> Array:
-        """Return FS 3 with timely braking, or the approach to the desired speed if that is less."""
+        """Return FS 3 with timely braking, or the approach to the desired speed if less."""
         return np.asarray(_cruise(
             speed, desired_speed, gap, lead_speed, self.time_gap, self.h, self.gain,
             self.standstill_gap, self._comfortable_deceleration, self._speed_time))

@@ -9,8 +9,7 @@ from commonroad.common.common_lanelet import LaneletType
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.roads.signs import sign_names
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.driving_side import DrivingSide, RIGHT_HAND
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.lane_graph import DrivingSide, FloatArray, IntArray, LaneGraph, RIGHT_HAND
 from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, UNDECIDED
 import numpy as np
 from numpy.typing import NDArray

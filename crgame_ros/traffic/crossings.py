@@ -19,7 +19,7 @@ from crgame_ros.traffic.meetings import (
     Meetings,
     Situation,
 )
-from crgame_ros.vehicle.standstill import STANDING
+from crgame_ros.vehicle.state import STANDING
 import numpy as np
 
 # Nearer to where one waits is first there [m].

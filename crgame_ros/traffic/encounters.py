@@ -172,7 +172,7 @@ def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap:
 @bare
 def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                    other: int) -> float:
-    """Return the gentlest braking with which two agents miss each other, -inf if none is needed."""
+    """Return the gentlest braking by which two agents miss each other, -inf if none is needed."""
     speed = agents.speed[slot]
     soon = _touch(lanes, following, agents, slot, speed, other, 0.0, FORESEEN, BESIDE)
     if soon == math.inf:

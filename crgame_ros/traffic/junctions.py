@@ -124,7 +124,7 @@ def hold_before(entry: float) -> float:
 
 @compiled
 def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int) -> float:
-    """Return the distance from an agent's centre to where its front waits before a junction [m]."""
+    """Return the distance of an agent's centre to where its front waits before a junction [m]."""
     hold = hold_before(entry) + way.offset[i, step]
     if step > 0:
         line = lines[way.lane[i, step - 1]]

@@ -87,7 +87,7 @@ class LaneTable(NamedTuple):
 
 @inlined
 def first_at_least(values: FloatArray | IntArray, low: int, high: int, least: float) -> int:
-    """Return the first row from `low` on with no less than a value, `high` if none before it has."""
+    """Return the first row from `low` with at least a value, `high` if none before it has."""
     while low < high:
         middle = (low + high) // 2
         if values[middle] < least:

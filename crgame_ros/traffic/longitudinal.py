@@ -7,14 +7,13 @@ import math
 from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
 from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.encounters import FIRMEST, moderate
-from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.lane_change import SHORTEST_CHANGE
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, nearest_row
-from crgame_ros.traffic.leaders import Corridors, Pairs, Ways
+from crgame_ros.traffic.leaders import Corridors, Followers, Pairs, Ways
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.vehicle.standstill import QUEUEING
+from crgame_ros.vehicle.state import QUEUEING
 import numpy as np
 from numpy.typing import NDArray
 

@@ -11,7 +11,7 @@ from crgame_ros.traffic.conflicts import ConflictTable, touch
 from crgame_ros.traffic.junctions import Arrivals, Passages, time_to
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.leaders import Ways
-from crgame_ros.vehicle.standstill import QUEUEING
+from crgame_ros.vehicle.state import QUEUEING
 import numpy as np
 from numpy.typing import NDArray
 

@@ -128,7 +128,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
 @inlined
 def onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
            s: float) -> tuple[int, float]:
-    """Return the lane on a route, and the arc length there, for an arc length of an earlier one."""
+    """Return the lane on a route, and the arc length there, for an arc length of an earlier."""
     for _ in range(LANES_AHEAD):
         if s <= lanes.length[lane]:
             break

@@ -180,7 +180,7 @@ class Movements:
                     yield lanes, follower
 
     def _angle(self, lanes: tuple[int, ...]) -> float:
-        """Return the turn from the end of the first lane to the beginning of the last one [rad]."""
+        """Return the turn from the end of the first lane to the start of the last [rad]."""
         graph = self._graph
         first = np.array(lanes)
         begin = graph.yaw[graph.first[first]]

@@ -139,7 +139,7 @@ def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles
 
 def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArray:
     """
-    Return the speeds at which agents that steer as `tracking.steer` does keep to a band's clearance.
+    Return the speeds at which agents that steer by `tracking.steer` keep a band's clearance.
 
     They steer for a point that is farther ahead the faster they drive, and so cut what is shorter
     than that. On small angles a rear axle that steers for the point at the distance l moves as

@@ -51,7 +51,7 @@ ASIDE = 0.6
 def tight_lanes(graph: LaneGraph, car: Shape, large_car: Shape,
                 truck: Shape) -> NDArray[np.bool_]:
     """
-    Return for cars and long vehicles (2) which lanes (2, L) they leave the road on, as agents drive.
+    Return the lanes (2, L) on which cars and long vehicles (2) leave the road, as agents drive.
 
     Each lane with a bend, a kink or little width is driven from every lane before it to every
     lane behind it. Where one leaves the road it is tried whether swinging out helps, and
@@ -256,7 +256,7 @@ class _Trials:
 
 
 def _suspicious(graph: LaneGraph, shape: Shape) -> FloatArray:
-    """Return from where to where lanes (L, 2) bend or are narrow [m]; inf and -inf where nowhere."""
+    """Return from where to where lanes (L, 2) bend or are narrow [m]; inf, -inf if nowhere."""
     wide = 0.5 * shape.width + 0.5 * EASY_WIDTH
     bad = (graph.half_width < wide) | (np.abs(graph.curvature) > EASY_BEND)
     s = (np.arange(len(bad)) - np.repeat(graph.first, graph.count)) * np.repeat(

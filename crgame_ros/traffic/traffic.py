@@ -16,20 +16,18 @@ from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fading, note_leaders
 from crgame_ros.traffic.crossings import AT_LINE, Crossings
-from crgame_ros.traffic.desired_speeds import DesiredSpeeds
-from crgame_ros.traffic.drivers import Drivers
-from crgame_ros.traffic.driving_side import driving_side
+from crgame_ros.traffic.drivers import DesiredSpeeds, Drivers
 from crgame_ros.traffic.encounters import brush
 from crgame_ros.traffic.exit_room import queues
-from crgame_ros.traffic.followers import Followers
 from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
 from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.lane_graph import driving_side, FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import (
     ahead,
     Corridors,
     corridors,
+    Followers,
     nearest,
     obstacles,
     own_corridors,

@@ -5,7 +5,7 @@
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.vehicle.standstill import QUEUEING
+from crgame_ros.vehicle.state import QUEUEING
 import numpy as np
 
 # Who wants to accelerate by more than this does not wait [m/s^2].

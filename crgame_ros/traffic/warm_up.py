@@ -23,7 +23,7 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.cache import marker
+from crgame_ros.traffic.compiled import marker
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world_view import WorldView
 import numpy as np

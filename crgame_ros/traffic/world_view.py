@@ -11,7 +11,7 @@ from crgame_ros.traffic.agents import AgentTable, NOBODY, write_centers
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray
 from crgame_ros.traffic.placement import Bodies, Entries, VEHICLE_TIME, WALKER_TIME
-from crgame_ros.vehicle.standstill import STANDING
+from crgame_ros.vehicle.state import STANDING
 import numpy as np
 from numpy.typing import NDArray
 

@@ -44,7 +44,7 @@ class VehicleModel(ABC):
         """
 
     def direction(self, speed: float) -> float:
-        """Return the direction of travel, 1 or -1: that of the motion, at rest that of the gear."""
+        """Return the direction of travel, 1 or -1: that of the motion, or at rest of the gear."""
         return copysign(1.0, speed) if speed != 0.0 else float(self.gear)
 
     def speed_limit(self, direction: float) -> float:

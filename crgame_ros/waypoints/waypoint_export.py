@@ -19,9 +19,15 @@ from crgame_ros.scenario.export_elements import (
 )
 from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.scenario.loading import parse_scenario
-from crgame_ros.waypoints.waypoint_bounds import Bounds, DECIMALS, FloatArray, lane_bounds
-from crgame_ros.waypoints.waypoint_links import completed_links, is_reachable, turns
-from crgame_ros.waypoints.waypoint_pieces import cut_lanes, free_ids, Piece
+from crgame_ros.waypoints.waypoint_lanelets import Bounds, DECIMALS, FloatArray, lane_bounds
+from crgame_ros.waypoints.waypoint_pieces import (
+    completed_links,
+    cut_lanes,
+    free_ids,
+    is_reachable,
+    Piece,
+    turns,
+)
 from crgame_ros.waypoints.waypoint_roads import WaypointRoads
 from lxml import etree
 import numpy as np

@@ -263,7 +263,7 @@ def get(address: str) -> tuple[int, str]:
 
 def check_recording(graph: Graph) -> None:
     """End everything, and read from the bag who drove."""
-    from crgame_ros.recording.recorded_drivers import read_drivers
+    from crgame_ros.recording.run_record import read_drivers
     launcher = graph.launcher
     launcher.signal(signal.SIGINT)
     wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started), 'the end',

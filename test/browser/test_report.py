@@ -11,7 +11,7 @@ import re
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_file import report_html
 from crgame_ros.analysis.report.report_run import measured_run
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory

@@ -19,10 +19,9 @@ from aiohttp import ClientSession, CookieJar, Fingerprint, ServerFingerprintMism
 from cockpit_support import cockpit, get, HOST, in_loop, next_text, PumpBackend, wait_until
 from crgame_ros.cockpit import doorkeeper
 from crgame_ros.cockpit.access import Access
-from crgame_ros.cockpit.certificate import fingerprint, make_certificate, tls_context
 from crgame_ros.cockpit.invitations import Invitations
 from crgame_ros.cockpit.machine_addresses import reachable_addresses
-from crgame_ros.cockpit.opening import Opening
+from crgame_ros.cockpit.opening import fingerprint, make_certificate, Opening, tls_context
 from crgame_ros.cockpit.rights import Rights
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import InputError

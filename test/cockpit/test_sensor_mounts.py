@@ -5,12 +5,12 @@
 from collections import OrderedDict
 import copy
 
-from crgame_ros.cockpit.sensor_mounts import SensorMounts
+from crgame_ros.cockpit.perception_frames import SensorMounts
 from crgame_ros.game.driven_vehicle import DrivenAv
 from crgame_ros.game.game_file import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.perception.mounted_sensor import MountedSensor
+from crgame_ros.perception.sensors import MountedSensor
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState

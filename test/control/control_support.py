@@ -6,8 +6,7 @@ from collections.abc import Callable
 import math
 
 from crgame_ros.control.tracked_execution import TrackedExecution
-from crgame_ros.control.tracker import Reference, Tracker
-from crgame_ros.control.trackers import TRACKERS
+from crgame_ros.control.tracker import Reference, Tracker, TRACKERS
 from crgame_ros.vehicle.dynamic_bicycle import DynamicBicycle
 from crgame_ros.vehicle.models import VehicleModel
 from crgame_ros.vehicle.parameters import load_vehicle_parameters

@@ -8,7 +8,7 @@ import re
 
 import control_support as support
 from control_support import VEHICLE
-from crgame_ros.control.trackers import TRACKERS
+from crgame_ros.control.tracker import TRACKERS
 from crgame_ros.vehicle.models import VEHICLE_MODELS
 import numpy as np
 import pytest

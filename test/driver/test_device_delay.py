@@ -6,8 +6,7 @@ import os
 from typing import Any
 
 from crgame_ros.driver.device_map import load_device_map
-from crgame_ros.driver.evdev_device import EventDecoder
-from crgame_ros.driver.event_clock import stamp_by_steady_clock
+from crgame_ros.driver.evdev_device import EventDecoder, stamp_by_steady_clock
 from crgame_ros.driver.source import JoyDriver
 from crgame_ros.driver.wheel import GearButtons
 from crgame_ros.ros.device_delay import DeviceDelay

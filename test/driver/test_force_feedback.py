@@ -18,8 +18,13 @@ import time
 
 from crgame_ros.driver.device_map import load_device_maps, parse_device_map
 from crgame_ros.driver.evdev_device import open_evdev
-from crgame_ros.driver.force_effect import FULL_LEVEL, LENGTH_MS, RENEWAL_S
-from crgame_ros.driver.force_feedback import ForceFeedback, STATE_TIMEOUT_S
+from crgame_ros.driver.force_feedback import (
+    ForceFeedback,
+    FULL_LEVEL,
+    LENGTH_MS,
+    RENEWAL_S,
+    STATE_TIMEOUT_S,
+)
 from crgame_ros.driver.force_limits import ForceLimits, TorqueLimiter
 from crgame_ros.driver.steering_torque import SteeringTorque
 from crgame_ros.errors import InputError

@@ -4,9 +4,9 @@
 
 from pathlib import Path
 
+from crgame_ros.analysis.reproduction.commonroad_game import write_timing_figure
 from crgame_ros.analysis.reproduction.expectation import judge
 from crgame_ros.analysis.reproduction.recorded_human import read_recorded
-from crgame_ros.analysis.reproduction.reproduced_figures import write_timing_figure
 from crgame_ros.analysis.reproduction.single_av_evaluation import HUMAN_EXPECTATIONS, SameHuman
 from crgame_ros.analysis.reproduction.synchronization import (
     judge_synchronization,

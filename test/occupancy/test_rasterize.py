@@ -12,9 +12,9 @@ import sys
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.occupancy import OccupancyGrid
+from crgame_ros.occupancy.occupancy_command import write_map
 from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
 from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
-from crgame_ros.occupancy.occupancy_writer import write_map
 from crgame_ros.occupancy.rasterize import draw, Raster
 from crgame_ros.roads.road_boundary import RoadBoundary
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
@@ -319,7 +319,7 @@ def test_maps_that_are_refused() -> None:
 SLOW = """
 import os, sys, time
 from pathlib import Path
-from crgame_ros.occupancy import occupancy_writer
+from crgame_ros.occupancy import occupancy_command
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster
@@ -329,7 +329,7 @@ def progress(done, total):
     time.sleep(60.0)
 
 raster = Raster(load_scenario(Path(sys.argv[1])), RasterSpec())
-occupancy_writer.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
+occupancy_command.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
 """
 
 

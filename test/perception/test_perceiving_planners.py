@@ -13,8 +13,7 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.engine import Simulation
-from crgame_ros.simulation.offline import PlannerRecord, PlannerSeat
-from crgame_ros.simulation.offline_driver import offline_driver
+from crgame_ros.simulation.offline import offline_driver, PlannerRecord, PlannerSeat
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
 from perception_support import EXACT

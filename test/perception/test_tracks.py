@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.perception.tracks import Tracks
+from crgame_ros.perception.perception import Tracks
 import numpy as np
 import pytest
 

@@ -11,10 +11,10 @@ from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.adapter import PlannerAdapter
-from crgame_ros.planner.braking import braking_plan
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.planner.rollout import braking_plan
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

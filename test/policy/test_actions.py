@@ -9,11 +9,11 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.policy.actions import (
     checked_action,
+    PedalInverse,
     planned_states,
     wanted_motion,
     WantedMotion,
 )
-from crgame_ros.policy.pedal_inverse import PedalInverse
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import StateColumn, VehicleState

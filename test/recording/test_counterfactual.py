@@ -27,7 +27,7 @@ class Mine(ConstantVelocityPlanner):
 STANDING_PLANNER = '''
 from dataclasses import replace
 
-from crgame_ros.planner.braking import braking_plan
+from crgame_ros.planner.rollout import braking_plan
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
 
 

@@ -52,7 +52,7 @@ def _time_s(message: Message) -> float:
 
 
 def _worst_m(log: RunLog, whole: RunLog) -> tuple[float, float]:
-    """Return the largest distances of vehicles and objects from where they are in the whole run."""
+    """Return the largest distances of vehicles and objects from the whole run's."""
     rows = log.ks - whole.ks[0]
     vehicles = log.vehicle_states[:, :, :2] - whole.vehicle_states[rows, :, :2]
     objects = log.object_poses[:, :, :2] - whole.object_poses[rows, :, :2]

@@ -12,8 +12,12 @@ from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.recorded_seats import read_seat_orders, SeatOrder
-from crgame_ros.recording.run_record import read_run_record, run_record_of
+from crgame_ros.recording.run_record import (
+    read_run_record,
+    read_seat_orders,
+    run_record_of,
+    SeatOrder,
+)
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np

@@ -11,9 +11,8 @@ import tracemalloc
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.tables import pairs_table, run_tables, states_table, table_writer
-from crgame_ros.analysis.tables.recorded_run import run_name
 from crgame_ros.analysis.tables.run_tables import TABLES, write_tables
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.tabulated_run import run_name, TabulatedRun
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent

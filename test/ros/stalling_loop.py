@@ -18,7 +18,7 @@ import sys
 import time
 
 from crgame_ros.game.game import TimingSpec
-from crgame_ros.nodes.sim.pacer import Pacer
+from crgame_ros.nodes.sim.live_run import Pacer
 from crgame_ros.nodes.sim.step_watch import StepWatch
 from crgame_ros.timing.cycle_rows import CycleRows, CycleTable
 from crgame_ros.timing.late_step import Phase

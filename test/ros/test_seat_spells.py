@@ -4,7 +4,7 @@
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import DrivingSpell, parse_spells, SeatPerson
-from crgame_ros.ros.seat_spells import MAX_SPELLS, SeatSpells
+from crgame_ros.ros.seats import MAX_SPELLS, SeatSpells
 import pytest
 
 ADA, BOB = SeatPerson('p1', 'Ada', 'Keyboard'), SeatPerson('p2', 'Bob', 'G29')

@@ -25,7 +25,7 @@ import shapely
 
 
 def _is_plain(path: Path) -> bool:
-    """Return whether a game has nothing but a scenario, humans, AVs that know everything, events."""
+    """Return whether a game has only a scenario, humans, AVs that know everything, events."""
     game = load_game(path)
     return (game.traffic is None and not game.objects
             and all(av.perception is None for av in game.avs or ()))

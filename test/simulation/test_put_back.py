@@ -21,8 +21,8 @@ from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.put_back import PutBack
 from crgame_ros.simulation.setup import Setup
+from crgame_ros.simulation.stopped_drivers import PutBack
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np

@@ -30,8 +30,8 @@ from crgame_ros.schema.reading import read
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.run_tasks import StimulusSchedule
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.simulation.stimulus_schedule import StimulusSchedule
 from crgame_ros.vehicle.driver_command import DriverCommand
 import numpy as np
 import pytest

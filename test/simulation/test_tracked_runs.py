@@ -16,8 +16,8 @@ from crgame_ros.game.game_file import dump_game, parse_game
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.roads.route import start_lanelet
+from crgame_ros.simulation.autonomous_vehicle import RouteLane
 from crgame_ros.simulation.offline import OfflineResult, run_offline
-from crgame_ros.simulation.route_lane import RouteLane
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import StateColumn

@@ -9,7 +9,7 @@ from crgame_ros.study.data.condition_means import (
     participant_means,
     within_halves,
 )
-from crgame_ros.study.data.condition_plot import condition_svg
+from crgame_ros.study.data.condition_section import condition_svg
 import numpy as np
 import pytest
 from scipy import stats

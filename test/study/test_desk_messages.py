@@ -8,8 +8,8 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.desk.desk_messages import parse_experimenter, parse_participant
+from crgame_ros.study.desk.desk_pages import words_of
 from crgame_ros.study.desk.page_markdown import picture, read_tree
-from crgame_ros.study.desk.page_words import words_of
 from crgame_ros.study.study_file import Page
 import pytest
 

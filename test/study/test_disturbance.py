@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive that was disturbed from outside does not count."""
 
-from crgame_ros.study.conduct.disturbance import Disturbance
+from crgame_ros.study.conduct.study_drive import Disturbance
 import pytest
 
 

@@ -52,7 +52,7 @@ def test_a_list_is_taken_in_turn() -> None:
 
 def test_another_process_orders_alike() -> None:
     """Whatever its hash seed: nothing depends on the order of a set."""
-    code = ('from crgame_ros.study.trial_order import order_of; '
+    code = ('from crgame_ros.study.trial_plan import order_of; '
             'print([order_of(kind, 7, 11, 5) for kind in ("random", "williams")])')
     told = {subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                            env={'PYTHONHASHSEED': seed, 'PYTHONPATH': ':'.join(sys.path)}).stdout

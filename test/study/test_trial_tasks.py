@@ -3,7 +3,7 @@
 """What a trial's row says of its tasks."""
 
 from crgame_ros.analysis.tables.task_tables import DETECTION_SCORES, TAKE_OVER_REQUESTS
-from crgame_ros.study.data.trial_tasks import TASK_COLUMNS, task_values
+from crgame_ros.study.data.trials_table import TASK_COLUMNS, task_values
 import pytest
 
 SCORE = {'hit_rate': 0.75, 'response_mean_s': 0.4, 'response_median_s': 0.38}

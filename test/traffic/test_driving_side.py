@@ -12,8 +12,7 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.driving_side import driving_side, LEFT_HAND, PRIORITY_TO_THE_RIGHT
-from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.lane_graph import driving_side, LaneGraph, LEFT_HAND, PRIORITY_TO_THE_RIGHT
 import numpy as np
 import pytest
 import traffic_support as support

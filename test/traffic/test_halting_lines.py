@@ -140,7 +140,7 @@ def light(number: int, direction: TrafficLightDirection | None = None) -> Traffi
 
 def halt(graph: LaneGraph, scenario: Scenario, shown: dict[int, str], ids: list[int],
          speed: float = 8.0, stops: bool = False) -> float:
-    """Return where an agent of 4 m, whose centre is at x = 50 on lanelets with ids, has to halt."""
+    """Return where an agent of 4 m, with its centre at x = 50 on lanelets by id, has to halt."""
     lines = HaltingLines(graph, scenario.lanelet_network)
     lines.show(shown)
     lanes = np.array([[graph.index[i] for i in ids]])

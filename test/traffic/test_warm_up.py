@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 
-from crgame_ros.traffic import cache
+from crgame_ros.traffic import compiled
 import pytest
 
 # Counts what each compiled function has been compiled or loaded for, before and after drives.
@@ -49,21 +49,21 @@ def test_a_run_compiles_and_loads_nothing_more(maps: Path,
     assert functions > 40 and more == {}
 
 
-@pytest.mark.parametrize('file', ['traffic/agents.py', 'vehicle/standstill.py'])
+@pytest.mark.parametrize('file', ['traffic/agents.py', 'vehicle/state.py'])
 def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
                                              monkeypatch: pytest.MonkeyPatch) -> None:
     """`waiting` uses agents and a threshold: code compiled with others is not loaded again."""
-    package = Path(cache.__file__).parents[1]
+    package = Path(compiled.__file__).parents[1]
     for folder in ('traffic', 'vehicle'):
         shutil.copytree(package / folder, tmp_path / folder,
                         ignore=shutil.ignore_patterns('__pycache__'))
-    monkeypatch.setattr(cache, '_HERE', tmp_path / 'traffic')
-    before = cache.digest.__wrapped__('waiting')
-    assert before == cache.digest('waiting')
+    monkeypatch.setattr(compiled, '_HERE', tmp_path / 'traffic')
+    before = compiled.digest.__wrapped__('waiting')
+    assert before == compiled.digest('waiting')
     with (tmp_path / file).open('a') as changed:
         changed.write('# Changed.\n')
-    assert cache.digest.__wrapped__('waiting') != before
-    assert cache.digest.__wrapped__('driving_side') == cache.digest('driving_side')
+    assert compiled.digest.__wrapped__('waiting') != before
+    assert compiled.digest.__wrapped__('driving_side') == compiled.digest('driving_side')
 
 
 def test_who_comes_while_another_compiles_waits_for_it(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_who_comes_while_another_compiles_waits_for_it(tmp_path: Path) -> None:
                               stderr=subprocess.PIPE, text=True) as process:
             assert process.stderr is not None
             assert 'waiting for it' in process.stderr.readline()
-            (tmp_path / cache.marker().name).touch()
+            (tmp_path / compiled.marker().name).touch()
             fcntl.flock(lock, fcntl.LOCK_UN)
             assert process.stderr.read() == ''
     assert process.returncode == 0

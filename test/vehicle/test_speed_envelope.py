@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The speeds from which one slows down in time: v^2 = V^2 + 2 b d before a limit V."""
 
-from crgame_ros.vehicle.speed_envelope import SpeedEnvelope
+from crgame_ros.vehicle.stopping import SpeedEnvelope
 import numpy as np
 import pytest
 

@@ -6,8 +6,12 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.gaps_accepted import IN_LANE, NEAR
-from crgame_ros.analysis.behaviour.lane_crossing import HORIZON_S
-from crgame_ros.analysis.behaviour.lane_keeping import LONGEST_HALF_S, SIDEWAYS, STANDING
+from crgame_ros.analysis.behaviour.lane_keeping import (
+    HORIZON_S,
+    LONGEST_HALF_S,
+    SIDEWAYS,
+    STANDING,
+)
 from crgame_ros.analysis.behaviour.pedal_use import PRESSED, RELEASED_AGAIN
 from crgame_ros.analysis.behaviour.reactions import USUAL_LIMITS
 from crgame_ros.analysis.behaviour.steering_reversals import (

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import math
 
 from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
-from crgame_ros.analysis.behaviour.detection_score import DetectionScore
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.steering_reversals import COGNITIVE, ReversalSetting, VISUAL
 from crgame_ros.analysis.behaviour.take_overs import TakeOver
+from crgame_ros.analysis.behaviour.task_events import DetectionScore
 from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour, LaneChangeGap
 
 

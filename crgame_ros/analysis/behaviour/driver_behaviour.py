@@ -6,7 +6,7 @@ How each driven vehicle of a run was driven: all measures of a driver, from any 
 `MEASURES` defines each; `docs/behaviour.md` says more.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 import math
 
 from crgame_ros.analysis.behaviour.behaviour_measures import STABLE_ACCELERATION
@@ -19,10 +19,9 @@ from crgame_ros.analysis.behaviour.lane_keeping import (
     LaneKeeping,
     sdlp,
 )
-from crgame_ros.analysis.behaviour.limit_keeping import limit_events, limits_of, time_above
-from crgame_ros.analysis.behaviour.pedal_use import use_of_pedal
+from crgame_ros.analysis.behaviour.lane_visits import LaneVisit
+from crgame_ros.analysis.behaviour.pedal_use import Spread, spread_of, use_of_pedal
 from crgame_ros.analysis.behaviour.reactions import reaction_to, ResponseLimits, USUAL_LIMITS
-from crgame_ros.analysis.behaviour.spread import Spread, spread_of
 from crgame_ros.analysis.behaviour.steering_reversals import COGNITIVE, reversal_rate, VISUAL
 from crgame_ros.analysis.behaviour.take_overs import find_take_overs, TakeOverRequest
 from crgame_ros.analysis.behaviour.vehicle_behaviour import (
@@ -31,6 +30,7 @@ from crgame_ros.analysis.behaviour.vehicle_behaviour import (
     LaneChangeGap,
 )
 from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.events import FiredEvent, SpeedLimit
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.geometry.rigid_transform import RigidTransform
@@ -42,6 +42,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+
+def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
+              events: Sequence[tuple[int, SpeedLimit]]) -> FloatArray:
+    """
+    Return the speed limit at each step: NaN off the lanes and where there is none [m/s].
+
+    :param visits: stays in lanelets.
+    :param count: number of steps K.
+    :param events: step from which on a limit is set, in order.
+    """
+    limits = np.full(count, np.nan)
+    for visit in visits:
+        signed = roads.speed_limit(visit.lanelet)
+        limits[visit.first:visit.end] = math.nan if signed is None else signed
+        for step, event in events:
+            if not event.lanelets or visit.lanelet in event.lanelets:
+                limits[max(visit.first, step):visit.end] = event.speed
+    return limits
+
+
+def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
+                 first_k: int) -> list[tuple[int, SpeedLimit]]:
+    """Return the limits set by events, with the step since `first_k` at which they took effect."""
+    actions: Mapping[str, object] = {event.name: event.action for event in game.events}
+    found = []
+    for event in fired:
+        action = actions.get(event.name)
+        if isinstance(action, SpeedLimit):
+            found.append((event.k - first_k, action))
+    return found
+
+
+def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
+    """
+    Return the time above the limit [s]; each step stands for its time.
+
+    :return: NaN where there was no limit at all
+    """
+    limited = np.isfinite(limits)
+    if not limited.any():
+        return math.nan
+    return step_s * int(np.count_nonzero(np.abs(speed[limited]) > limits[limited]))
+
 
 # Orders of a seat that give it back.
 _BACK = ('game', 'planner')

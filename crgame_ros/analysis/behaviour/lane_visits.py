@@ -88,7 +88,7 @@ class LaneVisits:
 
     def _next(self, last: LaneVisit, row: int,
               poses: FloatArray) -> tuple[LaneEntry, int, int | None]:
-        """Return how a vehicle goes on from a lanelet that it has left, until when and in which."""
+        """Return how a vehicle goes on from a lanelet it has left, until when and in which."""
         along = self._along(last.lanelet)
         beside = [each for lanelet in (last.lanelet, *along) for each in self._beside(lanelet)]
         # Maps tell of neighbours for a part of the way only.

@@ -6,9 +6,34 @@ from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
-from crgame_ros.analysis.behaviour.spread import Spread, spread_of
 import numpy as np
 from numpy.typing import NDArray
+
+
+class Spread(NamedTuple):
+    """
+    How values spread; NaN where there is none.
+
+    :param mean: arithmetic.
+    :param sd: standard deviation with N - 1; NaN of fewer than two.
+    :param least: the smallest.
+    :param most: the greatest.
+    """
+
+    mean: float
+    sd: float
+    least: float
+    most: float
+
+
+def spread_of(values: NDArray[np.float64]) -> Spread:
+    """Return the spread of those values that are finite."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return Spread(math.nan, math.nan, math.nan, math.nan)
+    return Spread(float(known.mean()), float(known.std(ddof=1)) if len(known) > 1 else math.nan,
+                  float(known.min()), float(known.max()))
+
 
 FloatArray = NDArray[np.float64]
 

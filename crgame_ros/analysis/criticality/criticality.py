@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 from crgame_ros.analysis.criticality.car_following_measures import (
     deceleration_to_avoid_crash,
+    find_leader,
     required_acceleration,
     time_gap,
     time_to_collision,
     time_to_collision_accelerating,
 )
 from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
-from crgame_ros.analysis.criticality.leader import find_leader
 from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -216,7 +216,7 @@ class Criticality:
 
     def _accelerations(self, time_s: float, states: FloatArray, poses: FloatArray,
                        moves: FloatArray) -> FloatArray:
-        """Return everybody's acceleration (N, 2): the vehicles' own, the others' by differences."""
+        """Return all accelerations (N, 2): the vehicles' own, the others' by differences."""
         result = np.zeros_like(moves)
         if self._before is not None and time_s > self._before[0]:
             lapse = time_s - self._before[0]

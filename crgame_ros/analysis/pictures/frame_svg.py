@@ -15,7 +15,7 @@ from crgame_ros.analysis.pictures.figure_style import (
     shade,
     tint,
 )
-from crgame_ros.analysis.pictures.name_places import place_names
+from crgame_ros.analysis.pictures.frame_axes import place_names
 from crgame_ros.analysis.pictures.scene_frame import SceneFrame
 import numpy as np
 from numpy.typing import NDArray

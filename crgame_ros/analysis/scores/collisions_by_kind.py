@@ -10,7 +10,7 @@ from crgame_ros.analysis.scores.lanes_driven import LanesDriven
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
 from crgame_ros.drivability.contact import Kind
 from crgame_ros.geometry.outline import outline, placed
-from crgame_ros.vehicle.standstill import REST
+from crgame_ros.vehicle.state import REST
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 import math
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 from commonroad.common.solution import CostFunction, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
@@ -15,8 +15,31 @@ from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.trajectory import Trajectory
 from commonroad_dc.costs.evaluation import CostFunctionEvaluator
 from commonroad_dc.costs.route_matcher import LaneletRouteMatcher
-from crgame_ros.analysis.scores.cost_definitions import COSTS
 from crgame_ros.errors import one_line
+
+_PATH_LENGTH = 'the code takes the path length L where the site has the offset from the lane'
+
+
+class CostDefinition(NamedTuple):
+    """A cost function as the checker's code has it: a sentence, and where the site differs."""
+
+    definition: str
+    variant: str
+
+
+COSTS = {
+    'JB1': CostDefinition('T', 'the same on the site'),
+    'SA1': CostDefinition('0.1 SA + 0.1 SR + 1e5 D', 'weights differ from the site; the code '
+                          'does not see obstacles turned by exactly 0 rad in D'),
+    'WX1': CostDefinition('10 T + V + 0.1 A + 0.1 J + 0.1 D + 10 L', _PATH_LENGTH),
+    'SM1': CostDefinition('50 A + 50 SA + 50 SR + L + 20 V + 50 O', _PATH_LENGTH),
+    'SM2': CostDefinition('50 A + 50 SA + 50 SR + L + 50 O', _PATH_LENGTH),
+    'SM3': CostDefinition('50 A + 50 SA + 50 SR + 20 V + 50 O', 'weights differ from the site'),
+    'MW1': CostDefinition('5 Jlat + 0.5 Jlon + 0.2 Vlon + ID',
+                          'in the code Jlat is of the lateral speed, Vlon is 0, and ID is 10'),
+    'TR1': CostDefinition('0.01 Jlon + 22 SR + 8 D + 0.5 LC', 'not on the site'),
+}
+
 
 CHECKER = 'commonroad-drivability-checker'
 

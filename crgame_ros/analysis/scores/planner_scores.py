@@ -7,8 +7,7 @@ from typing import Any
 
 from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution
 from commonroad.scenario.scenario import ScenarioID
-from crgame_ros.analysis.scores.commonroad_costs import checker_version, TrajectoryCost
-from crgame_ros.analysis.scores.cost_definitions import COSTS
+from crgame_ros.analysis.scores.commonroad_costs import checker_version, COSTS, TrajectoryCost
 from crgame_ros.analysis.scores.solution_checks import SolutionChecks
 from crgame_ros.analysis.scores.trajectory_feasibility import TrajectoryFeasibility
 from crgame_ros.analysis.scores.vehicle_scores import VehicleScores

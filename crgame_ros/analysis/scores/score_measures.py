@@ -4,7 +4,7 @@
 
 from typing import NamedTuple
 
-from crgame_ros.analysis.scores.cost_definitions import COSTS
+from crgame_ros.analysis.scores.commonroad_costs import COSTS
 
 
 class ScoreMeasure(NamedTuple):

@@ -10,7 +10,9 @@ from commonroad.common.solution import PlanningProblemSolution, Solution
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.scenario import Scenario
 from commonroad_dc.feasibility import solution_checker
-from crgame_ros.analysis.scores.trajectory_feasibility import TrajectoryFeasibility
+from crgame_ros.analysis.scores.trajectory_feasibility import (
+    TrajectoryFeasibility,
+)
 from crgame_ros.errors import one_line
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.road_boundary import RoadBoundary

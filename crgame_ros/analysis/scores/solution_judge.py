@@ -11,7 +11,9 @@ from crgame_ros.analysis.scores.commonroad_costs import evaluate_costs
 from crgame_ros.analysis.scores.planner_scores import SolutionScores
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_checks import check_solution
-from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility
+from crgame_ros.analysis.scores.trajectory_feasibility import (
+    check_feasibility,
+)
 from crgame_ros.roads.road_boundary import RoadBoundary
 import numpy as np
 from numpy.typing import NDArray

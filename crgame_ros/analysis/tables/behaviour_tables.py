@@ -10,7 +10,7 @@ from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.table_part import TablePart
-from crgame_ros.analysis.tables.table_rows import TableRows
+from crgame_ros.analysis.tables.table_writer import TableRows
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 
 _PER_VEHICLE = tuple(name for name, measure in MEASURES.items() if measure.per == 'vehicle')

@@ -21,7 +21,7 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.table_rows import TableRows
+from crgame_ros.analysis.tables.table_writer import TableRows
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 import numpy as np
 import pyarrow as pa

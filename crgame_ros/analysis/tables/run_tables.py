@@ -4,25 +4,141 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+import json
+import os
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 from crgame_ros.analysis.tables.behaviour_tables import BEHAVIOUR_TABLES, write_behaviour
 from crgame_ros.analysis.tables.column import TableDeclaration
-from crgame_ros.analysis.tables.events_table import EVENT_PARTS, EVENTS
+from crgame_ros.analysis.tables.data_package import (
+    CREATOR,
+    data_package,
+    PACKAGE_FILE,
+    WrittenTable,
+)
 from crgame_ros.analysis.tables.pairs_table import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.plans_table import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs_table import RUN_PARTS, RUNS
 from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.states_table import state_rows, STATES
-from crgame_ros.analysis.tables.table_folder import TableFolder
 from crgame_ros.analysis.tables.table_part import part_rows
-from crgame_ros.analysis.tables.table_rows import KeptTable, TableRows
-from crgame_ros.analysis.tables.table_writer import Format
+from crgame_ros.analysis.tables.table_writer import (
+    Format,
+    FORMATS,
+    KeptTable,
+    TableRows,
+    TableWriter,
+)
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
-from crgame_ros.analysis.tables.task_tables import TASK_TABLES, write_tasks
+from crgame_ros.analysis.tables.task_tables import EVENT_PARTS, EVENTS, TASK_TABLES, write_tasks
 from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
 from crgame_ros.errors import InputError
+from crgame_ros.recording.export import prepare_folder, write_text
 import pyarrow as pa
+
+_LARGEST_PACKAGE = 10_000_000
+
+
+class TableFolder:
+    """
+    Writes tables under temporary names, and gives them their own once all are whole.
+
+    The dictionary goes first and comes last: where it is, everything it names is whole and of one
+    export. An earlier export of this program is replaced, nothing else.
+
+    :param out: the folder; it is made if it is not there.
+    :param declarations: of the tables.
+    :param file_format: Parquet or CSV.
+    :param name: of the data package.
+    :ivar writers: by the tables' names.
+    :raises InputError: if the folder cannot be written, or a file of somebody else is in the way.
+    """
+
+    def __init__(self, out: Path, declarations: tuple[TableDeclaration, ...], file_format: Format,
+                 name: str) -> None:
+        prepare_folder(out)
+        self._out, self._format, self._name = out, file_format, name
+        self._earlier = _earlier(out)
+        self._declarations = declarations
+        self._names = {table.name: f'{table.name}.{file_format}' for table in declarations}
+        for file in (*self._names.values(), PACKAGE_FILE):
+            if (out / file).exists() and file not in self._earlier:
+                raise InputError('a file that is no exported table is there already',
+                                 str(out / file), 'name another folder')
+        self._parts = {table.name: out / f'.{self._names[table.name]}.{os.getpid()}.part'
+                       for table in declarations}
+        self.writers: dict[str, TableWriter] = {}
+
+    def __enter__(self) -> Self:
+        try:
+            for table in self._declarations:
+                self.writers[table.name] = TableWriter(
+                    table, self._parts[table.name], self._format)
+        except OSError as error:
+            self._discard()
+            raise self._refusal(error) from error
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        try:
+            if error is None:
+                self._finish()
+        except (OSError, pa.ArrowInvalid) as failure:
+            raise self._refusal(failure) from failure
+        finally:
+            self._discard()
+        if isinstance(error, OSError):
+            raise self._refusal(error) from error
+
+    def _finish(self) -> None:
+        written = []
+        for table in self._declarations:
+            self.writers[table.name].close()
+            written.append(WrittenTable(table, self._parts[table.name], self._names[table.name],
+                                        self.writers[table.name].rows))
+        package = data_package(written, self._format, self._name)
+        (self._out / PACKAGE_FILE).unlink(missing_ok=True)
+        for name in self._earlier - {*self._names.values(), PACKAGE_FILE}:
+            (self._out / name).unlink(missing_ok=True)
+        for file in written:
+            file.path.replace(self._out / file.name)
+        write_text(json.dumps(package, indent=1, ensure_ascii=False, allow_nan=False) + '\n',
+                   self._out / PACKAGE_FILE)
+
+    def _discard(self) -> None:
+        """Leave nothing unfinished."""
+        for writer in self.writers.values():
+            try:
+                writer.release()
+            except (OSError, pa.ArrowInvalid):
+                # Of a full disk; the part is removed all the same.
+                continue
+        for part in self._parts.values():
+            part.unlink(missing_ok=True)
+
+    def _refusal(self, error: BaseException) -> InputError:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        return InputError(f'cannot be written ({reason})', str(self._out),
+                          'choose a folder that can be written, on a disk with room')
+
+
+def _earlier(out: Path) -> set[str]:
+    """Name the files of an earlier export in a folder; none if there is no such."""
+    try:
+        with (out / PACKAGE_FILE).open('rb') as stream:
+            package: Any = json.loads(stream.read(_LARGEST_PACKAGE))
+        if not str(package['createdBy']).startswith(CREATOR):
+            return set()
+        files = {str(resource['path']) for resource in package['resources']}
+    except (OSError, ValueError, RecursionError, LookupError, TypeError):
+        return set()
+    # Whatever it names, only what could be a table of ours is ours.
+    return {PACKAGE_FILE, *(file for file in files if file.rpartition('.')[2] in FORMATS
+                            and Path(file).name == file)}
+
 
 TABLES: tuple[TableDeclaration, ...] = (
     RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES)

@@ -3,10 +3,11 @@
 """The HTTP interface of past runs: list, pictures, scores, files, comparison, deletion, replay."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 import hashlib
 from pathlib import Path
 from urllib.parse import quote
+import zipfile
 
 from aiohttp import hdrs, web
 from crgame_ros.cockpit.job_process import JobProcess
@@ -20,9 +21,57 @@ from crgame_ros.cockpit.library_routes import (
 from crgame_ros.cockpit.request_rights import actor
 from crgame_ros.cockpit.runs.run_archive import PastRun, PICTURE, RunArchive
 from crgame_ros.cockpit.runs.run_replays import RunReplays
-from crgame_ros.cockpit.runs.run_zip import zip_chunks
 from crgame_ros.cockpit.server import HUB
 from crgame_ros.errors import InputError
+
+_CHUNK_BYTES = 256 * 1024
+
+
+class _Pending:
+    """What has been written and not yet been sent; it cannot be sought in."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+
+    def write(self, data: bytes, /) -> int:
+        self._parts.append(bytes(data))
+        return len(data)
+
+    def flush(self) -> None:
+        """Do nothing: what is written is there."""
+
+    def close(self) -> None:
+        """Do nothing: who sends it knows its end."""
+
+    def take(self) -> bytes:
+        data = b''.join(self._parts)
+        self._parts.clear()
+        return data
+
+
+def zip_chunks(name: str, files: Mapping[str, Path]) -> Iterator[bytes]:
+    """
+    Pack files.
+
+    :param name: of the folder in the archive.
+    :param files: by their names in that folder.
+    :return: the archive, piece by piece; a file that has gone meanwhile is left out.
+    """
+    pending = _Pending()
+    # Recordings are compressed already.
+    with zipfile.ZipFile(pending, 'w', zipfile.ZIP_STORED) as archive:
+        for inside, path in files.items():
+            try:
+                source = path.open('rb')
+            except OSError:
+                continue
+            entry = zipfile.ZipInfo.from_file(path, f'{name}/{inside}', strict_timestamps=False)
+            with source, archive.open(entry, 'w', force_zip64=True) as target:
+                while data := source.read(_CHUNK_BYTES):
+                    target.write(data)
+                    yield pending.take()
+    yield pending.take()
+
 
 READER = 'crgame_ros.cockpit.runs.run_jobs'
 READ_S = 120.0

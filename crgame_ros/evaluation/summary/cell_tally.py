@@ -7,10 +7,82 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crgame_ros.evaluation.summary.cell_block import CellBlock, CellBlocks, CellGroups, IntArray
-from crgame_ros.evaluation.summary.failure_reasons import FailureReasons
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.group_bootstrap import DrawnUnits
 from crgame_ros.evaluation.summary.paired_cells import paired_cells
+from crgame_ros.evaluation.summary.summary import FailureReason
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+# So many different reasons are counted one by one, and so many are told.
+_MOST_COUNTED, MOST_TOLD = 1000, 20
+_OTHER = 'other reasons'
+# Of a traceback the end says most [characters].
+_LONGEST_TRACEBACK = 6000
+# Tracebacks are long: few rows at a time.
+_BATCH_ROWS = 1024
+
+
+class FailureReasons:
+    """Counts the cells that failed, by how and why."""
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[str, str], Counter[int]] = {}
+        self._examples: dict[tuple[str, str], str] = {}
+
+    def add(self, block: CellBlock, groups: IntArray) -> None:
+        """
+        Count the failures of a block.
+
+        :param groups: (N) number of each cell's group.
+        """
+        rows = pa.array(np.flatnonzero(~block.ok))
+        for status, reason, key, group in zip(
+                block.status.take(rows).to_pylist(), block.reasons.take(rows).to_pylist(),
+                block.keys.take(rows).to_pylist(), groups[~block.ok].tolist(), strict=True):
+            kind = status, reason
+            if kind not in self._counts and len(self._counts) >= _MOST_COUNTED:
+                kind = status, _OTHER
+            self._counts.setdefault(kind, Counter())[group] += 1
+            self._examples[kind] = min(key, self._examples.get(kind, key))
+
+    def told(self, parts: EvaluatedParts,
+             labels: Sequence[tuple[str, ...]]) -> tuple[FailureReason, ...]:
+        """
+        Return the most frequent ones, and what is left in one of each status.
+
+        :param labels: of the groups, by number.
+        :raises InputError: if a part cannot be read.
+        """
+        kinds = sorted(self._counts, key=lambda kind: (-self._counts[kind].total(), kind))
+        for kind in kinds[MOST_TOLD:]:
+            rest = kind[0], _OTHER
+            if kind != rest:
+                self._counts.setdefault(rest, Counter()).update(self._counts[kind])
+                self._examples.setdefault(rest, self._examples[kind])
+        kinds = list(dict.fromkeys((*kinds[:MOST_TOLD],
+                                    *((status, _OTHER) for status, _ in kinds[MOST_TOLD:]))))
+        tracebacks = _tracebacks(parts, {self._examples[kind] for kind in kinds})
+        return tuple(FailureReason(
+            *kind, tuple(sorted((labels[group], count)
+                                for group, count in self._counts[kind].items())),
+            self._examples[kind], tracebacks.get(self._examples[kind], '')) for kind in kinds)
+
+
+def _tracebacks(parts: EvaluatedParts, keys: set[str]) -> dict[str, str]:
+    """Read the tracebacks of some cells, as far as they have left any."""
+    found: dict[str, str] = {}
+    if not keys:
+        return found
+    columns = {name: pa.string() for name in ('cell', 'status', 'traceback')}
+    examples = pa.array(sorted(keys))
+    for batch in parts.batches('cells', columns, _BATCH_ROWS):
+        rows = batch.rows.filter(pc.is_in(batch.rows['cell'], value_set=examples))
+        for key, status, text in zip(*(rows[name].to_pylist() for name in columns), strict=True):
+            if text and status != 'ok':
+                found[key] = max(text[-_LONGEST_TRACEBACK:], found.get(key, ''))
+    return found
 
 
 @dataclass

@@ -11,7 +11,7 @@ them as well adds variance that is not there). Otherwise cells are drawn.
 from dataclasses import dataclass, field
 from typing import Literal
 
-from crgame_ros.evaluation.summary.factor_labels import digest_of
+from crgame_ros.evaluation.summary.cell_block import digest_of
 from crgame_ros.evaluation.summary.summary import Estimate
 import numpy as np
 from numpy.typing import NDArray

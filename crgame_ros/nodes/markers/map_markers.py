@@ -119,7 +119,7 @@ def _lane_lines(network: LaneletNetwork) -> Iterator[Marker]:
 
 
 def _bounds(network: LaneletNetwork) -> Iterator[tuple[FloatArray, str]]:
-    """Yield each bound once: neighbours share theirs, and the one that knows its marking counts."""
+    """Yield each bound once: neighbours share theirs; the one with a marking counts."""
     found: dict[bytes, tuple[FloatArray, str]] = {}
     for lanelet in network.lanelets:
         for vertices, marking in (

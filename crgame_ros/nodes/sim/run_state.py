@@ -2,13 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people are told of a run: its state, and its world while that stands still."""
 
+from enum import auto, Enum
 import time
 
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
-from crgame_ros.nodes.sim.outcome import SIGNAL
 from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.nodes.sim.sim_outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation
+
+# It was to end with everything else.
+SIGNAL = 'signal'
+
+
+class Outcome(Enum):
+    """Why an epoch ended."""
+
+    FINISHED = auto()
+    RESET = auto()
+    STOPPED = auto()
+
+    def reason(self, by_signal: bool) -> str:
+        """Return it in a word: duration, reset, stop, or signal."""
+        if self is Outcome.STOPPED:
+            return SIGNAL if by_signal else 'stop'
+        return 'duration' if self is Outcome.FINISHED else 'reset'
+
 
 NS_PER_S = 1_000_000_000
 # Discovery is not the same on both sides for up to a second or two.

@@ -12,7 +12,7 @@ from crgame_ros.game.seat_documents import SeatTenant
 from crgame_ros.game.task_documents import parse_report, REPORT_TOPIC, TaskReport
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
-from crgame_ros.messages.request_head import request_head
+from crgame_ros.messages.request_layout import request_head
 from crgame_ros.messages.status_values import read_status, status_truth
 from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
 from crgame_ros.ros.ros_messages import from_time

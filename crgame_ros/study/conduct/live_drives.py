@@ -13,9 +13,16 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, run_folder
 from crgame_ros.study.conduct.director import Director
-from crgame_ros.study.conduct.disturbance import Disturbance
-from crgame_ros.study.conduct.drive_outcome import clean_s, cut_short, outcome_of, RESET
-from crgame_ros.study.conduct.study_drive import settings_of, StudyDrive, write_drive
+from crgame_ros.study.conduct.study_drive import (
+    clean_s,
+    cut_short,
+    Disturbance,
+    outcome_of,
+    RESET,
+    settings_of,
+    StudyDrive,
+    write_drive,
+)
 from crgame_ros.study.conduct.study_graph import StudyGraph
 from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.participant_session import ParticipantSession

@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive of a study: its game, written for the graph, and where it is recorded."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+import time
+from typing import Any
 from urllib.parse import urlencode
 
+from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.game.game_file import dump_game
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
@@ -13,6 +17,96 @@ from crgame_ros.study.trial_game import seat_of, trial_game
 from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.study.trial_settings import TrialSettings
 from crgame_ros.whole_file import write_whole
+
+# How runs end that were driven to their end: at their time, or by their own drivability.
+TIME, DRIVABILITY = 'duration', 'drivability of '
+RESET = 'reset'
+_CUT_SHORT = {'stop': 'somebody stopped the run', RESET: 'somebody began the run anew',
+              'signal': 'the programs were asked to end', 'silence': 'the simulation fell silent'}
+# A machine that slept for less was only busy [s].
+SLEEP_S = 0.5
+
+
+def cut_short(reason: str) -> str:
+    """
+    Return why a run is no whole drive; empty if it is one.
+
+    :param reason: with which it ended, as sim_node gives it.
+    """
+    if reason == TIME or reason.startswith(DRIVABILITY):
+        return ''
+    return _CUT_SHORT.get(reason, f'the run ended: {reason or "nobody knows why"}')
+
+
+def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
+    """
+    Return what became of a drive.
+
+    :param status: at its end, which was not cut short.
+    :param seat: vehicle of the participant.
+    :param end_time_s: the run's clock then [s].
+    :return: `outcome`: time, collision or off_road; `end_time_s`; and how often the vehicle
+        touched something, and left the road.
+    """
+    contacts, departures = _times(status, seat)
+    outcome = 'time'
+    if status.reason != TIME:
+        # Its own drivability ended it: whichever came last.
+        outcome = 'collision' if contacts and contacts[-1] >= max(departures, default=0.0) \
+            else 'off_road'
+    return {'outcome': outcome, 'end_time_s': round(end_time_s, 6), 'contacts': len(contacts),
+            'departures': len(departures)}
+
+
+def clean_s(status: RunStatus, seat: str, end_time_s: float) -> float:
+    """Return the longest time of a drive without a contact or leaving the road [s]."""
+    contacts, departures = _times(status, seat)
+    times = [0.0, *sorted((*contacts, *departures)), end_time_s]
+    return max(later - sooner for sooner, later in zip(times, times[1:], strict=False))
+
+
+def _times(status: RunStatus, seat: str) -> tuple[list[float], list[float]]:
+    return ([entry['t'] for entry in status.contacts if seat in (entry['vehicle'], entry['with'])],
+            [entry['t'] for entry in status.departures if entry['vehicle'] == seat])
+
+
+def _boot_s() -> float:
+    # It goes on while the machine sleeps; the steady clock does not.
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+class Disturbance:
+    """
+    Watches over one drive.
+
+    :param patience_s: for which the participant's page may be gone [s].
+    :param steady_s: clock that stands while the machine sleeps [s].
+    :param boot_s: clock that does not [s].
+    """
+
+    def __init__(self, patience_s: float, steady_s: Callable[[], float] = time.monotonic,
+                 boot_s: Callable[[], float] = _boot_s) -> None:
+        self._patience_s, self._steady_s, self._boot_s = patience_s, steady_s, boot_s
+        self._ahead_s = boot_s() - steady_s()
+        self._lost_s: float | None = None
+
+    def look(self, lost: bool) -> str | None:
+        """
+        Return why the drive does not count, None while it does.
+
+        :param lost: whether nobody holds the participant's seat now.
+        """
+        now_s = self._steady_s()
+        slept_s = self._boot_s() - now_s - self._ahead_s
+        if slept_s > SLEEP_S:
+            return f'the machine slept for {slept_s:.0f} s'
+        if not lost:
+            self._lost_s = None
+        elif self._lost_s is None:
+            self._lost_s = now_s
+        elif now_s - self._lost_s > self._patience_s:
+            return f"the participant's page was gone for {self._patience_s:g} s"
+        return None
 
 
 def settings_of(item: SessionItem) -> TrialSettings | None:

@@ -8,7 +8,7 @@ import json
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column
-from crgame_ros.study.data.study_column import (
+from crgame_ros.study.data.study_row_table import (
     plain_name,
     question_column,
     score_columns,

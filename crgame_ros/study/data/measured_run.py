@@ -13,9 +13,8 @@ import shutil
 from typing import Any
 
 from crgame_ros.analysis.behaviour.task_events import task_events
-from crgame_ros.analysis.tables.recorded_run import tabulated_runs
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.tabulated_run import tabulated_runs, TabulatedRun
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.run_folder import bags_of

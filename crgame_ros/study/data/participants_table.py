@@ -8,7 +8,7 @@ from typing import Any
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.study.data.asked_questions import AskedQuestions, plain_answer
 from crgame_ros.study.data.participant_record import ParticipantRecord
-from crgame_ros.study.data.study_column import flag_column, question_column, unlike
+from crgame_ros.study.data.study_row_table import flag_column, question_column, unlike
 from crgame_ros.study.data.trials_table import PARTICIPANT, utc, WALL
 from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.session_script import Fields

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+import fcntl
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,17 +14,58 @@ from crgame_ros.analysis.report.report_file import write_report
 from crgame_ros.analysis.report.report_run import read_report_run
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.errors import CrgameError
+from crgame_ros.recording.finish import finish_run
+from crgame_ros.recording.metadata import METADATA_FILE
+from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
 from crgame_ros.study.data.answers_table import answer_rows, ANSWERS
 from crgame_ros.study.data.asked_questions import AskedQuestions, trials_by_number
 from crgame_ros.study.data.conducted_study import ConductedStudy
 from crgame_ros.study.data.measured_run import MeasuredRun, MeasuredRuns
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.participants_table import ParticipantsTable
-from crgame_ros.study.data.run_finishing import finished_recording
 from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
 from crgame_ros.study.data.study_row_table import table_of_rows
 from crgame_ros.study.data.trials_table import TrialsTable
+from crgame_ros.study.session_journal import JOURNAL
 import pyarrow as pa
+
+
+def session_goes_on(participant: Path) -> bool:
+    """Return whether a process has a participant's session open."""
+    try:
+        with (participant / JOURNAL).open('rb') as stream:
+            # Shared and let go of at once: who opens the session now is not refused.
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(stream, fcntl.LOCK_UN)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def finished_recording(folder: Path, participant: Path, say: Callable[[str], object]) -> str:
+    """
+    See that the recording of a run is complete; finish it if whoever wrote it has been killed.
+
+    :param folder: of the run.
+    :param participant: folder of who drove.
+    :param say: takes one line for people.
+    :return: why it cannot be read; empty if it can.
+    """
+    if not folder.is_dir() or not bags_of(folder):
+        return 'the recording is missing'
+    closed = all((bag / METADATA_FILE).is_file() for bag in bags_of(folder))
+    derived = any(folder.glob('*.xml')) and any(folder.glob('timing*.json'))
+    if (folder / FINISHED_MARK).exists() or closed and derived:
+        return ''
+    if session_goes_on(participant):
+        # What is derived from a closed recording is written later; measures need none of it.
+        return '' if closed else 'the recording is not finished yet'
+    say(f'{folder}: finishing what was left unfinished')
+    finish_run(folder, lambda line: say(line) if line.startswith('error') else None)
+    return ''
+
 
 KEPT = '.runs'
 

@@ -9,6 +9,189 @@ from typing import Any, TYPE_CHECKING
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
     from crgame_ros.study.data.study_data import StudyData
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import fcntl
+import json
+import os
+
+from crgame_ros.analysis.tables.column import Column, INTEGER, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.data_package import (
+    data_package,
+    PACKAGE_FILE,
+    table_schema,
+    WrittenTable,
+)
+from crgame_ros.analysis.tables.run_tables import TABLES
+from crgame_ros.analysis.tables.table_writer import Format, NOT_A_NUMBER, TableWriter
+from crgame_ros.errors import InputError
+from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
+from crgame_ros.study.data.paper_section import provenance_of
+from crgame_ros.study.data.study_data import CountedTrial, StudyData
+from crgame_ros.study.data.study_row_table import csv_of_table, parquet_of_table
+from crgame_ros.yaml_text import read_text
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+RUNS, PROVENANCE, LOCK = 'runs', 'provenance.json', '.lock'
+DESCRIPTION = (
+    'What a study of crgame_ros has found. SI units and radians. A value that is missing is null '
+    f'in Parquet; in CSV a missing number is {NOT_A_NUMBER}, any other missing value an empty '
+    'field; empty texts are missing. CSV is RFC 4180 in UTF-8. Texts are what people wrote, to '
+    'the last character, but for NUL and halves of UTF-16 pairs, which become U+FFFD: nothing is '
+    'put in front of = + - @, so open these files in a spreadsheet by its import of texts, not by '
+    'a double click.')
+_WHOSE = (Column('participant', TEXT, '', 'anonymous id of who drove'),
+          Column('trial', INTEGER, '1', 'number of the trial'),
+          Column('condition', TEXT, '', 'of the trial'))
+DECLARATIONS = tuple(TableDeclaration(table.name, table.row, table.key, (*_WHOSE, *table.columns))
+                     for table in TABLES)
+# In the dictionary: which runs these tables are made of.
+MADE_OF = 'madeOf'
+
+
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """
+    Be the only one that writes a study's data.
+
+    :raises InputError: if somebody else does, or nobody can.
+    """
+    prepare_folder(folder)
+    with (folder / LOCK).open('w') as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError('another process writes there', str(folder), 'wait for it') from error
+        for part in folder.rglob('.*.part'):
+            # Of a process that was killed.
+            if part.is_file():
+                part.unlink()
+        yield
+
+
+def write_study_data(data: StudyData) -> dict[str, int]:
+    """
+    Write the tables, the tables of all runs, the dictionaries and the provenance.
+
+    A file is replaced whole; the dictionaries come last. Equal data give equal bytes.
+
+    :return: rows by table.
+    :raises InputError: if the folder cannot be written.
+    """
+    out = data.folder.data
+    written: dict[Format, list[WrittenTable]] = {'csv': [], 'parquet': []}
+    for declaration in data.declarations:
+        table = data.tables[declaration.name]
+        for file_format, content in (('csv', csv_of_table(table)),
+                                     ('parquet', parquet_of_table(table))):
+            path = out / f'{declaration.name}.{file_format}'
+            write_bytes(content, path)
+            written[file_format].append(  # type: ignore[index]
+                WrittenTable(declaration, path, path.name, len(table)))
+    write_text(_json(provenance_of(data)), out / PROVENANCE)
+    write_text(_json(_package(written, data.folder.study.name)), out / PACKAGE_FILE)
+    rows = {name: len(table) for name, table in data.tables.items()}
+    return rows | {f'{RUNS}/{name}': count for name, count in write_run_tables(
+        data.trials, out / RUNS, data.folder.study.name).items()}
+
+
+def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str, Any]:
+    """Describe the tables: of each there are two files, which hold the same."""
+    package = data_package(written['csv'], 'csv', study)
+    other = data_package(written['parquet'], 'parquet', study)['resources']
+    for resource in other:
+        resource['name'] += '_parquet'
+    package |= {'title': f'Study: {study}', 'description': DESCRIPTION,
+                'resources': [*package['resources'], *other]}
+    declarations = {table.name: table.declaration for tables in written.values()
+                    for table in tables}
+    for resource in package['resources']:
+        resource['schema'] = _schema(declarations[resource['path']])
+    return package
+
+
+def _schema(declaration: TableDeclaration) -> dict[str, Any]:
+    schema = table_schema(declaration)
+    schema.pop('foreignKeys', None)
+    if declaration.key != ('participant',):
+        schema['foreignKeys'] = [{'fields': ['participant'], 'reference': {
+            'resource': 'participants', 'fields': ['participant']}}]
+    return schema
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + '\n'
+
+
+def write_run_tables(trials: Sequence[CountedTrial], out: Path, study: str) -> dict[str, int]:
+    """
+    Write the tables of all runs, unless they are there already; a file is replaced whole.
+
+    One run after the other is read, so that memory is that of one.
+
+    :param study: name of it.
+    :return: rows by table.
+    :raises InputError: if the folder cannot be written.
+    """
+    prepare_folder(out)
+    measured = [trial for trial in trials if trial.run is not None]
+    made_of = [[trial.record.id, trial.attempt.trial.number, trial.attempt.trial.condition.name,
+                trial.run.key] for trial in measured if trial.run is not None]
+    earlier = _earlier(out, made_of)
+    if earlier is not None:
+        return earlier
+    written = []
+    for declaration in DECLARATIONS:
+        path = out / f'{declaration.name}.parquet'
+        part = out / f'.{path.name}.{os.getpid()}.part'
+        try:
+            with TableWriter(declaration, part, 'parquet') as writer:
+                for trial in measured:
+                    _add(trial, declaration.name, writer)
+            part.replace(path)
+        except OSError as error:
+            raise InputError(f'cannot be written ({error.strerror})', str(path),
+                             'make room, or make the folder writable') from error
+        finally:
+            part.unlink(missing_ok=True)
+        written.append(WrittenTable(declaration, path, path.name, writer.rows))
+    package = data_package(written, 'parquet', f'{study}-runs') | {
+        'title': f'Runs of the study {study}', MADE_OF: made_of}
+    write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n', out / PACKAGE_FILE)
+    return {table.declaration.name: table.rows for table in written}
+
+
+def _add(trial: CountedTrial, name: str, writer: TableWriter) -> None:
+    if trial.run is None:
+        return
+    table = trial.run.table(name)
+    if len(table):
+        planned = trial.attempt.trial
+        whose = {'participant': trial.record.id, 'trial': planned.number,
+                 'condition': planned.condition.name}
+        columns: dict[str, Any] = {
+            column: pa.array([value] * len(table), writer.declaration.schema.field(column).type)
+            for column, value in whose.items()}
+        writer.add(columns | {column: table.column(column).combine_chunks()
+                              for column in table.column_names})
+
+
+def _earlier(out: Path, made_of: list[list[Any]]) -> dict[str, int] | None:
+    """Return the rows of tables that are there already, made of the same runs; else None."""
+    try:
+        package = json.loads(read_text(out / PACKAGE_FILE, 'data dictionary'))
+        if package[MADE_OF] != made_of:
+            return None
+        rows = {}
+        for resource in package['resources']:
+            with pq.ParquetFile(out / str(resource['path'])) as table:
+                if table.metadata.num_rows != resource['rows']:
+                    return None
+            rows[str(resource['name'])] = int(resource['rows'])
+        return rows if len(rows) == len(DECLARATIONS) else None
+    except (InputError, OSError, ValueError, LookupError, TypeError, pa.ArrowInvalid):
+        return None
 
 
 def add_data_arguments(what: Any) -> None:
@@ -47,7 +230,6 @@ def data_command(values: argparse.Namespace) -> int:
     :raises InputError: if the folder holds no study, or cannot be written.
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
-    from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
         data = _read(folder, reports=not values.no_reports)
@@ -70,7 +252,6 @@ def report_command(values: argparse.Namespace) -> int:
     """
     from crgame_ros.analysis.report.report_file import check_report_path
     from crgame_ros.study.data.conducted_study import ConductedStudy
-    from crgame_ros.study.data.study_data_folder import only_writer
     from crgame_ros.study.data.study_report import write_study_report
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):
@@ -88,7 +269,6 @@ def rerun_command(values: argparse.Namespace) -> int:
     :raises InputError: if nothing can be repeated, or a planner is none.
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
-    from crgame_ros.study.data.study_data_folder import only_writer
     from crgame_ros.study.data.study_rerun import rerun_study
     folder = ConductedStudy(values.folder)
     with only_writer(folder.data):

@@ -14,9 +14,8 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.study.data.study_column import with_unit
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
-from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows
+from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows, with_unit
 from crgame_ros.study.data.trials_table import PARTICIPANT, TRIAL
 import pyarrow.parquet as pq
 

@@ -5,15 +5,42 @@
 from collections.abc import Callable, Mapping
 import logging
 import time
-from typing import Any
+from typing import Any, Protocol
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.study.desk.drives import Drives
-from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.participant_session import ParticipantSession, SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.study_file import Break, Page
 from crgame_ros.study.trial_plan import PlannedTrial
+
+
+class Drives(Protocol):
+    """
+    Drives the items of a session that are driven: trials and practice.
+
+    It starts, finishes and aborts them in the session itself; the desk does all other items.
+    """
+
+    @property
+    def state(self) -> DriveState:
+        """Tell of the drive that goes on or comes next."""
+
+    def watch(self, changed: Callable[[], None]) -> None:
+        """Name who is told, on the event loop, whenever the state or the session has changed."""
+
+    def wake(self) -> None:
+        """Say that the session has moved on: another item may have to be driven."""
+
+    def ready(self, item: str) -> None:
+        """Take the participant's word that the drive of an item may begin."""
+
+    def tell(self, kind: str, text: str) -> None:
+        """Let the recording that goes on, if one does, keep a note or marker at this moment."""
+
+    def abort(self, reason: str) -> None:
+        """End the drive that goes on; it counts for nothing and comes again."""
+
 
 # Why a session ends that nobody has agreed to.
 DECLINED = 'consent was not given'

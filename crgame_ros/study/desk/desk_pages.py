@@ -3,16 +3,51 @@
 """The pages that are open at a desk: what each is sent, and which of them the participant uses."""
 
 from collections.abc import Mapping
+from functools import cache
 import json
 import logging
+from pathlib import Path
 from typing import Any
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.experimenter_document import experimenter_document
-from crgame_ros.study.desk.page_words import words_of
-from crgame_ros.study.desk.participant_document import participant_document
+from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
+from crgame_ros.study.study_file import StudyFile
+from crgame_ros.yaml_text import read_yaml
+
+WORDS = Path(__file__).resolve().parent / 'words'
+STANDARD = 'en'
+
+
+def words_of(study: StudyFile, language: str) -> dict[str, str]:
+    """
+    Return the words in a language; English ones where it has none.
+
+    :param study: `words.fr.yaml` beside its file is that for French, or goes before ours.
+    :return: by their key.
+    :raises InputError: if a file of words cannot be read.
+    """
+    words = dict(_read(WORDS / f'{STANDARD}.yaml'))
+    for file in (WORDS / f'{language}.yaml', study.base / f'words.{language}.yaml'):
+        if language.isalnum() and file.is_file():
+            given = _read(file)
+            unknown = sorted(set(given) - set(words))
+            if unknown:
+                raise InputError(f'has "{unknown[0][:40]}", which is no word of the page',
+                                 str(file), f'take the keys of {STANDARD}.yaml')
+            words |= given
+    return words
+
+
+@cache
+def _read(file: Path) -> dict[str, str]:
+    given = read_yaml(file, 'words')
+    if not isinstance(given, dict) or not all(
+            isinstance(key, str) and isinstance(text, str) for key, text in given.items()):
+        raise InputError('is no list of words', str(file), 'give texts by their key')
+    return given
+
 
 # The run's clock changes with every cycle: nobody reads it faster.
 TOLD_EVERY_S = 0.2

@@ -18,8 +18,7 @@ from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.recorded_seats import SeatOrder
-from crgame_ros.recording.run_record import run_record_of, RunRecord
+from crgame_ros.recording.run_record import run_record_of, RunRecord, SeatOrder
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn

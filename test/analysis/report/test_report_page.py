@@ -11,7 +11,7 @@ import re
 from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
 from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.planners_section import planners_section
-from crgame_ros.analysis.report.report_page import report_html
+from crgame_ros.analysis.report.report_file import report_html
 from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
 from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.analysis.scores.score_measures import MEASURES as MEASURES_OF_SCORES

@@ -4,13 +4,13 @@
 
 from dataclasses import replace
 
-from crgame_ros.analysis.reproduction.multi_av_evaluation import (
+from crgame_ros.analysis.reproduction.recorded_human import record_offline
+from crgame_ros.analysis.reproduction.single_av_evaluation import (
     judge_multi_av,
     jumps,
     MultiAvRun,
     run_alone,
 )
-from crgame_ros.analysis.reproduction.recorded_human import record_offline
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.run_log import RunLog
 import numpy as np

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-from crgame_ros.analysis.reproduction.reproduction_report import CAPTIONS
+from crgame_ros.analysis.reproduction.reproduce_command import CAPTIONS
 from crgame_ros.cli import main
 import pytest
 

@@ -5,8 +5,7 @@
 from dataclasses import replace
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.reproduction.driven_lane import DrivenLane
-from crgame_ros.analysis.reproduction.encounter import Encounter
+from crgame_ros.analysis.reproduction.encounter import DrivenLane, Encounter
 from crgame_ros.analysis.reproduction.expectation import judge
 from crgame_ros.analysis.reproduction.recorded_human import record_offline, RecordedHuman
 from crgame_ros.analysis.reproduction.single_av_evaluation import (

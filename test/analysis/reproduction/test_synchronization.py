@@ -6,9 +6,9 @@ from pathlib import Path
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
-from crgame_ros.analysis.reproduction.naive_loop import NaiveLoop
 from crgame_ros.analysis.reproduction.synchronization import (
     judge_synchronization,
+    NaiveLoop,
     PAPER_TABLE,
     Synchronization,
 )

@@ -7,8 +7,13 @@ import math
 from pathlib import Path
 import sys
 
-from crgame_ros.analysis.scores.drive_comfort import BOUNDS, measure_comfort
-from crgame_ros.analysis.scores.nuplan_score import Expert, NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.nuplan_score import (
+    BOUNDS,
+    Expert,
+    measure_comfort,
+    NuplanScore,
+    NuplanScorer,
+)
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive
 from crgame_ros.errors import InputError
 import numpy as np

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, RUN, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.table_folder import TableFolder
+from crgame_ros.analysis.tables.run_tables import TableFolder
 from crgame_ros.errors import InputError
 import polars
 import pytest
