@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finding exchangeable classes by name, entry point, module or file; checking their options."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 import importlib
 from importlib.metadata import entry_points
 import importlib.util
@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 import sys
 import types
-from typing import Any, ClassVar, get_args, get_origin, get_type_hints, Literal, Union
+from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.paths import share_directory
@@ -37,10 +37,6 @@ class ModelRegistry:
     :param base: the class that all of them derive from
     :param document: the page of the documentation that tells how to write one
     """
-
-    # Who decide whether this process may run code that is not registered, given its name as
-    # `module:Class` or `path/to/file.py:Class`; nobody does in programs that people start.
-    judges: ClassVar[list[Callable[[str], bool]]] = []
 
     def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type,
                  document: str | None = None) -> None:
@@ -113,9 +109,6 @@ class ModelRegistry:
         if name in self.built_in:
             found = _from_module(self.built_in[name], label)
         elif ':' in name:
-            if not all(judge(name) for judge in self.judges):
-                raise InputError('is code that only a message names: it is not run', label,
-                                 'name it in the game file, or to the node that runs it')
             source, _, attribute = name.rpartition(':')
             found = (self._from_file(Path(source), attribute, label) if source.endswith('.py')
                      else _from_module(name, label))

@@ -17,6 +17,7 @@ from crgame_ros.driver.source import (
 )
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GameDocument, parse_game_document, parse_seats_document
+from crgame_ros.registry import POLICY
 from crgame_ros.ros.device_delay import DeviceDelay
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
@@ -25,7 +26,7 @@ from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
 from crgame_ros.ros.seat import GAME
 from crgame_ros.ros.spinning import prompt_executor, spin
-from crgame_ros.ros.trusted_code import trust_code
+from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
@@ -59,7 +60,7 @@ class DriverNode(Node):
         self._joy_map: str = declare('joy_map', 'generic_gamepad', ParameterDescriptor(
             description='device map for the messages of an external joy node',
             read_only=True)).value
-        trust_code(self, self._choice)
+        self._code = TrustedCode(self, self._choice)
         if self._choice:
             parse_source(self._choice)
         if self._choice == 'joy':
@@ -110,6 +111,8 @@ class DriverNode(Node):
                 self.get_logger().info(f'{self._vehicle_id}: the simulation repeats a recording')
                 driver = None
             else:
+                if (self._choice or human.driver).startswith(POLICY):
+                    self._code.check(self._choice or human.driver, f'{self._vehicle_id}: driver')
                 driver = live_driver(self._choice or human.driver,
                                      '' if self._choice else human.timeline,
                                      self._vehicle_id, self._joy_map,

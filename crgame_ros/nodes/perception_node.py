@@ -18,7 +18,7 @@ from crgame_ros.ros.perception_messages import LocalizationMessage, ScanMessages
 from crgame_ros.ros.ros_messages import SeriesMessage
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
-from crgame_ros.ros.trusted_code import trust_code
+from crgame_ros.ros.trusted_code import TrustedCode
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
 from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.vehicle.state import VehicleState
@@ -37,7 +37,7 @@ class PerceptionNode(Node):
         self._vehicle_id: str = self.declare_parameter(
             'vehicle', 'av0', ParameterDescriptor(
                 description='id of the AV that perceives', read_only=True)).value
-        trust_code(self)
+        self._code = TrustedCode(self)
         endpoints = Endpoints(self)
         self._documents = ScenarioDocuments(endpoints)
         self._world = WorldFollower(endpoints, '/vehicles/state', self._forget)
@@ -122,6 +122,8 @@ class PerceptionNode(Node):
         if av is None or av.perception is None:
             return None
         spec = av.perception
+        for sensor in spec.sensors:
+            self._code.check(sensor.model, f'sensor {sensor.name} of {self._vehicle_id}:')
         perception = make_perception(
             self._vehicle_id, spec, scenario.objects, av.vehicle, av.transform, initial, game.seed,
             game.scheduler.dt_s,

@@ -13,7 +13,7 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.planner.crew import PlannerCrew
+from crgame_ros.planner.crew import PlannerCrew, swapped_in
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.ros.endpoints import Endpoints
@@ -22,7 +22,7 @@ from crgame_ros.ros.ros_messages import SeriesMessage, to_time
 from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.spinning import spin
-from crgame_ros.ros.trusted_code import trust_code
+from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
@@ -47,7 +47,7 @@ class PlannerNode(Node):
             'planner', '', ParameterDescriptor(
                 description='planner instead of the one that the game names',
                 read_only=True)).value
-        trust_code(self, self._choice)
+        self._code = TrustedCode(self, self._choice)
         endpoints = Endpoints(self)
         self._plans = endpoints.publisher('/<av>/plan', self._vehicle_id)
         self._paths = endpoints.publisher('/<av>/plan_path', self._vehicle_id)
@@ -144,6 +144,8 @@ class PlannerNode(Node):
         context = PlannerContext(
             self._vehicle_id, loaded.scenario, problem, av.vehicle, objects,
             game.scheduler.time_step_s, game.scheduler.k0, game.seed, game.drivability.road)
+        for planner in (name, *swapped_in(self._vehicle_id, game.events)):
+            self._code.check(planner, 'planner')
         crew = PlannerCrew(context, name, options, game.events, time.perf_counter)
         self._reader = RequestReader(self._vehicle_id, objects, game.scheduler)
         self._crew, self._game = crew, game

@@ -19,7 +19,7 @@ from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.ros.ros_messages import StateMessage
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
-from crgame_ros.ros.trusted_code import trust_code
+from crgame_ros.ros.trusted_code import TrustedCode
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.simulation.traffic_setup import make_traffic
@@ -43,7 +43,7 @@ class TrafficNode(Node):
 
     def __init__(self) -> None:
         super().__init__('traffic_node')
-        trust_code(self)
+        self._code = TrustedCode(self)
         endpoints = Endpoints(self)
         self._refusals = endpoints.refusals
         self._documents = ScenarioDocuments(endpoints)
@@ -105,6 +105,7 @@ class TrafficNode(Node):
         self._spec = scenario.game.traffic
         if self._spec is None:
             return
+        self._code.check(self._spec.model, 'car-following model')
         drive_everything()
         self._orders = TrafficOrders(scenario.loaded, scenario.game.events)
         self._obeyed = set()

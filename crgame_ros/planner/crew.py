@@ -14,6 +14,12 @@ from crgame_ros.planner.planner_registry import create_planner
 from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 
 
+def swapped_in(vehicle_id: str, events: Sequence[EventSpec]) -> tuple[str, ...]:
+    """Return the names of the planners that events bring in for an AV."""
+    return tuple(event.action.planner for event in events
+                 if isinstance(event.action, PlannerSwap) and event.action.av == vehicle_id)
+
+
 class PlannerCrew:
     """
     Runs the planner in office, and changes it and its roads as events say.

@@ -84,7 +84,6 @@ class PlannerRegistry(ModelRegistry):
         if name == EXTERNAL and name not in self.names():
             raise InputError('an external planner answers live runs only', where or 'planner',
                              'start the run with ./run.sh, or name a planner')
-        # Which file may be run is decided where it is loaded.
         found = super().find(POLICY if name.startswith(POLICY) else name, where)
         if not isinstance(getattr(found, 'name', None), str):
             raise InputError('has no name', self.label(name, where),

@@ -10,7 +10,7 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
 from crgame_ros.policy.observation_spec import ObservationSpec
-from crgame_ros.registry import ModelRegistry, module_of_file, POLICY
+from crgame_ros.registry import module_of_file, POLICY
 from crgame_ros.schema.reading import read
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +64,6 @@ def load_policy(name: str, where: str = '') -> Policy:
     :raises InputError: if there is none, it may not be run or is no policy.
     """
     label = f'{where}: {POLICY}{name}' if where else f'{POLICY}{name}'
-    if not all(judge(f'{POLICY}{name}') for judge in ModelRegistry.judges):
-        raise InputError('is code that only a message names: it is not run', label,
-                         'name it in the game file, or to the node that runs it')
     file, _, function = name.rpartition(':')
     path = Path(file).expanduser()
     if not file.endswith('.py'):

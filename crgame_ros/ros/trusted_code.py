@@ -1,32 +1,50 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which code a node may run: what its own parameters name, or a game file that was read."""
+"""The code that a node may run: what its own parameters name, and what the game files name."""
 
 import json
 from pathlib import Path
 
-from crgame_ros.registry import ModelRegistry
+from crgame_ros.errors import InputError
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 
-def trust_code(node: Node, *named: str) -> None:
+class TrustedCode:
     """
-    Declare the parameter `roster`, and run no code that messages alone name.
+    Refuses code that only a message names; each node checks a name before it is loaded.
 
+    Declares the parameter `roster`.
+
+    :param node: the node that loads code.
     :param named: what the node's own parameters name.
     """
-    roster: str = node.declare_parameter('roster', '', ParameterDescriptor(
-        description='file in which sim_node lists the code that the game files which it has read '
-        'name; what only a message names is not run', read_only=True)).value
 
-    def is_trusted(name: str) -> bool:
-        if name in named:
-            return True
+    def __init__(self, node: Node, *named: str) -> None:
+        roster: str = node.declare_parameter('roster', '', ParameterDescriptor(
+            description='file in which sim_node lists the code that the game files which it has '
+            'read name; what only a message names is not run', read_only=True)).value
+        self._roster = Path(roster) if roster else None
+        self._named = named
+
+    def check(self, name: str, where: str) -> None:
+        """
+        Let a name pass that is no code, such as `idm`, or code that is trusted.
+
+        :param name: of a planner, sensor, driver or model: `module:Class`, `FILE.py:Class` and
+            `policy:FILE.py:load` are code.
+        :param where: what is to run it, for messages.
+        :raises InputError: if it is code that neither the node nor a game file names.
+        """
+        if ':' in name and name not in self._named and name not in self._listed():
+            raise InputError('is code that only a message names: it is not run',
+                             f'{where} {name}',
+                             'name it in the game file, or to the node that runs it')
+
+    def _listed(self) -> tuple[str, ...]:
+        # Read each time: sim_node writes it anew for each game.
         try:
-            code = json.loads(Path(roster).read_text(encoding='utf-8'))['code'] if roster else []
+            return tuple(json.loads(self._roster.read_text(encoding='utf-8'))['code']
+                         if self._roster else ())
         except (OSError, ValueError, KeyError):
-            return False
-        return name in code
-
-    ModelRegistry.judges.append(is_trusted)
+            return ()

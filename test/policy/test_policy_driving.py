@@ -9,7 +9,6 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game
 from crgame_ros.game.game_file import dump_game, load_game, parse_game
 from crgame_ros.policy.policy_file import load_policy
-from crgame_ros.registry import ModelRegistry
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
@@ -82,13 +81,6 @@ def test_what_is_no_policy_is_refused_in_a_line(name: str, said: str) -> None:
 def test_a_plan_is_nothing_to_press_pedals_by() -> None:
     with pytest.raises(InputError, match='plans'):
         driven('cut_in', 'by_plans', av=False)
-
-
-def test_a_policy_that_only_a_message_names_is_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ModelRegistry, 'judges', [lambda name: name == f'policy:{HERE}:failing'])
-    assert load_policy(f'{HERE}:failing').action == 'acceleration'
-    with pytest.raises(InputError, match='only a message'):
-        load_policy(f'{HERE}:acceleration')
 
 
 def test_a_game_finds_its_policies_beside_it_and_from_anywhere(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_the_file_of_parameters_lists_every_one(project_root: Path) -> None:
             r"(?:declare_parameter|declare|text|flag)\(\s*'([a-z_]+)'", source))
         declared |= set(re.findall(r"declare_number\(\s*self(?:\._node)?,\s*'([a-z_]+)'",
                                    source))
-        if 'trust_code(' in source:
+        if 'TrustedCode(' in source:
             declared.add('roster')
         names = set(listed.get(path.stem, {}).get('ros__parameters', {}))
         assert names == declared, path.stem
