@@ -6,7 +6,7 @@ The 3D view beside the map: how often and how fast it is drawn, key to picture, 
 Each view has a live run of its own in a real browser, in turns, and so has each version where
 `--against` names another one. What rendered it is stated: a browser without a graphics card draws
 on the processor that the simulation needs, too. Needs what benchmarks/cockpit.py needs, and
-three.js (`crgame cockpit-3d`).
+three.js (`crgame page-libraries`).
 """
 
 import argparse

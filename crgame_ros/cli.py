@@ -59,8 +59,8 @@ TOOLS = (
           'crgame_ros.occupancy.occupancy_command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',
           'crgame_ros.waypoints.waypoint_command'),
-    _Tool('cockpit-3d', "fetch what the page's 3D view is drawn with",
-          'crgame_ros.cockpit.three_command'),
+    _Tool('page-libraries', 'fetch three.js and Plotly, which draw the 3D view and plots',
+          'crgame_ros.page_libraries_command'),
     _Tool('schema', 'what a game file and other files may say, for editors',
           'crgame_ros.schema_command'))
 DESCRIPTION = """\
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _build_parser() -> argparse.ArgumentParser:
     parser = _Parser(prog='crgame', description=DESCRIPTION, formatter_class=partial(
-        argparse.RawDescriptionHelpFormatter, max_help_position=18))
+        argparse.RawDescriptionHelpFormatter, max_help_position=20))
     parser.add_argument('--version', action='version', version=f'crgame_ros {__version__}')
     commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
                                      parser_class=_Parser)

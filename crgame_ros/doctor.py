@@ -16,7 +16,7 @@ import sys
 import time
 from typing import Literal
 
-from crgame_ros.cockpit.three_library import find_library, wanted_version
+from crgame_ros.page_libraries import COMMAND, find_libraries
 from crgame_ros.paths import share_directory
 from crgame_ros.registry import PACKAGES
 from crgame_ros.ros.environment import (
@@ -112,7 +112,7 @@ def run_checks(runs: Path | None = None) -> list[Check]:
     """Check everything, in some seconds; recordings go to `runs`, by default ./runs."""
     prepare_environment()
     return [check_python(), *check_packages(share_directory() / 'requirements.txt'),
-            check_imports(), check_three(), check_ros(), check_profile(), check_devices(),
+            check_imports(), check_page_libraries(), check_ros(), check_profile(), check_devices(),
             check_priority(), *check_discovery(), check_disk(runs or Path('runs')),
             check_processors(), check_clock()]
 
@@ -193,12 +193,12 @@ def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
     return Check('imports', 'fail', detail, 'remove .venv and start again')
 
 
-def check_three() -> Check:
-    """Check whether the cockpit can show its 3D view."""
-    if find_library() is None:
-        return Check('3D view', 'warn', f'three.js {wanted_version()} is not there: the cockpit '
-                     'shows its map alone', 'crgame cockpit-3d')
-    return Check('3D view', 'ok', f'three.js {wanted_version()}')
+def check_page_libraries() -> Check:
+    """Check whether pages can show their 3D view and plots."""
+    if find_libraries() is None:
+        return Check('page libraries', 'warn', 'three.js and Plotly are not there: the cockpit '
+                     'shows neither its 3D view nor plots, and reports cannot be made', COMMAND)
+    return Check('page libraries', 'ok', 'three.js and Plotly')
 
 
 def check_ros() -> Check:

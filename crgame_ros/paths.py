@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator
 import errno
-import importlib.util
 from itertools import count
 import os
 from pathlib import Path
@@ -62,22 +61,6 @@ def check_room(folder: Path, size: int = 1 << 20) -> None:
             # Some file systems cannot promise room.
             if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
                 raise
-
-
-def plotly_script() -> Path:
-    """
-    Find the script of Plotly, which draws plots in pages.
-
-    :raises CrgameError: if it is not installed.
-    """
-    # Importing plotly costs a second; only its script is wanted.
-    spec = importlib.util.find_spec('plotly')
-    for directory in spec.submodule_search_locations or () if spec is not None else ():
-        script = Path(directory) / 'package_data' / 'plotly.min.js'
-        if script.is_file():
-            return script
-    raise CrgameError('the package plotly is missing, which draws the plots of cockpit and report;'
-                      ' install it: pip install plotly')
 
 
 def config_directory() -> Path:

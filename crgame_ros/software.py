@@ -11,8 +11,7 @@ import subprocess
 from crgame_ros import __version__
 
 # Of those that compute what a report tells.
-_PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker',
-             'plotly')
+_PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker')
 _GIT_S = 10.0
 
 

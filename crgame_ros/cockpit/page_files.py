@@ -7,15 +7,14 @@ from dataclasses import dataclass
 import hashlib
 from pathlib import Path
 
-from crgame_ros.cockpit.three_library import find_library, SCRIPTS
 from crgame_ros.errors import CrgameError
-from crgame_ros.paths import plotly_script
+from crgame_ros.page_libraries import find_libraries, PLOTLY, THREE_SCRIPTS
 
 PAGE = Path(__file__).resolve().parent / 'page'
 INDEX = '/'
-PLOTLY = '/plotly.js'
-# Of the 3D view: '/three/three.module.js' imports the other one by its relative path.
-THREE = {f'/three/{name}': name for name in SCRIPTS}
+# The libraries by the path of their request: '/three/three.module.js' imports the other script of
+# three.js by its relative path.
+LIBRARIES = {'/plotly.js': PLOTLY, **{f'/three/{name}': name for name in THREE_SCRIPTS}}
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml', '.png': 'image/png'}
 
@@ -42,29 +41,29 @@ class PageFile:
 
 def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
     """
-    Read all files of the page, and Plotly's script.
+    Read all files of the page.
 
     :param directory: the folder with index.html.
     :return: by the path of the request.
-    :raises CrgameError: if the page or Plotly is not installed.
+    :raises CrgameError: if the page is not installed.
     """
     table = read_files(directory, '/static/')
     index = table.pop('/static/index.html', None)
     if index is None:
         raise CrgameError(f'{directory}: the page of the cockpit is missing; '
                           'install crgame_ros again')
-    return {**table, INDEX: index, PLOTLY: _read(plotly_script())}
+    return {**table, INDEX: index}
 
 
-def read_three(path: str) -> PageFile | None:
+def read_library(path: str) -> PageFile | None:
     """
-    Read a script of three.js, which may have been fetched while the cockpit runs.
+    Read a script of a library, which may have been fetched while the cockpit runs.
 
     :param path: of the request.
-    :return: None if that is none of them, or they have not been fetched.
+    :return: None if the path is none of LIBRARIES, or they have not been fetched.
     """
-    folder = find_library() if path in THREE else None
-    return None if folder is None else _read(folder / THREE[path])
+    folder = find_libraries() if path in LIBRARIES else None
+    return None if folder is None else _read(folder / LIBRARIES[path])
 
 
 def read_files(directory: Path, prefix: str) -> dict[str, PageFile]:

@@ -144,23 +144,23 @@ async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRun
 
 
 def _is_static(path: str) -> bool:
-    return path.startswith(('/static/', '/three/')) or path == page_files.PLOTLY
+    return path.startswith('/static/') or path in page_files.LIBRARIES
 
 
 def _add_page(app: web.Application, table: Mapping[str, PageFile]) -> None:
-    three: dict[str, PageFile] = {}
+    libraries: dict[str, PageFile] = {}
 
     def find(path: str) -> PageFile | None:
-        if path in page_files.THREE and path not in three:
-            file = page_files.read_three(path)
+        if path in page_files.LIBRARIES and path not in libraries:
+            file = page_files.read_library(path)
             if file is not None:
-                three[path] = file
-        return table.get(path) or three.get(path)
+                libraries[path] = file
+        return table.get(path) or libraries.get(path)
 
     async def serve(request: web.Request) -> web.Response:
         return file_answer(request, find(request.path))
 
-    for path in (page_files.INDEX, page_files.PLOTLY, *page_files.THREE, '/static/{name:.*}'):
+    for path in (page_files.INDEX, *page_files.LIBRARIES, '/static/{name:.*}'):
         app.router.add_get(path, serve)
 
 

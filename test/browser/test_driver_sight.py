@@ -8,7 +8,7 @@ from typing import Any
 
 from browser_support import Browser
 from crgame_ros.cockpit.frames import encode_seen
-from crgame_ros.cockpit.three_library import find_library
+from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
@@ -48,8 +48,8 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 @pytest.fixture
 def page(cockpit: Served, browser: Browser) -> Browser:
     """Open the page, and keep what it tells the server of its picture."""
-    if find_library() is None:
-        pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     browser.open(cockpit.address)
     browser.wait('window.crgame?.ready && crgame.world.shown && crgame.store.me.id')
     browser.run("""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.cockpit.three_library import find_library
+from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
@@ -60,8 +60,8 @@ def cockpit() -> Iterator[Served]:
 @pytest.fixture(scope='module')
 def pictures(cockpit: Served, module_browser: Browser) -> dict[str, Any]:
     """Return what is seen by day, at dusk and in fog."""
-    if find_library() is None:
-        pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     page = module_browser
     page.resize(640, 400)
     page.open(cockpit.address)

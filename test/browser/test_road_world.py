@@ -10,11 +10,11 @@ from typing import Any
 
 from browser_support import Browser
 from crgame_ros.cockpit.scene import scene_document
-from crgame_ros.cockpit.three_library import find_library
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.game_file import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
+from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup
@@ -72,8 +72,8 @@ return [...pixels];
 @pytest.fixture(scope='module')
 def page(module_browser: Browser) -> Iterator[Browser]:
     """Open a page, and make a renderer in it."""
-    if find_library() is None:
-        pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     run = RecordedRun(scenarios_directory() / 'cut_in.yaml', 0.1)
     with served(RunBackend(run)) as server:
         module_browser.open(server.address)

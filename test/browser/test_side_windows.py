@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from browser_support import Browser
-from crgame_ros.cockpit.three_library import find_library
+from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
@@ -40,8 +40,8 @@ def cockpit() -> Iterator[Served]:
 def test_two_side_windows_show_the_time_of_the_main_one(
         cockpit: Served, browser: Browser, tmp_path: Path) -> None:
     """At any moment the three pictures are at most one picture apart."""
-    if find_library() is None:
-        pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     driver = browser.driver
     main = driver.current_window_handle
     browser.resize(480, 300)

@@ -8,7 +8,7 @@ from typing import Any
 
 from browser_support import Browser
 from crgame_ros.cockpit import page_files
-from crgame_ros.cockpit.three_library import find_library
+from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 from numpy.typing import NDArray
@@ -68,8 +68,8 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 @pytest.fixture(scope='module')
 def page(cockpit: Served, module_browser: Browser) -> Browser:
     """Return a page whose 3D view is open, in a window that costs little."""
-    if find_library() is None:
-        pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     module_browser.resize(640, 400)
     module_browser.open(cockpit.address)
     module_browser.wait('crgame.ready && crgame.store.scene && crgame.store.latest')
@@ -383,6 +383,6 @@ def test_without_the_library_the_map_works_and_a_line_says_so(
               (node) => node.getClientRects().length > 0).length""") == 1
         assert browser.run_async('return await crgame.view3d.show(true)') is False
         browser.wait("""[...document.querySelectorAll('#notices *')].some(
-            (node) => node.textContent.includes('crgame cockpit-3d'))""")
+            (node) => node.textContent.includes('crgame page-libraries'))""")
         assert browser.run("return document.querySelector('#world').clientWidth > 0")
         assert all('/three/' in error for error in browser.console_errors())

@@ -8,7 +8,7 @@ from pathlib import Path
 import time
 
 from browser_support import Browser
-from crgame_ros.cockpit.three_library import find_library
+from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
 from PIL import Image
 import pytest
@@ -87,8 +87,8 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 @pytest.fixture
 def page(cockpit: Served, browser: Browser) -> Browser:
     """Return a page whose 3D view is open."""
-    if find_library() is None:
-        pytest.skip('the 3D view is not tested: `crgame cockpit-3d` has not fetched three.js')
+    if find_libraries() is None:
+        pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     browser.resize(800, 500)
     browser.open(cockpit.address)
     browser.wait('window.crgame?.ready && crgame.store.scene && crgame.store.latest')

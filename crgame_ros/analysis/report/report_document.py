@@ -9,7 +9,7 @@ from pathlib import Path
 import re
 
 from crgame_ros.analysis.report.report_text import plain
-from crgame_ros.paths import plotly_script
+from crgame_ros.page_libraries import plotly_script
 
 PAGE = Path(__file__).resolve().parent / 'page'
 # Plotly makes an empty `<style>` whose rules it then adds by script.
@@ -25,7 +25,7 @@ def plotted_document(title: str, body: str, data: str) -> str:
     :param title: text, as tabs show it.
     :param body: HTML.
     :param data: of the plots, JSON that may stand in a script.
-    :raises CrgameError: if Plotly is not installed.
+    :raises CrgameError: if Plotly has not been fetched.
     """
     script = (PAGE / 'report.js').read_text(encoding='utf-8')
     plotly = plotly_script().read_text(encoding='utf-8')

@@ -31,7 +31,8 @@ export function loadPlotly() {
     script.addEventListener('error', () => {
       loading = null;
       script.remove();
-      reject(new Error('The plots cannot be drawn: the server does not give the library Plotly.'));
+      reject(new Error('The plots need Plotly, which the server does not have: '
+        + '`crgame page-libraries` fetches it.'));
     });
     const styles = document.createElement('meta');
     styles.id = MAP_STYLES;

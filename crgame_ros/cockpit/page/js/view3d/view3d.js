@@ -16,7 +16,7 @@ import { readViewWindow } from './view_window.js';
 /** @import { Looks, Picture } from './picture.js' */
 
 const MISSING = 'The 3D view needs three.js, which the server does not have: '
-  + '`crgame cockpit-3d` fetches it.';
+  + '`crgame page-libraries` fetches it.';
 const LOST = 'The graphics card took the 3D view back: it returns when the card is free.';
 // While nothing moves, the mirrors are still drawn one after the other.
 const PICTURES_AFTER_CHANGE = 7;

