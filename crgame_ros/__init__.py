@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real-time, human-in-the-loop driving simulation on CommonRoad and ROS 2."""
 
-__version__ = '0.1.0'
-
 # Importing this package loads nothing more: each name below is loaded when somebody asks for it.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -21,6 +19,7 @@ if TYPE_CHECKING:
     from crgame_ros.python_interface.recorded_runs import read_run
     from crgame_ros.python_interface.replays import replay
     from crgame_ros.python_interface.run_functions import export, measure, report
+    from crgame_ros.version import __version__
 else:
     # Type checkers are not shown this: to them a name that is not imported above is an error.
     def __getattr__(name: str) -> object:
@@ -32,11 +31,12 @@ else:
         return found
 
 __all__ = [
-    'Computing', 'CrgameError', 'evaluate', 'EvaluationPlan', 'export', 'Game', 'InputError',
-    'load_game', 'measure', 'Plan', 'Planner', 'PlannerContext', 'PlanningError', 'PlanRequest',
-    'read_run', 'replay', 'report', 'run', 'Run', 'scenarios_directory']
+    '__version__', 'Computing', 'CrgameError', 'evaluate', 'EvaluationPlan', 'export', 'Game',
+    'InputError', 'load_game', 'measure', 'Plan', 'Planner', 'PlannerContext', 'PlanningError',
+    'PlanRequest', 'read_run', 'replay', 'report', 'run', 'Run', 'scenarios_directory']
 # The module of each name, within this package.
 _PLACES = {
+    '__version__': 'version',
     'CrgameError': 'errors', 'InputError': 'errors', 'PlanningError': 'errors',
     'Computing': 'evaluation.evaluation', 'EvaluationPlan': 'evaluation.evaluation_plan',
     'evaluate': 'python_interface.finished_evaluation', 'scenarios_directory': 'paths',

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import importlib
 import json
+import os
 from pathlib import Path
 import sys
 from typing import NamedTuple
@@ -85,9 +86,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if words[:1] == ['run']:
             from crgame_ros.launcher.main import main as run
             return run(words[1:])
-        values = _build_parser().parse_args(words)
+        values = _build_parser(words[0] if words else '').parse_args(words)
         command: Callable[[argparse.Namespace], int] = values.command
-        return command(values)
+        code = command(values)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Nobody reads on: `crgame offline | head`. Python's own last flush has to find an end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
         return error.exit_code
@@ -95,7 +102,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _build_parser() -> argparse.ArgumentParser:
+def _build_parser(chosen: str) -> argparse.ArgumentParser:
+    """
+    Build the parser of all commands.
+
+    :param chosen: the one command whose module is loaded, for its options; its name may be wrong.
+    """
     parser = _Parser(prog='crgame', description=DESCRIPTION, formatter_class=partial(
         argparse.RawDescriptionHelpFormatter, max_help_position=20))
     parser.add_argument('--version', action='version', version=f'crgame_ros {__version__}')
@@ -118,8 +130,9 @@ def _build_parser() -> argparse.ArgumentParser:
     info.add_argument('bag', type=Path, help='folder or file of the recording')
     info.set_defaults(command=_info)
     for tool in TOOLS:
-        importlib.import_module(tool.module).add_arguments(
-            commands.add_parser(tool.name, help=tool.does))
+        command = commands.add_parser(tool.name, help=tool.does)
+        if tool.name == chosen:
+            importlib.import_module(tool.module).add_arguments(command)
     doctor = commands.add_parser('doctor', help=DOCTOR)
     doctor.add_argument('--clean', action='store_true',
                         help='remove the shared memory that killed ROS processes have left')

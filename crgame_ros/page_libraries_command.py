@@ -9,7 +9,7 @@ from crgame_ros.page_libraries import fetch_libraries, find_libraries
 DESCRIPTION = """\
 Fetch three.js, which draws the 3D view, and Plotly, which draws the plots of the cockpit and of
 reports, from npm. Both have the MIT licence. scripts/env.sh fetches them for a checkout; after
-`pip install`, run this command once. Without npm on this machine, pip brings one for the download."""
+`pip install`, run this command once. Without npm on this machine, pip brings it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -406,7 +406,7 @@ def test_examples_of_crgame_are_true() -> None:
     for page, line in examples:
         program, *words = shlex.split(line.replace('<', '').replace('>', ''))
         assert program == './crgame', f'{page}: {line}'
-        assert callable(_build_parser().parse_args(words).command), f'{page}: {line}'
+        assert callable(_build_parser(words[0]).parse_args(words).command), f'{page}: {line}'
 
 
 def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.cockpit.seen_view import SHOWN
 from crgame_ros.errors import InputError
 from crgame_ros.game.task_documents import LONGEST_MS, MAX_NUMBER, PageTimes
+from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
 MAX_BYTES = 64 * 1024
 MAX_NAME = 40
@@ -25,7 +26,6 @@ MAX_DELAY_MS = 60_000.0
 _VIEW_NUMBERS = {'width_px': 1e5, 'height_px': 1e5, 'ratio': 100.0}
 _VIEW_MEASURES = {'across_deg': 180.0, 'screen_width_m': 20.0, 'eye_distance_m': 20.0,
                   'rate_hz': 1000.0}
-REAL_TIME_FACTORS = (0.1, 10.0)
 ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
 # Rounding of a calibrated axis in the page.
 _AXIS_TOLERANCE = 1e-3
@@ -131,7 +131,7 @@ def _control(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _rate(message: Mapping[str, Any]) -> dict[str, Any]:
-    low, high = REAL_TIME_FACTORS
+    low, high = MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR
     factor = _number(message.get('factor'), 'factor')
     if not low <= factor <= high:
         raise _wrong('factor', f'is not from {low:g} to {high:g}')

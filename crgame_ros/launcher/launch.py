@@ -24,7 +24,7 @@ from crgame_ros.ros.environment import (
 )
 from crgame_ros.ros.place import held
 from crgame_ros.ros.shared_memory import remove_stale
-from crgame_ros.traffic.compiled import compile_now
+from crgame_ros.traffic.kernel_cache import compile_now, compiling_when_idle
 
 
 def launch(arguments: Sequence[str] | None = None) -> int:
@@ -43,13 +43,14 @@ def launch(arguments: Sequence[str] | None = None) -> int:
                                 new_token() if request.token else None, say=say)
         require_ros()
         plan = plan_run(request)
-        compile_now()
+        if plan.setup.game.traffic is not None:
+            compile_now()
         announce(plan)
         # Killed processes leave 4 MB each.
         remove_stale()
         finisher = Finisher(plan.folder, say, not request.no_report)
         try:
-            with held(os.environ['ROS_DOMAIN_ID'], request.namespace):
+            with compiling_when_idle(), held(os.environ['ROS_DOMAIN_ID'], request.namespace):
                 specs = node_specs(plan)
                 load(shared_modules(specs, plan))
                 graph = Graph(specs, say, Roster(plan.roster), finisher, request.namespace)

@@ -24,6 +24,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGINT, _leave)
     # run.sh holds it back while Python itself starts.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    words = sys.argv[1:] if arguments is None else arguments
+    if {'--help', '-h'} & set(words):
+        # Answers in an environment that has no packages yet.
+        from crgame_ros.launcher.arguments import parse_arguments
+        parse_arguments(['--help'])
     from crgame_ros.launcher.launch import launch
     signal.signal(signal.SIGINT, before)
     return launch(arguments)

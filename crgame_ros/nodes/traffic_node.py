@@ -25,6 +25,7 @@ from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.simulation.traffic_setup import make_traffic
 from crgame_ros.simulation.world import TrafficOrders
 from crgame_ros.simulation.world_reader import WorldReader
+from crgame_ros.traffic.kernel_cache import compile_now
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.warm_up import drive_everything
 from crgame_ros.traffic.world_view import WorldView
@@ -106,6 +107,7 @@ class TrafficNode(Node):
         if self._spec is None:
             return
         self._code.check(self._spec.model, 'car-following model')
+        compile_now()
         drive_everything()
         self._orders = TrafficOrders(scenario.loaded, scenario.game.events)
         self._obeyed = set()

@@ -67,7 +67,9 @@ def make_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork
     :param seed: of the game; the traffic's own goes before it.
     """
     from crgame_ros.traffic.adoption import Adopted
+    from crgame_ros.traffic.kernel_cache import compile_now
     from crgame_ros.traffic.traffic import Traffic
+    compile_now()
     tracks = [Adopted(obstacles.descriptions[column], obstacles.first_step(column),
                       *obstacles.track(column)) for column in adopted]
     return Traffic(spec, network, loaded.scenario, others, tracks, scheduler.time_step_s,

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import TimingSpec
+from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
-MIN_REAL_TIME_FACTOR = 0.1
-MAX_REAL_TIME_FACTOR = 10.0
 NS = 1e-9
 
 

@@ -3,9 +3,11 @@
 """Compile everything that traffic runs, before it is needed: `python -m …traffic.warm_up`."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import fcntl
 from functools import cache
+import os
+from pathlib import Path
 import sys
 import time
 
@@ -23,7 +25,7 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.compiled import marker
+from crgame_ros.traffic.kernel_cache import marker
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world_view import WorldView
 import numpy as np
@@ -54,9 +56,19 @@ def _turn(say: Callable[[str], None]) -> Iterator[None]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            _hurry(lock)
             say('another process compiles traffic: waiting for it')
             fcntl.flock(handle, fcntl.LOCK_EX)
+        handle.truncate(0)
+        handle.write(str(os.getpid()))
+        handle.flush()
         yield
+
+
+def _hurry(lock: Path) -> None:
+    """Give the process that compiles an ordinary priority, where it has only idle time."""
+    with suppress(ValueError, OSError):
+        os.sched_setscheduler(int(lock.read_text()), os.SCHED_OTHER, os.sched_param(0))
 
 
 def _compile(say: Callable[[str], None]) -> None:
@@ -145,4 +157,6 @@ def _lanelet(number: int, x: np.ndarray, y: np.ndarray, **links: object) -> Lane
 
 
 if __name__ == '__main__':
+    if sys.argv[1:] == ['--idle']:
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     ensure_compiled(lambda text: print(f'crgame: {text}', file=sys.stderr, flush=True))

@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Install the pinned packages: make_venv.sh FOLDER PYTHON wheels|jazzy STAMP; scripts/env.sh calls it.
+#
+# uv installs, the one on the PATH or one in a folder of its own: it is ten times as fast as pip.
+set -euo pipefail
+venv=$1 python=$2 ros=$3 wanted=$4
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
+
+say() {
+    printf 'crgame: %s\n' "$*" >&2
+}
+
+fail() {
+    say "$@"
+    exit 1
+}
+
+trap 'say "stopped; the next start goes on from here"; exit 130' INT TERM HUP
+if ! { mkdir -p "$venv" && touch "$venv/COLCON_IGNORE" && exec 9>"$venv/.lock"; } 2>/dev/null; then
+    fail "cannot write to $venv: copy the checkout to a folder of your own"
+fi
+flock -n 9 || {
+    say 'waiting for another start that installs packages'
+    flock 9
+}
+if [[ -e $venv/stamp ]] && grep -qx "$wanted" "$venv/stamp"; then
+    exit
+fi
+
+say "installing packages into ${venv##*/}, once: $("$python" --version), ROS 2 Jazzy from $ros"
+# pip's settings serve uv as well, and so do the certificates of the machine.
+index=${PIP_INDEX_URL:-$("$python" -m pip config get global.index-url 2>/dev/null)} || true
+[[ -z $index ]] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$index}
+export UV_SYSTEM_CERTS=1 UV_NATIVE_TLS=1
+unset PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE VIRTUAL_ENV CONDA_PREFIX PIP_TARGET PIP_PREFIX
+if ! uv=$(command -v uv); then
+    uv=$venv/uv/bin/uv
+    if [[ ! -x $uv ]]; then
+        "$python" -m venv "$venv/uv" >/dev/null ||
+            fail "$python cannot make environments: apt install python3-venv, or install uv"
+        "$venv/uv/bin/python" -m pip --disable-pip-version-check --quiet install uv==0.13.9 ||
+            fail 'uv, which installs packages, cannot be installed: check the network, or install uv'
+    fi
+fi
+site=() without='^$'
+[[ $ros != jazzy ]] || site=(--system-site-packages) without='^ros-'
+# An environment of another interpreter, or half of one, is made anew.
+if [[ ! -e $venv/stamp ]]; then
+    "$uv" venv --quiet --allow-existing --python "$python" "${site[@]}" "$venv"
+fi
+
+install() {
+    "$uv" pip install --no-deps --python "$venv/bin/python" "$@"
+}
+
+pins=$root/requirements.txt
+[[ ${CRGAME_DEVELOP:-} != 1 ]] || pins=$root/requirements-dev.txt
+# The lines of a package with its hashes are one for sed and grep.
+sed -e ':a' -e '/\\$/{N;ba}' "$pins" | grep -v "$without" >"$venv/requirements.txt"
+install -r "$venv/requirements.txt" ||
+    fail 'the packages are not installed: see above; check network, disk and the settings of pip'
+# ROS headers: nothing is compiled against them.
+rm -rf "$venv/include"
+ln -sf ../../crgame "$venv/bin/crgame"
+
+(PYTHONPATH=$root "$venv/bin/python" -m crgame_ros.cli page-libraries) >"$venv/pages.log" 2>&1 &
+pages=$!
+say 'compiling polygon3 for the planners that need it: up to half a minute'
+# The others declare Python < 3.12, though they work on it.
+grep '^polygon3' "$root/requirements-planners.txt" | install --quiet -r - 2>"$venv/polygon3.log" &&
+    grep -v '^polygon3' "$root/requirements-planners.txt" |
+    install --quiet --python-version 3.11 -r - ||
+    say "no planners reactive, reactive-package, idm-package: polygon3 does not compile;" \
+        "apt install gcc python3-dev, remove ${venv##*/} and start again"
+wait "$pages" || say "pages have no 3D view and no plots: $(tail -n 1 "$venv/pages.log");" \
+    './crgame page-libraries tries again'
+# What serves developers serves everybody.
+printf '%s\n' "$wanted" "$(cat "$root"/requirements{,-planners}.txt | sha256sum)" >"$venv/stamp"
