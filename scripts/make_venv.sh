@@ -19,7 +19,8 @@ fail() {
 }
 
 trap 'say "stopped; the next start goes on from here"; exit 130' INT TERM HUP
-if ! { mkdir -p "$venv" && touch "$venv/COLCON_IGNORE" && exec 9>"$venv/.lock"; } 2>/dev/null; then
+# uv locks .lock itself.
+if ! { mkdir -p "$venv" && touch "$venv/COLCON_IGNORE" && exec 9>"$venv/making.lock"; } 2>/dev/null; then
     fail "cannot write to $venv: copy the checkout to a folder of your own"
 fi
 flock -n 9 || {
@@ -69,12 +70,15 @@ ln -sf ../../crgame "$venv/bin/crgame"
 (PYTHONPATH=$root "$venv/bin/python" -m crgame_ros.cli page-libraries) >"$venv/pages.log" 2>&1 &
 pages=$!
 say 'compiling polygon3 for the planners that need it: up to half a minute'
+planners=$root/requirements-planners.txt
 # The others declare Python < 3.12, though they work on it.
-grep '^polygon3' "$root/requirements-planners.txt" | install --quiet -r - 2>"$venv/polygon3.log" &&
-    grep -v '^polygon3' "$root/requirements-planners.txt" |
-    install --quiet --python-version 3.11 -r - ||
-    say "no planners reactive, reactive-package, idm-package: polygon3 does not compile;" \
+if install --quiet "$(grep '^polygon3' "$planners")" 2>"$venv/polygon3.log"; then
+    grep -v '^polygon3' "$planners" >"$venv/planners.txt"
+    install --quiet --python-version 3.11 -r "$venv/planners.txt"
+else
+    say 'no planners reactive, reactive-package, idm-package: polygon3 does not compile;' \
         "apt install gcc python3-dev, remove ${venv##*/} and start again"
+fi
 wait "$pages" || say "pages have no 3D view and no plots: $(tail -n 1 "$venv/pages.log");" \
     './crgame page-libraries tries again'
 # What serves developers serves everybody.
