@@ -11,27 +11,26 @@ from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING
 
 from aiohttp import web
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.criticality_rows import criticality_rows, CRITICALITY_TOPIC
+from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.cockpit.message_frames import MessageFrames
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
 from crgame_ros.cockpit.replay_index import index_run, RunIndex
+from crgame_ros.cockpit.replay_outline import pack
 from crgame_ros.cockpit.replay_tracks import Mark
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
-from crgame_ros.errors import CrgameError
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.recording.epochs import Epoch, epoch_numbers, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_log import read_run_log
 from crgame_ros.scenario.loading import parse_scenario
 
 if TYPE_CHECKING:
     from crgame_ros.cockpit.client import Client
     from crgame_ros.cockpit.hub import Hub
-from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.criticality.criticality_rows import criticality_rows, CRITICALITY_TOPIC
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
-from crgame_ros.cockpit.message_frames import MessageFrames
-from crgame_ros.cockpit.replay_outline import pack
-from crgame_ros.errors import InputError
-from crgame_ros.recording.run_log import read_run_log
 
 
 def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:

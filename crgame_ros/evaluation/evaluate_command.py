@@ -3,28 +3,27 @@
 """`crgame evaluate`: planner x scenario x human x seed, on this machine's cores or a cluster."""
 
 import argparse
+from collections.abc import Callable
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
+from crgame_ros.analysis.report.report_file import write_report
+from crgame_ros.analysis.report.report_run import measured_run
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell_run import run_cell
+from crgame_ros.evaluation.evaluation_folder import EvaluationFolder, REPORTS
+from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.summary_command import add_summary_arguments
+from crgame_ros.recording.export import prepare_folder, write_scenario
+from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.run_record import run_record_of
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
     from crgame_ros.evaluation.evaluation import Computing
     from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
-from collections.abc import Callable
-
-from crgame_ros.analysis.report.report_file import write_report
-from crgame_ros.analysis.report.report_run import measured_run
-from crgame_ros.evaluation.cell_run import run_cell
-from crgame_ros.evaluation.evaluation_folder import EvaluationFolder, REPORTS
-from crgame_ros.evaluation.source_digest import engine_digest
-from crgame_ros.recording.export import prepare_folder, write_scenario
-from crgame_ros.recording.offline_outcome import offline_outcome
-from crgame_ros.recording.run_record import run_record_of
 
 
 def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:

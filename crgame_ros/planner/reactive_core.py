@@ -25,10 +25,7 @@ from crgame_ros.planner.interface import PlannerContext  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
 from crgame_ros.planner.reference_path import DrivingPath  # noqa: E402
 from crgame_ros.vehicle.parameters import VehicleParameters  # noqa: E402
-from crgame_ros.vehicle.state import (
-    REST,  # noqa: E402
-    STATE_WIDTH,  # noqa: E402
-)
+from crgame_ros.vehicle.state import REST, STATE_WIDTH  # noqa: E402
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 

@@ -12,11 +12,6 @@ USUAL_NS = 1_000_000_000
 AGREEING = 3
 # Of a run whose game nobody publishes people hear after so long [s].
 PATIENCE_S = 2.0
-EXIT = 'exit'
-# Until a reset or a signal.
-STAY = 'stay'
-# As `STAY` if the run's game was chosen after the start, else as `EXIT`.
-STAY_IF_CHOSEN = 'stay-if-chosen'
 
 
 class TimeCourse(Enum):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who drives what in a live run: one source a seat, changed by orders on /seats/order."""
 
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterable, Iterator, MutableMapping
 from dataclasses import replace
 import json
 from typing import TYPE_CHECKING
@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import (
+    DrivingSpell,
     MAX_SOURCE_LENGTH,
     ORDER_TOPIC,
     parse_demand,
     seat_entry,
     SeatDemand,
+    SeatPerson,
     SeatTenant,
+    spells_document,
 )
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, SHARED_DEPTH
 from crgame_ros.ros.seat import GAME, PLANNER, Seat
@@ -25,9 +28,7 @@ if TYPE_CHECKING:  # The driver's process needs neither, and they take half a se
     from crgame_ros.recording.recorded_inputs import RecordedInputs
     from crgame_ros.simulation.engine import Simulation
     from crgame_ros.simulation.setup import Setup
-from collections.abc import Iterable
 
-from crgame_ros.game.seat_documents import DrivingSpell, SeatPerson, spells_document
 
 # Further changes are told as one: people change seats a few times, a flood does it for ever.
 MAX_SPELLS = 500

@@ -5,37 +5,26 @@
 from collections.abc import Sequence
 from typing import Protocol, TYPE_CHECKING
 
-from crgame_ros.game.events import TrafficOrder
+from crgame_ros.game.events import EventSpec, SpeedLimit, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
+from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.simulation.run_events import RunEvents
 from crgame_ros.simulation.setup import Setup
-from crgame_ros.vehicle.state import VehicleState
-
-if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
-    from crgame_ros.traffic.traffic import Traffic
-    from crgame_ros.traffic.world_view import WorldView
-from typing import TYPE_CHECKING
-
-from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.simulation.world_reader import (
     driven_centers,
     FloatArray,
     joints_of,
     WorldReader,
 )
+from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
-if TYPE_CHECKING:
-    from crgame_ros.traffic.world_view import WorldView
-from typing import TYPE_CHECKING
-
-from crgame_ros.game.events import EventSpec, SpeedLimit
-from crgame_ros.roads.road_network import RoadNetwork
-from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
-from crgame_ros.scenario.loading import LoadedScenario
-
-if TYPE_CHECKING:  # Imports numba: only runs with agents should wait for that.
+if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
     from crgame_ros.traffic.traffic import Traffic
+    from crgame_ros.traffic.world_view import WorldView
 
 
 class TrafficOrders:

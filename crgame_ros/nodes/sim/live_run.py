@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One epoch of a live run: from the request of k0 to the end, a reset or a stop."""
 
+from collections.abc import Callable
 from dataclasses import replace
 import gc
 import time
@@ -30,7 +31,6 @@ from rclpy.node import Node
 
 if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
     from crgame_ros.recording.recorded_inputs import RecordedInputs
-from collections.abc import Callable
 
 NS_PER_S = 1_000_000_000
 # How often the executor looks for service calls [Hz], and the least time left for it [ns].

@@ -14,7 +14,7 @@ from crgame_ros.game.seat_documents import SeatTenant
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.number_parameters import declare_number
-from crgame_ros.ros.run_time import EXIT, STAY, STAY_IF_CHOSEN
+from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node

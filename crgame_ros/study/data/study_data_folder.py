@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The files of what a study has found: each there whole at any time, with a data dictionary."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import fcntl
+import json
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.data_package import (
+    data_package,
+    PACKAGE_FILE,
+    table_schema,
+    WrittenTable,
+)
+from crgame_ros.analysis.tables.table_writer import Format, NOT_A_NUMBER
+from crgame_ros.errors import InputError
+from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
+from crgame_ros.study.data.paper_section import provenance_of
+from crgame_ros.study.data.run_rows_tables import write_run_tables
+from crgame_ros.study.data.study_data import StudyData
+from crgame_ros.study.data.study_row_table import csv_of_table, parquet_of_table
+
+if TYPE_CHECKING:  # Other commands do not wait for it.
+    pass
+
+
+RUNS, PROVENANCE, LOCK = 'runs', 'provenance.json', '.lock'
+DESCRIPTION = (
+    'What a study of crgame_ros has found. SI units and radians. A value that is missing is null '
+    f'in Parquet; in CSV a missing number is {NOT_A_NUMBER}, any other missing value an empty '
+    'field; empty texts are missing. CSV is RFC 4180 in UTF-8. Texts are what people wrote, to '
+    'the last character, but for NUL and halves of UTF-16 pairs, which become U+FFFD: nothing is '
+    'put in front of = + - @, so open these files in a spreadsheet by its import of texts, not by '
+    'a double click.')
+
+
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """
+    Be the only one that writes a study's data.
+
+    :raises InputError: if somebody else does, or nobody can.
+    """
+    prepare_folder(folder)
+    with (folder / LOCK).open('w') as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError('another process writes there', str(folder), 'wait for it') from error
+        for part in folder.rglob('.*.part'):
+            # Of a process that was killed.
+            if part.is_file():
+                part.unlink()
+        yield
+
+
+def write_study_data(data: StudyData) -> dict[str, int]:
+    """
+    Write the tables, the tables of all runs, the dictionaries and the provenance.
+
+    A file is replaced whole; the dictionaries come last. Equal data give equal bytes.
+
+    :return: rows by table.
+    :raises InputError: if the folder cannot be written.
+    """
+    out = data.folder.data
+    written: dict[Format, list[WrittenTable]] = {'csv': [], 'parquet': []}
+    for declaration in data.declarations:
+        table = data.tables[declaration.name]
+        for file_format, content in (('csv', csv_of_table(table)),
+                                     ('parquet', parquet_of_table(table))):
+            path = out / f'{declaration.name}.{file_format}'
+            write_bytes(content, path)
+            written[file_format].append(  # type: ignore[index]
+                WrittenTable(declaration, path, path.name, len(table)))
+    write_text(_json(provenance_of(data)), out / PROVENANCE)
+    write_text(_json(_package(written, data.folder.study.name)), out / PACKAGE_FILE)
+    rows = {name: len(table) for name, table in data.tables.items()}
+    return rows | {f'{RUNS}/{name}': count for name, count in write_run_tables(
+        data.trials, out / RUNS, data.folder.study.name).items()}
+
+
+def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str, Any]:
+    """Describe the tables: of each there are two files, which hold the same."""
+    package = data_package(written['csv'], 'csv', study)
+    other = data_package(written['parquet'], 'parquet', study)['resources']
+    for resource in other:
+        resource['name'] += '_parquet'
+    package |= {'title': f'Study: {study}', 'description': DESCRIPTION,
+                'resources': [*package['resources'], *other]}
+    declarations = {table.name: table.declaration for tables in written.values()
+                    for table in tables}
+    for resource in package['resources']:
+        resource['schema'] = _schema(declarations[resource['path']])
+    return package
+
+
+def _schema(declaration: TableDeclaration) -> dict[str, Any]:
+    schema = table_schema(declaration)
+    schema.pop('foreignKeys', None)
+    if declaration.key != ('participant',):
+        schema['foreignKeys'] = [{'fields': ['participant'], 'reference': {
+            'resource': 'participants', 'fields': ['participant']}}]
+    return schema
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + '\n'
