@@ -1,33 +1,32 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures of all tests; ROS traffic of every test stays on this machine and in its own domain."""
+"""Fixtures and tiers of all tests; their ROS traffic stays here, each in a domain of its own."""
 
-from collections.abc import Iterator
-import gc
 import os
 from pathlib import Path
 import signal
 import sys
-from typing import Any
 
 from crgame_ros.ros.environment import prepare_environment
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from worker_roles import (  # noqa: E402 - importable from here on
-    ALONE,
-    group_of,
-    in_company,
-    keeps_to_the_clock,
-    order_of,
-    own_domain_id,
-    RoleScheduling,
-    step_back,
-)
+from ros_domains import own_domain_id  # noqa: E402 - importable from here on
 
 LONGEST_ID = 100
 ROOT = Path(__file__).resolve().parents[1]
+# Their tests start ROS graphs, servers or browsers; they come first, for they wait more than
+# they compute.
+GRAPH_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
+TIERS = ('quick', 'default', 'all')
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Declare the tier."""
+    parser.addoption('--tier', choices=TIERS, default='all', help=(
+        'quick: no ROS graph, no browser; default: what decides whether a change lands; all: '
+        'also the tests marked exhaustive or clock, and every case of those marked matrix'))
 
 
 def pytest_configure() -> None:
@@ -46,50 +45,40 @@ def pytest_configure() -> None:
 
 # Before xdist reads the groups.
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put tests that keep to the clock first, and each file into a group of its own."""
-    groups = {item: group_of(item, ROOT / 'test') for item in items}
-    items.sort(key=lambda item: order_of(groups[item]))
-    for item, group in groups.items():
-        if item.get_closest_marker('xdist_group') is None or group == ALONE:
-            item.add_marker(pytest.mark.xdist_group(group))
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what the tier has not; graphs come first; each file has a worker to itself."""
+    tier = config.getoption('--tier')
+    kept, left_out, seen = [], [], set[str]()
+    for item in items:
+        case_of = item.nodeid.partition('[')[0]
+        (kept if _is_in(item, tier, case_of in seen) else left_out).append(item)
+        seen.add(case_of)
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+    items[:] = sorted(kept, key=lambda item: not _starts_graphs(item))
+    for item in items:
+        if item.get_closest_marker('xdist_group') is None:
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition('::')[0]))
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> RoleScheduling | None:
-    """With `--dist loadgroup` some workers run graphs and the others compute."""
-    return RoleScheduling(config, log) if config.getvalue('dist') == 'loadgroup' else None
+def _starts_graphs(item: pytest.Item) -> bool:
+    return item.path.relative_to(ROOT / 'test').parts[0] in GRAPH_FOLDERS
+
+
+def _is_in(item: pytest.Item, tier: str, is_further_case: bool) -> bool:
+    if tier == 'all':
+        return True
+    marked = {mark.name for mark in item.iter_markers()}
+    if {'exhaustive', 'clock'} & marked or ('matrix' in marked and is_further_case):
+        return False
+    return tier == 'default' or not (_starts_graphs(item) or 'slow' in marked)
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
-    """Name long values by their length: a line of megabytes chokes whoever reads the output."""
+    """Name long values by their length: a line of megabytes cannot be read."""
     if isinstance(val, str | bytes) and len(val) > LONGEST_ID:
         return f'{argname} of {len(val)}'
     return None
-
-
-@pytest.fixture(scope='module', autouse=True)
-def _company(request: pytest.FixtureRequest,
-             tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep from each other, and from what computes, those that keep to the clock."""
-    first = next(item for item in request.session.items if item.path == request.path)
-    group = group_of(first, ROOT / 'test')
-    own = tmp_path_factory.getbasetemp()
-    # Workers have folders beside each other; a session without any has nobody to wait for.
-    folder = own.parent if 'PYTEST_XDIST_WORKER' in os.environ else own
-    file = folder / 'company.lock'
-    if not keeps_to_the_clock(group):
-        step_back()
-        with in_company(file):
-            yield
-        return
-    # A collection in the heap that all other tests have left stops this process for half a
-    # second: whoever drives a vehicle from here would fall silent, and be braked.
-    gc.collect()
-    gc.freeze()
-    with in_company(file, alone=group == ALONE):
-        yield
-    gc.unfreeze()
 
 
 @pytest.fixture(scope='session')
@@ -109,7 +98,7 @@ def shared_scenarios() -> Path:
 
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    """Return the test, and the processes it starts, a ROS domain that nobody else uses."""
+    """Return the test, and the processes it starts, a ROS domain of its own."""
     domain = own_domain_id()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     return domain

@@ -36,6 +36,7 @@ def refusal(command: str, out: Path, full: bool = False) -> str:
     return told[0]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
     """Not after the run, and no half-made file or folder stays."""
@@ -45,6 +46,7 @@ def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
     assert not out.exists() or not any(out.iterdir())
 
 
+@pytest.mark.matrix
 @pytest.mark.skipif(shutil.which('mount') is None, reason='no mount')
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_file_system_without_room(command: str, tmp_path: Path) -> None:
@@ -62,6 +64,7 @@ def test_a_file_system_without_room(command: str, tmp_path: Path) -> None:
         subprocess.run(['umount', str(place)], check=True)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('command', COMMANDS)
 @pytest.mark.parametrize('name', ['file', 'file/below', 'file.xml', 'folder.xml'])
 def test_something_else_in_the_way_is_told_at_the_start(

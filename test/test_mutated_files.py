@@ -15,7 +15,9 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / 'benchmarks'
 SMALL = ('ZAM_Over-1_1', 'DEU_Test-1_1_T-1', 'more/ZAM_Zip-2_1_T-1', 'more/DEU_Gar-1_1_T-1',
          'more/GRL_Nuuk-6', 'more/DEU_Moabit-4_1_T-1', 'more/ZAM_Urban-3_3_Repair')
 
-pytestmark = pytest.mark.skipif(not BENCHMARKS.is_dir(), reason='part of the source tree only')
+pytestmark = [
+    pytest.mark.skipif(not BENCHMARKS.is_dir(), reason='part of the source tree only'),
+    pytest.mark.exhaustive]
 
 
 @pytest.fixture(scope='module')

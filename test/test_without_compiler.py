@@ -82,6 +82,7 @@ def test_offline_run_with_idm() -> None:
     assert off_road == [False, False]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('planner', ['reactive', 'reactive-package', 'idm-package'])
 def test_planners_that_need_it_say_so(planner: str, project_root: Path, tmp_path: Path) -> None:
     """One line with the remedy and exit code 2, no traceback."""

@@ -28,6 +28,7 @@ def found_in(browser: Browser, where: str) -> list[str]:
     return found
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('size', SIZES)
 def test_every_page_of_a_session(new_browser: OpenBrowser, tmp_path: Path, size: str) -> None:
     browser = new_browser(*SIZES[size])
@@ -53,6 +54,7 @@ def test_every_page_of_a_session(new_browser: OpenBrowser, tmp_path: Path, size:
     assert not found, '\n'.join(found)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('size', SIZES)
 def test_the_experimenters_page(new_browser: OpenBrowser, tmp_path: Path, size: str) -> None:
     browser = new_browser(*SIZES[size])

@@ -11,6 +11,8 @@ import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
+pytestmark = pytest.mark.exhaustive
+
 # Stands for the hardware that a test has not: a wheel whose buttons a test presses.
 WHEEL = """
 const wheel = { id: 'Wheel (Vendor: 046d Product: c24f)', index: 0, connected: true, mapping: '',

@@ -16,6 +16,7 @@ TEXT = '<b>"it\'s" & \\ {age}</b>\n\n  second line\t😀 Grüße ' + 'ä😀' * 
 TEXT += 'x' * (10_000 - len(TEXT))
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('language', 'agree', 'drive', 'thanks'), [
     ('en', 'I agree', 'Drive 2 of 2', 'Thank you'),
     ('de', 'Ich stimme zu', 'Fahrt 2 von 2', 'Vielen Dank')])
@@ -132,6 +133,7 @@ def check_told(told: dict[str, dict[str, Any]], language: str) -> None:
     assert len(told) == 13
 
 
+@pytest.mark.exhaustive
 def test_nothing_is_lost_or_asked_twice_after_a_kill_and_a_reload(browser: Browser,
                                                                   tmp_path: Path) -> None:
     """The page comes back by itself with what was typed; what was kept is not asked again."""

@@ -12,6 +12,8 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.actions.interaction import POINTER_TOUCH
 from selenium.webdriver.common.actions.pointer_input import PointerInput
 
+pytestmark = pytest.mark.exhaustive
+
 QUESTIONS = ['trust', 'often', 'tired', 'vehicles']
 ANSWERS = {'trust': 7, 'often': 4, 'tired': 50, 'vehicles': ['truck']}
 

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
+pytestmark = pytest.mark.exhaustive
+
 # How far from the human's vehicle one sees in these tests [m].
 VISIBILITY_M = 30.0
 # A point of the plan's band, ahead of the AV and beside its line: as it is on the small map.

@@ -11,6 +11,8 @@ from crgame_ros.paths import scenarios_directory
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
+pytestmark = pytest.mark.exhaustive
+
 # The road from the driver's seat, and how many pixels of the tail lamps are seen from behind.
 PICTURE = """
 const [ahead] = arguments;

@@ -55,6 +55,7 @@ def new_run(page: LivePage) -> LivePage:
     return page
 
 
+@pytest.mark.exhaustive
 def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
         page: LivePage, new_browser: OpenBrowser) -> None:
     """By the buttons alone: asked for, handed over, given back; one drives at a time."""
@@ -95,6 +96,7 @@ def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
     assert other.browser.console_errors() == []
 
 
+@pytest.mark.exhaustive
 def test_an_av_is_taken_over_and_given_back(new_run: LivePage) -> None:
     """It brakes by the key, and its planner drives it on from where it was left."""
     page, graph = new_run, new_run.graph
@@ -137,6 +139,7 @@ def test_pause_and_step(page: LivePage) -> None:
     graph.wait_for_steps(20)
 
 
+@pytest.mark.clock
 def test_the_real_time_factor(page: LivePage) -> None:
     """At a fifth of the pace a second of simulated time takes five of the clock."""
     graph = page.graph
@@ -226,6 +229,7 @@ def plan_color(page: LivePage) -> int:
     return int(blue) - int(red)
 
 
+@pytest.mark.exhaustive
 def test_an_event_blanks_the_plan_in_the_picture(new_run: LivePage) -> None:
     """And another shows it again; both act at the next scenario step."""
     page = new_run

@@ -23,8 +23,6 @@ import pytest
 from recorded_poses import DT_C_S, DT_S, read_recorded
 from selenium.webdriver.common.keys import Keys
 
-pytestmark = pytest.mark.alone
-
 # The person stands on the lane that leads to -x, so that the heading is at the border of +-pi;
 # the AV, the leader and the pedestrian are 400 m ahead.
 GAME = f"""
@@ -196,6 +194,7 @@ if (!Object.hasOwn(crgame.connection, 'send')) {
 """
 
 
+@pytest.mark.clock
 @pytest.mark.parametrize('leaving', LEAVINGS.values(), ids=LEAVINGS.keys())
 def test_hands_off_lets_go_at_once(page: LivePage, leaving: Leaving) -> None:
     """From the whole pedal to nothing within 0.5 s, though the key is still down."""
@@ -229,6 +228,7 @@ def test_hands_off_lets_go_at_once(page: LivePage, leaving: Leaving) -> None:
     graph.wait_for_command('hv0', THROTTLE, 0.05, 1.0)
 
 
+@pytest.mark.clock
 def test_a_closed_tab_lets_go_at_once(page: LivePage) -> None:
     """The seat is left, too: somebody else may claim it."""
     graph, first = page.graph, page.driver.current_window_handle
@@ -269,6 +269,7 @@ requestAnimationFrame(collect);
 """
 
 
+@pytest.mark.clock
 def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
     """To a micrometre, in each frame that stood between two samples of the run."""
     page = only_page

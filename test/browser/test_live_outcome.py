@@ -137,6 +137,7 @@ def test_the_card_has_score_links_and_the_last_seconds(page: LivePage) -> None:
     page.wait('crgame.world.shown.t === crgame.store.latest.t')
 
 
+@pytest.mark.exhaustive
 def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
     """The run before is shown again in another tab, and deleted; the last one stays."""
     out = page.graph.launcher.out
@@ -176,6 +177,7 @@ def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
     assert page.browser.console_errors() == []
 
 
+@pytest.mark.exhaustive
 def test_again_another_and_the_next_game(page: LivePage) -> None:
     """The same once more, then traffic by itself; the card gives way to each run."""
     page.click('#outcome [data-action=again]')

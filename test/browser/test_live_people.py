@@ -26,6 +26,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 import yaml
 
+pytestmark = pytest.mark.exhaustive
+
 TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state', '/seats/drivers')
 HOSTILE = 20
 LONG_S, SHORT_S = 3600.0, 6.0

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 import pytest
 
+pytestmark = pytest.mark.exhaustive
+
 # The pedestrian of the scenario stands at (170, -4.9) until somebody lets him go. Seen from the
 # lane at y = -1.75, a van from x = 161 to 167 m whose left side is at y = -3.5 covers that place
 # until the front of the AV, which begins at x = 47 m with 12.5 m/s, has come to 163 m; after that

@@ -66,6 +66,7 @@ def choose_file(page: LivePage, path: Path) -> None:
         By.CSS_SELECTOR, '#panel-scenario input[type=file]').send_keys(str(path))
 
 
+@pytest.mark.exhaustive
 def test_texts_of_a_game_are_text(page: LivePage) -> None:
     """Its title in the list, the preview and the header, and the label of its event."""
     title = str(GAME['title'])
@@ -81,6 +82,7 @@ def test_texts_of_a_game_are_text(page: LivePage) -> None:
     assert page.browser.console_errors() == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('content', 'reason'), BAD.values(), ids=BAD.keys())
 def test_bad_files_are_refused_in_words(page: LivePage, tmp_path: Path, content: str,
                                         reason: str) -> None:
@@ -128,6 +130,7 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     assert page.browser.console_errors() == []
 
 
+@pytest.mark.exhaustive
 def test_an_upload_is_deleted_after_a_question(page: LivePage) -> None:
     """Its bin asks first, and it stays while its run goes on; then it is gone for good."""
     row = '#panel-scenario [data-action="delete"]'

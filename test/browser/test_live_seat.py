@@ -20,6 +20,8 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 from sensor_msgs.msg import Joy
 
+pytestmark = pytest.mark.exhaustive
+
 # The person comes from behind to a vehicle that a joy node drives, which stands askew.
 GAME = f"""
 scenario: {SCENARIOS / 'ZAM_CutIn-1_1_T-1.xml'}

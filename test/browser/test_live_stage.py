@@ -17,7 +17,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 GAME = f"""
 scenario: {SCENARIOS / 'ZAM_Crossing-1_1_T-1.xml'}

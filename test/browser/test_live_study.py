@@ -17,6 +17,8 @@ import pytest
 from study_people import study_session, StudySession
 import yaml
 
+pytestmark = pytest.mark.exhaustive
+
 # In the first drive alone; the light comes twice.
 TASKS = [
     {'name': 'light', 'detection_response': {'interval': [2.5, 2.6]}, 'when': {'time': 0}},

@@ -14,7 +14,7 @@ from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
 import pytest
 from selenium.webdriver.common.keys import Keys
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 GAME = f"""
 scenario: {SCENARIOS / 'ZAM_Crossing-1_1_T-1.xml'}

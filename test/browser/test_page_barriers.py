@@ -12,6 +12,7 @@ ALARMS = [{'id': f'{kind}:{subject}', 'kind': kind, 'subject': subject, 'text': 
            'since_t': 1.0} for kind, subject in (('collision', 'hv0'), ('off_road', 'hv0'))]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('theme', ['light', 'dark'])
 def test_every_tab(browser: Browser, theme: str) -> None:
     """With the alarms of a vehicle that somebody drives."""

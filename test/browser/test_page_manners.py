@@ -77,6 +77,7 @@ def alarm(kind: str, subject: str) -> dict[str, Any]:
             'since_t': 1.0}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('size', SIZES, ids=lambda size: f'{size[0]}x{size[1]}')
 def test_nothing_is_cut_off_and_the_road_is_free(
         page: Browser, size: tuple[int, int]) -> None:

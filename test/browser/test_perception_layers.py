@@ -22,6 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'cockpit'))
 
 from perception_recording import Perceived, record_perceiving  # noqa: E402, I100 - importable now
 
+pytestmark = pytest.mark.exhaustive
+
 DURATION_S = 12.0
 IS_DRAWN = '!crgame.replay.loading && crgame.world.shown?.t === crgame.replay.t'
 DRAWN = """

@@ -110,6 +110,7 @@ def test_poses_are_those_of_the_bag(page: Browser, log: RunLog,
                                   first_run.vehicle_states[::10, :, :3])
 
 
+@pytest.mark.exhaustive
 def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunLog) -> None:
     """The world stands as it was, instead of moving what it knows to where nobody was."""
     before = seek(page, 1.0)
@@ -187,6 +188,7 @@ def test_slider_is_dragged_and_steered_by_keys(page: Browser, log: RunLog) -> No
     np.testing.assert_array_equal(drawn(page)['vehicles'][:, :8], log.vehicle_states[320])
 
 
+@pytest.mark.clock
 def test_it_plays_at_its_speed_and_pauses(page: Browser) -> None:
     """The space bar plays; at 8 seconds a second, 3 s are passed quickly, and then it stands."""
     seek(page, 2.0)
@@ -252,6 +254,7 @@ def test_documents_follow_the_time_back_too(page: Browser) -> None:
     page.wait('document.querySelector("#alarms [data-kind=collision]")')
 
 
+@pytest.mark.exhaustive
 def test_plots_have_the_past_and_the_future(page: Browser, log: RunLog) -> None:
     """After a jump the history is there at once, from the recording."""
     seek(page, 20.0)
@@ -263,6 +266,7 @@ def test_plots_have_the_past_and_the_future(page: Browser, log: RunLog) -> None:
     assert [at_ticks[k] for k in range(100, 321)] == log.vehicle_states[100:, 0, 3].tolist()
 
 
+@pytest.mark.exhaustive
 def test_another_run_of_the_recording(page: Browser, bag: Path) -> None:
     """The list of runs leads to the other one, with its own scene, and back."""
     second = read_run_log(bag, 1)

@@ -105,6 +105,7 @@ def test_all_plots_of_a_run_show_the_same_time(shown: Browser) -> None:
                '.layout.xaxis.range) === "[2,6]"', 'the same time')
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('width', 'height'), [(1280, 800), (390, 844)])
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_it_fits_and_can_be_read(shown: Browser, file: Path, width: int, height: int,

@@ -122,6 +122,7 @@ def straight_bounds(scene: Scene, marking: str) -> list[tuple[NDArray[np.float64
     return found
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', MARKED)
 def test_lines_are_where_the_map_has_them(page: Browser, shared_scenarios: Path,
                                           name: str) -> None:
@@ -147,6 +148,7 @@ def test_lines_are_where_the_map_has_them(page: Browser, shared_scenarios: Path,
         assert beside, 'no asphalt on either side of the line'
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', PUBLISHED)
 def test_published_maps_are_cheap(page: Browser, shared_scenarios: Path, name: str) -> None:
     scene = scene_of(shared_scenarios / f'{name}.xml')

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
+pytestmark = pytest.mark.exhaustive
+
 # Notes of each picture when it came, by the machine's clock [ms], and what time it shows [s].
 NOTE = """
 window.noted = [];

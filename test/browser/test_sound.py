@@ -69,6 +69,7 @@ def band_rms(samples: FloatArray, low_Hz: float, high_Hz: float) -> float:
     return math.sqrt(spectrum[(bins_Hz >= low_Hz) & (bins_Hz <= high_Hz)].sum())
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('speed', [5.0, 13.9, 25.0, 36.0])
 def test_the_engine_has_the_tone_of_its_speed_and_gear(page: Browser, speed: float) -> None:
     own = heard_at(page, speed)

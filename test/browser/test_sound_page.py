@@ -12,6 +12,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from world_support import RecordedRun, RunBackend, Served, served
 
+pytestmark = pytest.mark.exhaustive
+
 # Every sample that the page sends to its speakers passes `heardPeak`, too.
 TAP = """
 const connect = AudioNode.prototype.connect;

@@ -59,6 +59,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Browser, Pa
         yield browser, folder / 'data' / 'report.html'
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('width', 'theme'), [(1280, 'light'), (1280, 'dark'), (390, 'dark')])
 def test_it_can_be_read(page: tuple[Browser, Path], width: int, theme: str) -> None:
     browser, path = page

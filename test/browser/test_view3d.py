@@ -145,6 +145,7 @@ def make_poses(run: RecordedRun) -> list[dict[str, Any]]:
     return poses
 
 
+@pytest.mark.exhaustive
 def test_points_of_the_map_are_where_a_pinhole_at_the_eye_sees_them(
         page: Browser, run: RecordedRun) -> None:
     """In the driver's view and in side and rear windows, at 200 poses: to a pixel in 1920."""
@@ -310,6 +311,7 @@ def test_what_is_left_out_of_pictures_is_hardly_seen(page: Browser) -> None:
         assert view['share'] < 0.7
 
 
+@pytest.mark.clock
 def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
     """The page says so; when the context is back, pictures are what they were."""
     page.run("""
@@ -341,6 +343,7 @@ def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
     assert colors > 5
 
 
+@pytest.mark.exhaustive
 def test_a_side_window_shows_the_time_of_the_first_and_nothing_else(
         page: Browser, cockpit: Served) -> None:
     """No panels, no instruments; what it shows is what the seat's window showed last."""

@@ -11,6 +11,8 @@ from crgame_ros.paths import scenarios_directory
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
+pytestmark = pytest.mark.exhaustive
+
 SIZES = ((390, 844), (640, 360), (844, 390), (820, 1180), (1180, 820))
 # What fingers have no room for has other ways: S brakes, both indicators are hazard lights.
 LEFT_OUT = {'cap cap-Space', 'cap cap-KeyJ'}

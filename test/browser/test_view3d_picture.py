@@ -97,6 +97,7 @@ def page(cockpit: Served, browser: Browser) -> Browser:
     return browser
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('light', ['day', 'dusk'])
 def test_60_vehicles_on_400_lanelets_take_few_calls_and_triangles(
         run: RecordedRun, cockpit: Served, page: Browser, light: str) -> None:
@@ -112,6 +113,7 @@ def test_60_vehicles_on_400_lanelets_take_few_calls_and_triangles(
     assert page.console_errors() == []
 
 
+@pytest.mark.exhaustive
 def test_wheels_of_others_are_turned_as_they_drive(
         run: RecordedRun, cockpit: Served, page: Browser) -> None:
     """The angle of a single-track model with their speed and yaw rate: 1.6 degrees here."""
@@ -170,6 +172,7 @@ def test_the_view_shows_that_it_has_the_focus_and_says_what_is_around(page: Brow
     page.wait('document.querySelector("#around").textContent.includes("hv0")')
 
 
+@pytest.mark.exhaustive
 def test_keys_typed_into_fields_bring_no_pictures_out_of_turn(
         cockpit: Served, page: Browser) -> None:
     """Only what may drive is waited for, at the rate at which the run goes."""

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
-pytestmark = pytest.mark.alone
-
 # Linear interpolation over two missing samples (30 ms) at 9 m/s^2 is wrong by a t^2 / 8 = 1 mm;
 # a display that is one sample (10 ms) off is wrong by 0.2 m at the 20 m/s and more of this game.
 SAME_PLACE_M = 0.002
@@ -58,6 +56,7 @@ def recorded_at(run: RecordedRun, t: float) -> NDArray[np.float64]:
     return first + (position - before) * (second - first)
 
 
+@pytest.mark.exhaustive
 def test_vehicles_and_objects_stand_where_the_recording_has_them(
         run: RecordedRun, page: Served, browser: Browser) -> None:
     page.control('start')
@@ -79,6 +78,7 @@ def test_vehicles_and_objects_stand_where_the_recording_has_them(
     assert seen > 40
 
 
+@pytest.mark.clock
 def test_time_never_goes_back_and_keeps_close_behind(page: Served, browser: Browser) -> None:
     page.control('start')
     browser.wait('crgame.world.shown.t > 0.5')
@@ -135,6 +135,7 @@ def test_reset_shows_the_new_epoch_only(
     assert browser.run('return crgame.store.history(0, 120).t.length') == 1
 
 
+@pytest.mark.clock
 @pytest.mark.parametrize('factor', [0.2, 5.0])
 def test_real_time_factor_is_followed(
         run: RecordedRun, browser: Browser, factor: float) -> None:
@@ -152,6 +153,7 @@ def test_real_time_factor_is_followed(
     assert rate == pytest.approx(factor, rel=0.25)
 
 
+@pytest.mark.clock
 def test_late_states_are_bridged_for_100_ms_and_no_longer(
         run: RecordedRun, page: Served, browser: Browser) -> None:
     page.control('start')
@@ -177,6 +179,7 @@ def test_history_gives_the_recorded_speeds(
     assert np.ptp(past['t']) <= 1.0
 
 
+@pytest.mark.exhaustive
 def test_connection_that_breaks_is_taken_up_again(
         run: RecordedRun, page: Served, browser: Browser) -> None:
     page.control('start')
@@ -190,6 +193,7 @@ def test_connection_that_breaks_is_taken_up_again(
     browser.wait('crgame.world.shown.t > arguments[0] + 0.3', arguments=(t,))
 
 
+@pytest.mark.exhaustive
 def test_simulation_that_began_anew_behind_a_new_connection_is_shown(
         run: RecordedRun, browser: Browser) -> None:
     with served(RunBackend(run)) as page:

@@ -293,6 +293,7 @@ def test_canvas_has_the_pixels_of_the_screen(page: Served, browser: Browser) -> 
         assert sizes[2] > width / 2
 
 
+@pytest.mark.clock
 def test_400_lanelets_and_60_obstacles_draw_within_8_ms_of_script(
         new_browser: Callable[..., Browser], run: RecordedRun, tmp_path: Path) -> None:
     """The script time of a frame on a map of 400 lanelets with 60 cars, all in view."""

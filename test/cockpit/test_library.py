@@ -115,6 +115,7 @@ async def test_a_preview_shows_the_scene_and_where_everything_starts(tmp_path: P
          'planning_problem': setup.avs[0].planning_problem.planning_problem_id}]
 
 
+@pytest.mark.exhaustive
 @in_loop
 async def test_every_listed_entry_can_be_previewed(tmp_path: Path) -> None:
     async with with_library(tmp_path) as running:
@@ -182,6 +183,7 @@ async def test_uploads_and_nothing_else_are_deleted(tmp_path: Path) -> None:
     assert list((tmp_path / 'uploads').iterdir()) == []
 
 
+@pytest.mark.exhaustive
 @in_loop
 async def test_a_preview_that_nobody_waits_for_is_ended(tmp_path: Path) -> None:
     reader = JobProcess(READER, 'scenario')
@@ -325,6 +327,7 @@ async def test_frames_go_on_while_a_scenario_is_read(tmp_path: Path) -> None:
         assert longest_s < 0.5 * (loop.time() - begin_s)
 
 
+@pytest.mark.exhaustive
 @in_loop
 async def test_a_scenario_that_takes_too_long_is_given_up_and_the_next_is_read(
         tmp_path: Path) -> None:

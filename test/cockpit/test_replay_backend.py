@@ -318,6 +318,7 @@ def test_progress_is_told_when_it_takes_long(bag: Path) -> None:
     assert quiet == []
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('name', 'message'), [
     ('nowhere', 'no such file or folder'), ('text.mcap', 'no MCAP file'),
     ('empty', 'no recording in this folder')])
@@ -341,6 +342,7 @@ def test_replay_goes_with_no_game() -> None:
     assert done.stderr.startswith('error: --replay: shows a recording')
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['int', 'term'])
 def test_command_serves_until_it_is_told_to_stop(bag: Path, tmp_path: Path,
                                                  number: signal.Signals) -> None:

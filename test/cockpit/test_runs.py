@@ -165,6 +165,7 @@ async def test_only_runs_that_are_over_are_deleted_and_only_their_own_files(
     assert {path.name for path in session.iterdir()} == {'.started', 'run_2', 'run_3'}
 
 
+@pytest.mark.exhaustive
 @in_loop
 async def test_runs_are_compared_and_shown_again(tmp_path: Path, bag: Path) -> None:
     session = make_run(tmp_path / 'now', bag)

@@ -309,6 +309,7 @@ async def test_a_flood_is_cut_off_and_others_go_on(opcode: int, text: bytes) -> 
         await reader.close()
 
 
+@pytest.mark.clock
 @in_loop
 async def test_whoever_sends_400_messages_a_second_is_kept() -> None:
     async with cockpit() as running:
@@ -323,6 +324,7 @@ async def test_whoever_sends_400_messages_a_second_is_kept() -> None:
         await sender.close()
 
 
+@pytest.mark.clock
 @in_loop
 async def test_whoever_never_reads_is_dropped_and_costs_nothing() -> None:
     # 64 KiB at 100 Hz: 40 MB until it is dropped, if they were kept.
@@ -350,6 +352,7 @@ async def test_whoever_never_reads_is_dropped_and_costs_nothing() -> None:
         await reader.close()
 
 
+@pytest.mark.clock
 @in_loop
 async def test_whoever_falls_silent_is_noticed() -> None:
     # It reads nothing and answers nothing, but nothing is unsent either: only a ping tells, sent

@@ -123,6 +123,7 @@ def test_a_wheel_ahead_of_the_vehicle_is_held_back(speed: float) -> None:
     assert MODEL.aligning(0.0, 0.0, 3.0) == MODEL.aligning(-3.0, 0.2, 3.0) == 0.0
 
 
+@pytest.mark.exhaustive
 def test_a_wheel_let_go_comes_to_rest_in_the_middle() -> None:
     """With the vehicle 30 ms behind the wheel: what pulls it back does not make it swing."""
     dt_s, inertia, angle, rate = 0.001, 0.03, 2.0, 0.0

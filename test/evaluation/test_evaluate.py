@@ -131,6 +131,7 @@ def test_tables_have_a_row_for_each_cell(expected: list[list[dict[str, Any]]]) -
     assert all(row['worst_gap'] or row['worst_min_distance'] for row in vehicles)
 
 
+@pytest.mark.clock
 def test_a_killed_client_takes_its_workers_along_and_goes_on(
         tmp_path: Path, expected: list[list[dict[str, Any]]]) -> None:
     evaluation = Evaluation(tmp_path)
@@ -150,6 +151,7 @@ def test_a_killed_client_takes_its_workers_along_and_goes_on(
     assert CELLS <= evaluation.begun.total() <= CELLS + 1
 
 
+@pytest.mark.exhaustive
 def test_ctrl_c_ends_everybody_in_a_line(tmp_path: Path) -> None:
     evaluation = Evaluation(tmp_path)
     process = evaluation.start('--workers', '1')
@@ -164,6 +166,7 @@ def test_ctrl_c_ends_everybody_in_a_line(tmp_path: Path) -> None:
     assert evaluation.finished >= 2
 
 
+@pytest.mark.exhaustive
 def test_killed_workers_are_replaced(tmp_path: Path,
                                      expected: list[list[dict[str, Any]]]) -> None:
     evaluation = Evaluation(tmp_path)
@@ -201,6 +204,7 @@ def cluster(folder: Path, begun: Path) -> Iterator[tuple[str, 'subprocess.Popen[
             process.wait(60)
 
 
+@pytest.mark.exhaustive
 def test_a_cluster_of_somebody_else_computes_the_same(
         tmp_path: Path, expected: list[list[dict[str, Any]]]) -> None:
     evaluation = Evaluation(tmp_path)
@@ -218,6 +222,7 @@ def test_a_cluster_of_somebody_else_computes_the_same(
     assert evaluation.tables() == expected
 
 
+@pytest.mark.exhaustive
 def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path) -> None:
     process = Evaluation(tmp_path).start('--scheduler', 'tcp://127.0.0.1:9')
     _, told = process.communicate(timeout=120)

@@ -42,6 +42,7 @@ def seeds(folder: Path, table: str = 'cells', column: str = 'seed') -> list[Any]
             for value in pq.read_table(path)[column].to_pylist()]
 
 
+@pytest.mark.exhaustive
 def test_a_killed_process_loses_no_cell(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, '-c', FILL, tmp_path, Path(__file__).parent],
                           capture_output=True, text=True)

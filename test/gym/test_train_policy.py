@@ -13,6 +13,9 @@ from crgame_ros.game.game_file import load_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
+import pytest
+
+pytestmark = pytest.mark.exhaustive
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from crgame_ros.ros.node_main import TELL_WHERE
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / 'scenarios'

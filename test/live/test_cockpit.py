@@ -110,6 +110,7 @@ def test_plan_frames_are_the_plans(graph: Graph, page: PageClient) -> None:
     assert rows[:, 4] == pytest.approx(0.1 * np.arange(len(rows)))
 
 
+@pytest.mark.exhaustive
 def test_holding_a_key_drives_and_closing_lets_go(graph: Graph, page: PageClient) -> None:
     """The filter ramps the brake up; after the connection is gone it is off within 0.3 s."""
     with PageClient(graph.page) as driver:
@@ -137,6 +138,7 @@ def test_holding_a_key_drives_and_closing_lets_go(graph: Graph, page: PageClient
     wait_until(lambda: page.seat('hv0')['holder'] is None, 'the seat without a holder')
 
 
+@pytest.mark.clock
 def test_silence_lets_go_too(graph: Graph, page: PageClient) -> None:
     """A page that hangs keeps its connection and its seat, but not the pedals."""
     assert page.request('claim', seat='hv0')['ok']
@@ -150,6 +152,7 @@ def test_silence_lets_go_too(graph: Graph, page: PageClient) -> None:
     assert page.seat('hv0')['holder'] == page.id
 
 
+@pytest.mark.clock
 def test_hands_off_is_immediate(graph: Graph, page: PageClient) -> None:
     """What a page sends at blur: the next cycle that hears it has the pedals released."""
     assert page.request('claim', seat='hv0')['ok']
@@ -243,6 +246,7 @@ def test_trigger(graph: Graph, page: PageClient) -> None:
     wait_until(lambda: (frame := page.newest(2)) is not None and frame[6] == 60.0, 'the box')
 
 
+@pytest.mark.exhaustive
 def test_another_game_with_more_vehicles(graph: Graph, page: PageClient) -> None:
     """Chosen from the list: reset into it, its second AV gets a planner of its own."""
     with urllib.request.urlopen(f'{graph.page}api/scenarios', timeout=10) as answer:
@@ -278,6 +282,7 @@ def _post(url: str, content: dict) -> dict:
         return json.load(answer)
 
 
+@pytest.mark.exhaustive
 def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
     """Killed outright: the run keeps its pace, a new one comes back at once."""
     with PageClient(graph.page) as client:
@@ -305,6 +310,7 @@ def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
         assert client.request('release', seat='hv0')['ok']
 
 
+@pytest.mark.exhaustive
 def test_the_next_port_is_taken_when_one_is_in_use(tmp_path: Path) -> None:
     """And said so; somebody must be in the seat before a `cockpit` driver's run begins."""
     with socket.socket() as taken:

@@ -14,7 +14,7 @@ from live_support import CUT_IN, is_node, Launcher, SCENARIOS
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 STEPS_PER_TICK = 10
 TOPICS = ('/clock', '/scenario/game', '/scenario/xml', '/scenario/objects', '/seats',

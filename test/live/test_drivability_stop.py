@@ -12,7 +12,10 @@ from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from live_support import Launcher, SCENARIOS
+import pytest
 import yaml
+
+pytestmark = pytest.mark.exhaustive
 
 # A step takes 67 ms of wall time: many times what the monitor needs for its verdict.
 SLOW = 0.15

@@ -16,7 +16,7 @@ from crgame_ros.launcher.main import ENDED_EARLY
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, ROOT, wait_until
 import pytest
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 
 
 def _files(folder: Path) -> None:
@@ -25,6 +25,7 @@ def _files(folder: Path) -> None:
     assert list((folder / 'bag').glob('*.mcap'))
 
 
+@pytest.mark.exhaustive
 def test_a_closed_terminal_is_an_end_in_good_order(tmp_path: Path) -> None:
     with Launcher([CUT_IN], tmp_path / 'run') as launcher:
         launcher.wait_for('recording into')
@@ -86,6 +87,7 @@ def _says(pattern: str) -> Callable[[subprocess.Popen[str], list[str]], bool]:
     return heard
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('moment', 'early'), [
     (_is_python, True), (_loads_numpy, True), (_says('^sim_node: process'), False)],
     ids=['Python starts', 'imports', 'first node'])
@@ -117,6 +119,7 @@ def test_ctrl_c_during_the_start_is_a_line_and_no_traceback(
             process.kill()
 
 
+@pytest.mark.exhaustive
 def test_a_stopped_node_does_not_outlive_a_killed_launcher(tmp_path: Path) -> None:
     with Launcher([CUT_IN], tmp_path / 'run') as launcher:
         launcher.wait_for('planner idm is ready')
@@ -140,6 +143,7 @@ def test_files_are_written_through_one_signal_and_left_at_a_second() -> None:
     assert signal.getsignal(signal.SIGHUP) == before
 
 
+@pytest.mark.exhaustive
 def test_runs_that_a_reset_ended_at_once_are_no_failure(tmp_path: Path) -> None:
     """Two resets in a row, then a stop: the first run has its files, the others a line."""
     with Launcher([CUT_IN], tmp_path / 'run') as launcher, \

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 import pytest
 import yaml
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 AGENTS = 12
 DURATION_S = 6.0

@@ -124,6 +124,7 @@ def test_refusals_are_told(stage: Stage) -> None:
     assert [event.name for event in stage.fired] == ['hide-plan']
 
 
+@pytest.mark.exhaustive
 def test_planner_changes_and_comes_back_the_same_when_restarted(stage: Stage) -> None:
     """
     Another planner and another limit; after its death the node is as it was before.
@@ -148,6 +149,7 @@ def test_planner_changes_and_comes_back_the_same_when_restarted(stage: Stage) ->
     assert peer.states('av0')[-1, 4] < SLOW + 0.1
 
 
+@pytest.mark.exhaustive
 def test_stopped_planner_is_asked_for_nothing(stage: Stage) -> None:
     """No request after the tick of the event, until another event lets it go on."""
     peer = stage.peer
@@ -166,6 +168,7 @@ def test_stopped_planner_is_asked_for_nothing(stage: Stage) -> None:
     assert min(n for n in asked() if n >= stopped) == stage.fired[1].n
 
 
+@pytest.mark.exhaustive
 def test_recorded_events_repeat_offline_and_live(tmp_path: Path) -> None:
     """
     The bag's events become exact steps, and every recorded object comes out again.

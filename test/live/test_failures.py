@@ -40,6 +40,7 @@ def _check_loss(cycles: CycleTable, last_n: int) -> None:
     assert brake[-1] == pytest.approx(GENTLE_BRAKE, abs=1e-7)
 
 
+@pytest.mark.clock
 def test_seat_lets_go_while_the_driver_is_frozen(run: Run) -> None:
     """0.2 s of silence: the pedal is released, then braked gently; the driver then continues."""
     launcher, peer = run
@@ -74,6 +75,7 @@ def test_killed_driver_is_started_again_and_drives(run: Run) -> None:
     assert peer.cycles().commands('hv0')[-1, 1] == 0.0
 
 
+@pytest.mark.exhaustive
 def test_monitor_and_supervisor_are_started_again(run: Run) -> None:
     """Drivability and time-sync are killed: every cycle still happens, and both report again."""
     launcher, peer = run
@@ -99,6 +101,7 @@ def _computed_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
+@pytest.mark.exhaustive
 def test_who_takes_the_place_of_the_dead_has_everything_loaded(run: Run) -> None:
     """Twice in a row, and of any node: it works after less computing than imports alone take."""
     launcher, peer = run
@@ -122,6 +125,7 @@ def _recorded_steps(bag: Path, offset_ns: int) -> list[int]:
                 for item in reader.decoded(['/vehicles/state'])]
 
 
+@pytest.mark.exhaustive
 def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
     """
     Killed, it loses no more than its last moments, and continues in another folder.
@@ -168,7 +172,7 @@ def test_recorder_is_killed_then_its_disk_is_full(tmp_path: Path) -> None:
     assert (tmp_path / 'run' / 'C-ZAM_CutIn-1_1_T-1.xml').is_file()
 
 
-@pytest.mark.alone
+@pytest.mark.clock
 def test_killed_simulation_ends_the_run(tmp_path: Path) -> None:
     """The launcher says so and fails; everything that was published by then is recorded."""
     with Launcher([CUT_IN], tmp_path / 'run') as launcher, Peer(launcher.domain, *TOPICS) as peer:

@@ -109,6 +109,7 @@ def _whole(run: Run, pids: dict[str, int]) -> None:
     assert [line for line in launcher.errors if 'Traceback' in line] == []
 
 
+@pytest.mark.exhaustive
 def test_no_message_ends_a_node_or_the_run(run: Run) -> None:
     """More than 300 of them on 24 topics: refused and counted, and everybody drives on."""
     launcher, peer = run
@@ -158,7 +159,7 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
     _whole(run, pids)
 
 
-@pytest.mark.alone
+@pytest.mark.clock
 def test_a_flood_takes_nobodys_place(run: Run) -> None:
     """
     Hundreds of strangers' plans, agents and commands a second: everybody's own arrive.

@@ -21,7 +21,7 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 from steady_game import write_steady_game
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 STOPPED_S = 0.15
 # So many names take sim_node some tens of milliseconds to answer.
 NAMES = 15_000

@@ -10,6 +10,7 @@ import subprocess
 import sys
 
 from live_support import CUT_IN, Launcher
+import pytest
 from steady_game import write_steady_game
 
 SECONDS = 5
@@ -25,6 +26,7 @@ def _finished(launcher: Launcher) -> None:
     assert len(list(launcher.out.glob('*.xml'))) == 1
 
 
+@pytest.mark.exhaustive
 def test_two_graphs_in_one_domain_do_not_touch_each_other(tmp_path: Path) -> None:
     duration = ['--duration', str(SECONDS)]
     with Launcher([CUT_IN, *duration, '--namespace', '/exp1'], tmp_path / 'one') as one, \

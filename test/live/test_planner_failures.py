@@ -49,6 +49,7 @@ def _followed(plan: Plan, rows: NDArray[np.float64]) -> int:
     return len(ticks)
 
 
+@pytest.mark.clock
 def test_av_follows_its_last_plan_and_brakes_while_the_planner_is_frozen(run: Run) -> None:
     """
     Frozen: the last plan to its end, then 4 m/s^2 straight on to a stop, counted; then recovery.
@@ -146,6 +147,7 @@ def _answer(run: Run, rogue: Publisher, lie: Callable[[NDArray[np.float64]], NDA
     rogue.publish(to_joint_trajectory(plan_to_joints(plan, 'av0', TICK_NS)))
 
 
+@pytest.mark.exhaustive
 def test_lies_of_a_planner_are_refused_with_the_reason(run: Run) -> None:
     """
     NaN, a start elsewhere, a jump, 90 m/s, a wrong stamp: each is named, and the good plan stays.

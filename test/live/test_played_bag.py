@@ -18,8 +18,8 @@ from live_peer import Peer
 from live_support import Launcher, PATIENCE_S, SCENARIOS
 from page_client import PageClient
 import pytest
+from ros_domains import own_domain_id
 from visualization_msgs.msg import Marker
-from worker_roles import own_domain_id
 
 DURATION_S = 4.0
 # Where the third round begins: without documents, which are known from the second.
@@ -63,7 +63,7 @@ class Played(NamedTuple):
         return [from_time(message.header.stamp) * 1e-9 for message in heard]
 
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 
 @pytest.fixture(scope='module')

@@ -17,6 +17,8 @@ from live_support import CUT_IN, Launcher, ROOT
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.exhaustive
+
 DURATION_S = 4.0
 DRIVER = '''"""Drive a human's car, as the AV's policy does."""
 from pathlib import Path

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 # Long enough for the throttle (0 to 0.6 s) and the first steering (4.0 to 4.4 s) of the script.
 DURATION_S, STEPS = 4.6, 460

@@ -15,7 +15,7 @@ from crgame_ros.analysis.reproduction.synchronization import (
 from live_support import CUT_IN
 import pytest
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 DURATION_S = 5.0
 
 

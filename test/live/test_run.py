@@ -119,6 +119,7 @@ def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> No
     assert {'criticality_node: hv0', 'criticality_node: av0'} <= told
 
 
+@pytest.mark.exhaustive
 def test_the_human_drives_live_against_another_planner(finished: Launcher, tmp_path: Path) -> None:
     """In real time, recorded; the human does what it did, to the last bit."""
     assert main(['replay', str(finished.out), '--planner', 'constant-velocity', '--live',
@@ -227,6 +228,7 @@ def _vehicle_of(obstacle: DynamicObstacle, poses: dict[str, tuple[float, float, 
                                                     _center(*poses[vehicle])))
 
 
+@pytest.mark.exhaustive
 def test_interrupt_ends_a_rerun_in_good_order(finished: Launcher, tmp_path: Path) -> None:
     """The run's own `game.yaml` starts the same game again; Ctrl-C ends it with all outputs."""
     game_file = finished.out / 'game.yaml'
@@ -249,6 +251,7 @@ def _wait_for_step(launcher: Launcher, n: int) -> None:
         peer.wait_until(lambda: peer.n >= n, f'n = {n}')
 
 
+@pytest.mark.exhaustive
 def test_terminate_ends_a_bare_scenario(shared_scenarios: Path, tmp_path: Path) -> None:
     """
     `--scenario` alone runs: a human is placed, the AV gets a planner; SIGTERM ends it well.
@@ -268,6 +271,7 @@ def test_terminate_ends_a_bare_scenario(shared_scenarios: Path, tmp_path: Path) 
     assert 2.0 < math.dist(vehicles['hv0'][:2], vehicles['av0'][:2]) < 100.0
 
 
+@pytest.mark.exhaustive
 def test_no_node_outlives_a_killed_launcher(tmp_path: Path) -> None:
     """After `kill -9` of the launcher the nodes end by themselves, the recorder in good order."""
     with Launcher([CUT_IN], tmp_path / 'run') as launcher:
@@ -290,6 +294,7 @@ BAD_INPUT = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('case', BAD_INPUT)
 def test_bad_input_starts_nothing(case: str, tmp_path: Path) -> None:
     """Exit code 2, one line that names the culprit, no process and no folder."""

@@ -106,6 +106,7 @@ def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
     peer.wait_until(lambda: _last(taker, 0, THROTTLE), 'the script in the seat again')
 
 
+@pytest.mark.exhaustive
 def test_an_av_is_taken_over_and_given_back(peer: Peer) -> None:
     """It obeys the person, its planner goes on being asked, and drives on afterwards."""
     taker = Taker(peer, 'av0')
@@ -132,6 +133,7 @@ def test_an_av_is_taken_over_and_given_back(peer: Peer) -> None:
     assert np.all(np.abs(ways - 0.5 * (rows[1:, 4] + rows[:-1, 4]) * steps) < 0.02)
 
 
+@pytest.mark.clock
 def test_a_taker_who_falls_silent_is_braked(peer: Peer) -> None:
     """The watchdog of the seat holds for whoever sits in it: released, then 0.15 of the brake."""
     taker = Taker(peer, 'hv0')
@@ -157,6 +159,7 @@ def test_orders_that_make_no_sense_change_nothing(peer: Peer) -> None:
     assert _seats(peer) == before
 
 
+@pytest.mark.exhaustive
 def test_seats_outlive_a_reset(peer: Peer) -> None:
     """Who drives goes on driving in the next epoch."""
     taker = Taker(peer, 'hv0')

@@ -13,6 +13,9 @@ import urllib.request
 from crgame_ros.game.game_file import load_game
 from live_support import is_node, Launcher, SCENARIOS, wait_until
 from page_client import PageClient
+import pytest
+
+pytestmark = pytest.mark.exhaustive
 
 SHORT_S = 1.5
 SCENARIO = 'ZAM_CutIn-1_1_T-1.xml'

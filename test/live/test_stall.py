@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from steady_game import write_steady_game
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 # Beyond what machines stall by themselves, below the threshold of a drift reset [s].
 STALL_S = 0.11

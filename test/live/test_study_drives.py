@@ -24,6 +24,8 @@ from live_support import is_node, wait_until
 from page_client import PageClient
 import pytest
 
+pytestmark = pytest.mark.exhaustive
+
 DURATION_S = 2.5
 
 

@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 from page_client import PageClient
 import pytest
 
+pytestmark = pytest.mark.exhaustive
+
 STEP_NS = 10_000_000
 
 

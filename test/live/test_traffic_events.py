@@ -20,7 +20,7 @@ import pytest
 from std_msgs.msg import String
 import yaml
 
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 # Seconds after the start at which somebody presses the button, and traffic_node is killed.
 PRESSED_S, KILLED_S = 2.5, 6.0

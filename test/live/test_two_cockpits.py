@@ -15,6 +15,8 @@ from live_support import Launcher, ROOT, SCENARIOS, wait_until
 from page_client import PageClient
 import pytest
 
+pytestmark = pytest.mark.exhaustive
+
 
 @pytest.fixture
 def cockpits(tmp_path: Path) -> Iterator[tuple[str, str]]:

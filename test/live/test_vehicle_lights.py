@@ -16,7 +16,10 @@ from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from live_support import Launcher, SCENARIOS
 import numpy as np
+import pytest
 import yaml
+
+pytestmark = pytest.mark.exhaustive
 
 SECONDS = 1.5
 KEYS = """keys:

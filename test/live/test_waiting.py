@@ -81,6 +81,7 @@ def test_start_waits_for_hands_and_so_does_a_reset(page: PageClient) -> None:
     stands(page, 'paused')
 
 
+@pytest.mark.exhaustive
 def test_a_pause_in_the_run_ends_without_hands(page: PageClient) -> None:
     """Only the beginning waits: a paused run goes on, and its car brakes by itself."""
     assert page.request('claim', seat='hv0')['ok']
@@ -97,6 +98,7 @@ def test_a_pause_in_the_run_ends_without_hands(page: PageClient) -> None:
     reset(page)
 
 
+@pytest.mark.exhaustive
 def test_a_game_chosen_later_waits_too(page: PageClient) -> None:
     """And the order to start, given while it is loading, is not lost."""
     with urllib.request.urlopen(f'{page.page}api/scenarios', timeout=10) as answer:

@@ -88,6 +88,7 @@ def test_near_equals_the_whole_map(tmp_path: Path, kind: str) -> None:
     assert 0 < empty < 200
 
 
+@pytest.mark.exhaustive
 def test_ten_kilometres_stay_on_disk(tmp_path: Path) -> None:
     """
     Along the diagonal of 10 km x 10 km with a reach of 60 m, no more than 16 tiles are in memory.

@@ -61,6 +61,7 @@ def test_units() -> None:
     run('node', '--test', *files)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(('check', 'code', 'told'), [
     (check_types, 'export const f = (/** @type {number} */ x, y) => x.length + y;\n',
      ['TS2339', 'TS7006']),

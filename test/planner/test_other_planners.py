@@ -38,6 +38,7 @@ def accepted(plans: list[Plan], vehicle: VehicleParameters) -> bool:
                           support.DT) is None for plan in plans)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_stops_behind_a_standing_car(name: str, vehicle: VehicleParameters) -> None:
     plans = support.drive(ready(name, 12.0, v0=12.0), ego(vehicle, 12.0), 250,

@@ -78,6 +78,7 @@ def check_free(plans: list[Plan], road: support.Scenario, cars: tuple[Car, ...],
             assert not ego.collide(pycrcc.RectOBB(HALF_CAR, 0.9, heading, now, car_y)), k
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('speed', [0.0, 5.0])
 def test_passes_a_slow_car_in_the_free_lane_beside(speed: float,
                                                    vehicle: VehicleParameters) -> None:
@@ -150,6 +151,7 @@ def test_package_plans_as_its_authors_ship_it(vehicle: VehicleParameters) -> Non
     assert plan.states[-1, 3] == pytest.approx(15.0, abs=1.0)
 
 
+@pytest.mark.exhaustive
 def test_package_leaves_its_lane_for_a_standing_car(vehicle: VehicleParameters) -> None:
     """It swings out as far as it must, at the speed that it had, and knows no lanes."""
     road, cars = lanes(2), ((60.0, 0.0, 0.0, 0.0),)

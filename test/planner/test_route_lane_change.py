@@ -54,6 +54,7 @@ def test_changes_at_once_where_it_is_free() -> None:
 
 
 # Ahead of one that is as fast, a vehicle's length beside one, and into a row without any gap.
+@pytest.mark.matrix
 @pytest.mark.parametrize('cars', [
     ((-8.0, 10.0),), ((-2.0, 10.0),), ((4.0, 10.0),), ((-22.0, 16.0),),
     tuple((-40.0 + 12.0 * i, 10.0) for i in range(8)),

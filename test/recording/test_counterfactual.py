@@ -63,6 +63,7 @@ def record(recorder: Any, tmp_path_factory: pytest.TempPathFactory,
     return run
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', PLANNERS)
 def test_the_same_human_against_the_same_planner_and_another(
         name: str, record: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,

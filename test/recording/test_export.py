@@ -69,6 +69,7 @@ def test_what_a_driver_shows_and_sounds_reads_back(runs: Any, tmp_path: Path) ->
     assert av.initial_signal_state is None and not av.signal_series
 
 
+@pytest.mark.exhaustive
 def test_round_trip_of_published_scenarios(
         runs: Any, tmp_path: Path, shared_scenarios: Path) -> None:
     """Real roads with up to 36 recorded vehicles, a 2018b file and duplicate ids among them."""

@@ -57,6 +57,7 @@ def test_a_run_that_ended_before_it_began_is_no_error(tmp_path: Path, recorder: 
     assert not list(tmp_path.glob('*.xml')) and not list(tmp_path.glob('timing*.json'))
 
 
+@pytest.mark.exhaustive
 def test_two_quick_resets_in_one_recording(tmp_path: Path, recorder: Any, drive: Drive,
                                            capsys: pytest.CaptureFixture[str]) -> None:
     """Of `ros2 bag record -a`: the last run that began becomes the scenario, the others a note."""

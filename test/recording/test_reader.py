@@ -140,6 +140,7 @@ def test_only_what_may_hold_the_answer_is_read(tmp_path: Path, samples: Any, cut
         assert len(read) == 2
 
 
+@pytest.mark.exhaustive
 def test_a_damage_anywhere_is_told_or_harmless(tmp_path: Path, samples: Any) -> None:
     """Four bytes changed: refused, told, or each topic reads as recorded, one by one too."""
     times = iter(range(0, 10**13, 10**9))

@@ -38,6 +38,7 @@ def _flat(found: Any, name: str = '') -> dict[str, Any]:
     return {name: found}
 
 
+@pytest.mark.matrix
 def test_one_code_for_runs_logs_and_recordings(
         observed: tuple[Criticality, OfflineResult], recorder: Any, tmp_path: Path) -> None:
     """The same worst moments, times and crossings, however the run comes."""

@@ -148,6 +148,7 @@ def test_two_signals_leave_the_report_out_and_all_else_whole(session: Path) -> N
     assert main(['report', str(session)]) == 0
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('words', [[], ['--no-report']])
 def test_beside_a_graph_that_goes_on(session: Path, words: list[str]) -> None:
     """The process that finishes a run while the program stays for another."""

@@ -351,6 +351,7 @@ def _stretched(result: OfflineResult, times: int) -> TabulatedRun:
     return TabulatedRun('a', replace(record, log=longer), scored=False)
 
 
+@pytest.mark.exhaustive
 def test_memory_does_not_grow_with_the_run(recorded: Recorded, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a run eight times as long the tables take no more, but for how it was driven."""

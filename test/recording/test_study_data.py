@@ -261,6 +261,7 @@ def test_twice_gives_the_same_and_measures_nothing_again(copied: Path) -> None:
             for path in (copied / 'data' / '.runs').rglob('*')} == kept
 
 
+@pytest.mark.exhaustive
 def test_killed_it_leaves_whole_files(copied: Path) -> None:
     before = digests(copied / 'data')
     shutil.rmtree(copied / 'data' / 'runs')
@@ -330,6 +331,7 @@ def test_one_that_is_left_out_after_a_repeat_does_not_count(copied: Path) -> Non
     assert table(copied, 'trials').filter(participant='P03')['trial'].to_list() == [1]
 
 
+@pytest.mark.exhaustive
 def test_people_drive_again_as_they_did(copied: Path) -> None:
     shutil.rmtree(copied / 'participants' / 'P02')
     # Both sessions' runs are called alike.

@@ -21,8 +21,8 @@ from live_peer import Peer
 import numpy as np
 import rclpy
 from rclpy.context import Context
+from ros_domains import own_domain_id
 from std_msgs.msg import String
-from worker_roles import own_domain_id
 
 OFFSET_NS = 1_000_000_000
 PATIENCE_S = 20.0

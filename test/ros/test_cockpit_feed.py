@@ -200,6 +200,7 @@ def test_an_order_is_repeated_until_it_is_answered(setup: Setup) -> None:
     lived(check)
 
 
+@pytest.mark.exhaustive
 def test_a_seat_that_was_the_cockpits_before_can_be_taken_away(setup: Setup) -> None:
     """After a restart of the cockpit a claim changes nothing on /seats: it holds at once."""
     async def check(graph: Graph) -> None:

@@ -9,7 +9,7 @@ import sys
 import time
 
 import pytest
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 
 
 @pytest.mark.parametrize('after_s', [0.1, 0.2, 0.4, 0.8])

@@ -175,6 +175,7 @@ def test_av_brakes_behind_the_human_who_cuts_in(cut_in: Path) -> None:
     assert ahead[in_lane].min() > 4.5 + 2.0
 
 
+@pytest.mark.exhaustive
 def test_survives_reset_and_another_scenario(tmp_path: Path) -> None:
     """After a reset to a curved road with other lanes its plans are accepted again."""
     for name in ('cut_in.yaml', 'roundabout.yaml'):

@@ -6,7 +6,7 @@ from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics, OFFSET, RECORDED
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from live_peer import Peer
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 
 WANTED = {'/av0/plan', '/hv0/driver_command'}
 

@@ -209,6 +209,7 @@ def _compare(seen: set[tuple[str, ...]], expected: set[tuple[str, ...]]) -> None
     assert not missing and not undeclared, f'missing: {missing}\nundeclared: {undeclared}'
 
 
+@pytest.mark.matrix
 def test_nodes_are_those_of_the_game(graph: Graph) -> None:
     """One process each; a driver for each human and a planner for each AV, named after them."""
     case = graph.case
@@ -249,6 +250,7 @@ def test_services_are_the_declared_ones(graph: Graph) -> None:
     _compare(_settled(graph.services, expected), expected)
 
 
+@pytest.mark.matrix
 def test_parameters_that_may_be_set_are_the_declared_ones(graph: Graph) -> None:
     """All other parameters of our nodes are read-only, so that setting them is refused."""
     seen, expected = set(), {

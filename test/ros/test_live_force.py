@@ -22,11 +22,13 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.publisher import Publisher
+from ros_domains import own_domain_id
 from sensor_msgs.msg import JointState
-from worker_roles import own_domain_id
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'driver'))
 from pushed_wheel import Motor, PushedWheel, wheel_at  # noqa: E402, I100, I202
+
+pytestmark = pytest.mark.clock
 
 STEP_NS = 10_000_000
 GAME = f"""

@@ -20,9 +20,10 @@ from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S
 import numpy as np
+import pytest
+from ros_domains import own_domain_id
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-from worker_roles import own_domain_id
 
 # The node's default.
 REACH_M = 60.0
@@ -44,6 +45,7 @@ def _states(*positions: tuple[float, float]) -> JointTrajectory:
         velocities=[0.0] * len(names), accelerations=[0.0] * len(names))])
 
 
+@pytest.mark.exhaustive
 def test_the_tiles_near_the_vehicles_come_when_they_change(tmp_path: Path) -> None:
     """One grid until other tiles are needed, cell for cell as in the map; nothing without one."""
     loaded = load_scenario(CUT_IN.parent / 'ZAM_CutIn-1_1_T-1.xml')

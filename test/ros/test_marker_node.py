@@ -30,7 +30,7 @@ from steady_game import write_steady_game
 from visualization_msgs.msg import Marker, MarkerArray
 
 # On a machine with nothing to spare what is said once may come before who hears it.
-pytestmark = pytest.mark.alone
+pytestmark = pytest.mark.clock
 
 # CommonRoad vehicle 2 (BMW 320i): the rear axle is so far behind the centre [m].
 REAR_TO_CENTER = 1.4227

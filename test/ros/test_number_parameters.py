@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 import yaml
 
 
@@ -32,6 +32,7 @@ def test_whole_numbers_are_numbers_and_a_game_has_a_name() -> None:
     assert 'finished at 1.00 s' in done.stdout + done.stderr
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('node', 'parameter'), [
     ('sim_node', 'real_time_factor:=fast'), ('sim_node', 'real_time_factor:=1000'),
     ('sim_node', 'duration:=true'), ('sim_node', 'game:=7'), ('map_node', 'reach:=0'),

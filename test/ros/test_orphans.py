@@ -7,6 +7,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 SCRIPT = """
 import os, signal, time
 from crgame_ros.ros import node_main
@@ -25,6 +27,7 @@ time.sleep(600.0)
 """
 
 
+@pytest.mark.exhaustive
 def test_who_hangs_ends_some_time_after_its_parent() -> None:
     done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True)
     child = Path('/proc') / done.stdout.strip()

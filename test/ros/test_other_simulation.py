@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from live_peer import Peer
 from live_support import PATIENCE_S
 import pytest
+from ros_domains import own_domain_id
 from rosgraph_msgs.msg import Clock
-from worker_roles import own_domain_id
 
 
 def test_who_speaks_as_a_simulation_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,8 +23,8 @@ import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from ros_domains import own_domain_id
 from std_msgs.msg import String
-from worker_roles import own_domain_id
 
 MS = 1_000_000
 OFFSET_NS = 1_000_000_000

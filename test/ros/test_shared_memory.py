@@ -19,7 +19,7 @@ from crgame_ros.ros.shared_memory import (
     SHARED_MEMORY,
     YOUNG_S,
 )
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 
 MADE, UNMADE = (2).to_bytes(4, 'little') + bytes(60), bytes(64)
 

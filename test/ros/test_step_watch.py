@@ -11,7 +11,7 @@ from typing import Any
 
 from crgame_ros.timing.thread_counters import stolen_between
 import pytest
-from worker_roles import own_domain_id
+from ros_domains import own_domain_id
 
 LOOP = Path(__file__).parent / 'stalling_loop.py'
 # A step has 10 ms for whatever happens in it.
@@ -30,6 +30,7 @@ def stalls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return told
 
 
+@pytest.mark.clock
 @pytest.mark.parametrize('cause', ['gc', 'work', 'page_faults', 'blocked', 'stopped', 'processor'])
 def test_a_stall_is_told_by_its_cause(stalls: dict[str, Any], cause: str) -> None:
     """

@@ -13,8 +13,8 @@ from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.time_controller import Cycle
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S
+from ros_domains import own_domain_id
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
-from worker_roles import own_domain_id
 
 LAG_S = 1.0
 

@@ -62,6 +62,7 @@ def run(scenario: Path, planner: str, with_map: bool) -> OfflineResult:
     return run_offline(setup, duration_s=1.5, drivers={'hv0': ReplayDriver(commands)})
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(('name', 'planner', 'offset', 'with_map'), [
     ('ZAM_CutIn-1_1_T-1.xml', 'reactive', TILES, True),
     ('ZAM_Crossing-1_1_T-1.xml', 'idm', OFFSET, False)])

@@ -53,6 +53,7 @@ def test_every_game_with_engines_is_here() -> None:
                           or any(av.perception for av in game.avs or ())}
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_nobody_touches_anybody(name: str) -> None:
     """Neither the driven vehicles nor agents nor objects, by exact geometry at every tick."""
@@ -64,6 +65,7 @@ def test_nobody_touches_anybody(name: str) -> None:
         assert record.accepted_ratio >= 0.95
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_runs_repeat_bit_for_bit(name: str) -> None:
     """All states, those of agents and objects too."""
@@ -90,6 +92,7 @@ def test_export_is_read_back(name: str, tmp_path: Path) -> None:
         == len(result.object_poses) - 1
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_human_makes_the_av_slow_down(name: str) -> None:
     """Against the same game without the human, by as much as the story wants."""

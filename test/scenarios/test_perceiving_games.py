@@ -121,6 +121,7 @@ def test_av_in_fog_stops_within_its_sight() -> None:
     assert 1.5 < distances(result, 'av0', 'van')[-1] < 6.0
 
 
+@pytest.mark.exhaustive
 def test_too_fast_in_fog_brakes_late_and_hard() -> None:
     """At 22 m/s the horizon of 30 m is where it begins; with clear sight twice as far away."""
     pytest.importorskip('commonroad_rp')

@@ -46,6 +46,7 @@ def _crawling_s(result: OfflineResult) -> float:
     return float((lane & (speed < 5.0)).sum()) * TICK_S
 
 
+@pytest.mark.exhaustive
 def test_who_makes_room_keeps_the_acceleration_lane_moving() -> None:
     """Without courtesy some crawl to its end, without lane changes all wait there for good."""
     waiting = [_crawling_s(played('dense_merge')), _crawling_s(play('dense_merge', _selfish)),
@@ -55,6 +56,7 @@ def test_who_makes_room_keeps_the_acceleration_lane_moving() -> None:
     assert waiting[2] > waiting[1] + 10.0
 
 
+@pytest.mark.exhaustive
 def test_agents_react_to_how_the_human_drives(tmp_path: Path) -> None:
     """
     The human brakes to a stop after merging: those behind brake harder, those ahead don't care.
@@ -148,6 +150,7 @@ def test_agents_swerve_around_the_skip_with_the_stated_clearance() -> None:
     assert d.max() + 0.5 * 1.61 > 0.5 * 3.75 + 0.5
 
 
+@pytest.mark.exhaustive
 def test_agents_that_do_not_swerve_queue_behind_the_skip() -> None:
     """Nobody passes; the first stands behind it, the others behind him."""
     result = play('blocked_lane', _no_swerve, without_human)

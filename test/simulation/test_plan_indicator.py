@@ -110,6 +110,7 @@ def comes_round(roads: RoadNetwork, lanelet: int) -> bool:
     return False
 
 
+@pytest.mark.exhaustive
 def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> None:
     """Intersections name what leads to the left, to the right, and straight on."""
     wrong, count = [], 0

@@ -9,6 +9,8 @@ import threading
 from crgame_ros.timing.time_slice import shorten_time_slice, SHORTEST_NS, time_slice_ns
 import pytest
 
+pytestmark = pytest.mark.clock
+
 KERNEL = tuple(int(part) for part in platform.release().split('.')[:2])
 
 

@@ -83,6 +83,7 @@ def _red_since(light: TrafficLight, k: int) -> int:
     return since
 
 
+@pytest.mark.exhaustive
 def test_nobody_crosses_on_red_where_left_turns_begin_straight() -> None:
     path = SHARED / 'USA_Lanker-1_3_T-1.xml'
     scenario = load_scenario(path).scenario

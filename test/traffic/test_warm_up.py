@@ -35,6 +35,7 @@ print(json.dumps([len(before), {x: n for x, n in count().items() if n != before[
 """
 
 
+@pytest.mark.exhaustive
 def test_a_run_compiles_and_loads_nothing_more(maps: Path,
                                                shared_scenarios: Path) -> None:
     """Lights, junctions, lane changes, swerves, recorded vehicles, parked cars, pedestrians."""

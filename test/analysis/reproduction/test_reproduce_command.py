@@ -14,6 +14,7 @@ pytestmark = pytest.mark.xdist_group('reproduction')
 WORDS = ['reproduce', 'commonroad-game']
 
 
+@pytest.mark.exhaustive
 def test_nobody_reacts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All files are there, each unmet expectation has its line, and the exit code is 1."""
     out = tmp_path / 'again'

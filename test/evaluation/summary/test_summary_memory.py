@@ -9,6 +9,9 @@ import sys
 from evaluation_rows import write_parts
 import numpy as np
 import pyarrow as pa
+import pytest
+
+pytestmark = pytest.mark.exhaustive
 
 CELLS, SCENARIOS, PLANNERS = 100_000, 4, ('idm', 'mine', 'theirs', 'yours')
 # Of what is asked: less than 300 MB for 100,000 cells.
