@@ -63,6 +63,18 @@ def check_room(folder: Path, size: int = 1 << 20) -> None:
                 raise
 
 
+def extra_install(extra: str) -> str:
+    """
+    Return the command that installs an optional part.
+
+    :param extra: its name among the optional dependencies of pyproject.toml.
+    """
+    uv = Path(sys.prefix) / 'bin' / 'uv'
+    if uv.exists():
+        return f'{uv} pip install -c requirements-dev.txt -r pyproject.toml --extra {extra}'
+    return f"pip install '.[{extra}]'"
+
+
 def config_directory() -> Path:
     """Find the directory of configuration files."""
     return share_directory() / 'config'

@@ -66,6 +66,7 @@ install -r "$venv/requirements.txt" ||
 # ROS headers: nothing is compiled against them.
 rm -rf "$venv/include"
 ln -sf ../../crgame "$venv/bin/crgame"
+ln -sf "$uv" "$venv/bin/uv"
 
 (PYTHONPATH=$root "$venv/bin/python" -m crgame_ros.cli page-libraries) >"$venv/pages.log" 2>&1 &
 pages=$!

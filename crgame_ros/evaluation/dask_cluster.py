@@ -9,8 +9,9 @@ import os
 from typing import Any
 
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.paths import extra_install
 
-INSTALL = "pip install 'crgame_ros[evaluate]'"
+INSTALL = extra_install('evaluate')
 # A cell whose worker was killed this often has something to do with it.
 ALLOWED_FAILURES = 5
 _CONNECT_S = 8.0

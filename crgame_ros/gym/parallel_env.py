@@ -11,6 +11,7 @@ from crgame_ros.gym.agent_spaces import action_space, observation_space
 from crgame_ros.gym.driving_env import check_render_mode, Seen
 from crgame_ros.gym.episode_setups import SEEDS
 from crgame_ros.gym.scene_painter import FRAMES_PER_S, ScenePainter
+from crgame_ros.paths import extra_install
 from gymnasium import spaces
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ try:
     from pettingzoo import ParallelEnv
 except ImportError as _error:
     raise ImportError('crgame_ros.gym.parallel_env needs the package pettingzoo, which is not '
-                      "installed: pip install 'crgame_ros[gym]'", name='pettingzoo') from _error
+                      f'installed: {extra_install("gym")}', name='pettingzoo') from _error
 
 
 class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):

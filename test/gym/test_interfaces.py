@@ -12,6 +12,7 @@ from crgame_ros.gym.driving_env import DrivingEnv
 from crgame_ros.gym.games_together import GamesTogether
 from crgame_ros.gym.parallel_env import ParallelDrivingEnv
 from crgame_ros.gym.shipped_environments import ANY_GAME, environment_id, shipped_games
+from crgame_ros.paths import extra_install
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 import numpy as np
@@ -119,4 +120,4 @@ def test_the_package_says_what_to_install_where_gymnasium_is_missing() -> None:
          'try:\n    import crgame_ros.gym\nexcept ImportError as e:\n    print(e)'],
         capture_output=True, text=True, check=True)
     assert done.stdout == ('crgame_ros.gym needs the package gymnasium, which is not installed: '
-                           "pip install 'crgame_ros[gym]'\n")
+                           f'{extra_install("gym")}\n')
