@@ -18,7 +18,7 @@ from typing import Literal
 
 from crgame_ros.page_libraries import COMMAND, find_libraries
 from crgame_ros.paths import share_directory
-from crgame_ros.registry import PACKAGES
+from crgame_ros.registry import PACKAGES, planner_packages_install
 from crgame_ros.ros.environment import (
     free_domain_id,
     loopback_profile,
@@ -29,33 +29,26 @@ from crgame_ros.ros.environment import (
 )
 from packaging.requirements import Requirement
 
-# Groups of requirements.txt that only who works on the package needs.
-DEVELOPMENT = ('Build and test', 'A real browser in tests and benchmarks')
+# The pins of the source tree: of every run, and of planners that CommonRoad's packages serve.
+PINS, PLANNER_PINS = 'requirements.txt', 'requirements-planners.txt'
 
 
-def read_pins(requirements: Path) -> Iterator[tuple[str, str, str]]:
+def read_pins(folder: Path) -> Iterator[Requirement]:
+    """Read the pinned packages of both files in a folder, without their hashes."""
+    for name in (PINS, PLANNER_PINS):
+        for line in (folder / name).read_text(encoding='utf-8').splitlines():
+            if '==' in line and not line.startswith('#'):
+                yield Requirement(line.removesuffix('\\'))
+
+
+def needed(folder: Path, *, wheels: bool) -> list[Requirement]:
     """
-    Read the pinned packages.
+    List what this installation needs to run.
 
-    :return: for each its group (the comment above it), name and version.
-    """
-    group = ''
-    for line in requirements.read_text(encoding='utf-8').splitlines():
-        name, pinned, wanted = line.strip().partition('==')
-        if line.startswith('# '):
-            group = line[2:]
-        elif pinned:
-            yield group, name, wanted
+    These are the pins where scripts/env.sh has made the environment, or where the package is not
+    installed; elsewhere what the installed package asks for.
 
-
-def needed(requirements: Path, *, wheels: bool) -> list[Requirement]:
-    """
-    List what this installation needs to run, not what its development does.
-
-    Where scripts/env.sh or nobody has installed the package, these are the pins; where pip or
-    colcon has, what the package itself asks for.
-
-    :param requirements: requirements.txt.
+    :param folder: with the files of pins.
     :param wheels: whether ROS comes from wheels, which are then needed, too.
     """
     try:
@@ -63,8 +56,7 @@ def needed(requirements: Path, *, wheels: bool) -> list[Requirement]:
     except PackageNotFoundError:
         declared = []
     if not declared or (Path(sys.prefix) / 'stamp').is_file():
-        found = [Requirement(f'{name}=={wanted}')
-                 for group, name, wanted in read_pins(requirements) if group not in DEVELOPMENT]
+        found = list(read_pins(folder))
     else:
         found = [item for item in map(Requirement, declared)
                  if item.marker is None or item.marker.evaluate({'extra': ''})]
@@ -111,7 +103,7 @@ class Check:
 def run_checks(runs: Path | None = None) -> list[Check]:
     """Check everything, in some seconds; recordings go to `runs`, by default ./runs."""
     prepare_environment()
-    return [check_python(), *check_packages(share_directory() / 'requirements.txt'),
+    return [check_python(), *check_packages(share_directory()),
             check_imports(), check_page_libraries(), check_ros(), check_profile(), check_devices(),
             check_priority(), *check_discovery(), check_disk(runs or Path('runs')),
             check_processors(), check_clock()]
@@ -146,11 +138,11 @@ def check_python() -> Check:
                  'use Python 3.11 or 3.12: PYTHON=python3.12 ./run.sh')
 
 
-def check_packages(requirements: Path) -> list[Check]:
+def check_packages(folder: Path) -> list[Check]:
     """Compare the installed packages with the needed ones; one check for each that differs."""
     checks = []
     right = 0
-    for item in needed(requirements, wheels=ros_wheels_prefix() is not None):
+    for item in needed(folder, wheels=ros_wheels_prefix() is not None):
         remedy = COMPILE_FIX if item.name == 'polygon3' else f'pip install --no-deps "{item}"'
         try:
             found = version(item.name)
@@ -186,10 +178,9 @@ def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
     detail = '; '.join(f'{name}: {error}' for name, (error, _) in errors.items())
     absent = {(module or '').partition('.')[0] for _, module in errors.values()}
     if absent <= OF_SOME_PLANNERS:
-        pins = share_directory() / 'requirements.txt'
         return Check('imports', 'warn', f'without planners reactive, reactive-package or '
-                     f'idm-package: {detail}', COMPILE_FIX if absent == {'Polygon'} else
-                     f'pip install --no-deps --ignore-requires-python -r {pins}')
+                     f'idm-package: {detail}',
+                     COMPILE_FIX if absent == {'Polygon'} else planner_packages_install())
     return Check('imports', 'fail', detail, 'remove .venv and start again')
 
 

@@ -16,7 +16,7 @@ from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
 from crgame_ros.errors import InputError, short
 from crgame_ros.paths import share_directory
 
-# They declare Python < 3.12, so that pip does not bring them there; they work all the same.
+# Of requirements-planners.txt: pip does not bring them with this package.
 PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
             'commonroad_rp': 'commonroad-reactive-planner'}
 # Before FILE.py:load, where a planner or a driver is named: a trained policy drives.
@@ -169,13 +169,17 @@ def _from_module(target: str, label: str) -> Any:
                              'apt install gcc python3-dev, then delete .venv') from error
         package = isinstance(error, ImportError) and PACKAGES.get((error.name or '').split('.')[0])
         if package:
-            pins = share_directory() / 'requirements.txt'
-            raise InputError(f'needs the package {package}, which pip leaves out on Python 3.12',
-                             label, 'pip install --no-deps --ignore-requires-python -r '
-                             f'{pins}') from error
+            raise InputError(f'needs the package {package}, which does not come by itself', label,
+                             planner_packages_install()) from error
         raise InputError(f'cannot import {module_name} ({type(error).__name__}: {error})',
                          label, 'check the name and what it imports') from error
     return _attribute(module, attribute, label)
+
+
+def planner_packages_install() -> str:
+    """Return the command that installs the packages behind some planners."""
+    return ('pip install --no-deps --ignore-requires-python -r '
+            f'{share_directory() / "requirements-planners.txt"}')
 
 
 def _attribute(module: types.ModuleType, attribute: str, label: str) -> Any:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the package imports, setup.py asks pip for and package.xml asks rosdep for are the same."""
+"""The package imports what pyproject.toml asks pip for and package.xml asks rosdep for."""
 
 import ast
 from collections.abc import Iterator
@@ -8,6 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 import re
 import sys
+import tomllib
+from typing import Any
 
 from lxml import etree
 from packaging.requirements import Requirement
@@ -22,8 +24,6 @@ THIRD_PARTY = {
     'commonroad': ('commonroad-io', None),
     'commonroad_clcs': ('commonroad-clcs', None),
     'commonroad_dc': ('commonroad-drivability-checker', None),
-    'commonroad_idm_planner': ('commonroad-idm-planner', None),
-    'commonroad_rp': ('commonroad-reactive-planner', None),
     'evdev': ('evdev-binary', 'python3-evdev'),
     'lxml': ('lxml', 'python3-lxml'),
     'lz4': ('lz4', 'python3-lz4'),
@@ -33,7 +33,6 @@ THIRD_PARTY = {
     'numba': ('numba', None),
     'numpy': ('numpy', 'python3-numpy'),
     'packaging': ('packaging', 'python3-packaging'),
-    'plotly': ('plotly', None),
     'pyarrow': ('pyarrow', None),
     'rosbags': ('rosbags', None),
     'scipy': ('scipy', 'python3-scipy'),
@@ -43,6 +42,9 @@ THIRD_PARTY = {
 }
 # What a user asks for by an extra of its own; nothing else of the package imports it.
 EXTRAS = {'evaluate': {'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'}}
+# Of requirements-planners.txt, by imported name.
+OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',
+               'commonroad_rp': 'commonroad-reactive-planner'}
 # Dask's configuration comes with its scheduler.
 OF_EXTRAS = {'dask'}
 # Of ROS: each is a package of its own in package.xml; from pip they come together.
@@ -62,8 +64,8 @@ def _imported() -> Iterator[str]:
                 yield from (alias.name.partition('.')[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 yield (node.module or '').partition('.')[0]
-            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith('find_spec') \
-                    and isinstance(node.args[0], ast.Constant):
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) \
+                    and node.func.id == 'find_spec' and isinstance(node.args[0], ast.Constant):
                 yield str(node.args[0].value).partition('.')[0]
 
 
@@ -73,52 +75,50 @@ def imported() -> set[str]:
     return set(_imported()) - sys.stdlib_module_names - {'crgame_ros', 'ros_wheels_bootstrapper'}
 
 
-def _strings(node: ast.expr, names: dict[str, str]) -> str:
-    """Evaluate a string of setup.py, which may contain a constant of that file."""
-    return str(eval(compile(ast.Expression(node), 'setup.py', 'eval'), {}, names))
+def _project() -> dict[str, Any]:
+    """Read the metadata of pyproject.toml."""
+    found: dict[str, Any] = tomllib.loads(
+        (ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['project']
+    return found
 
 
-def _setup(keyword: str, extra: str = 'test') -> list[str]:
-    """Read a list of requirements from setup.py without running it; of extras a chosen one."""
-    tree = ast.parse((ROOT / 'setup.py').read_text(encoding='utf-8'))
-    names = {target.id: node.value.value for node in tree.body
-             if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
-             for target in node.targets if isinstance(target, ast.Name)}
-    call = next(node.value for node in tree.body if isinstance(node, ast.Expr)
-                and isinstance(node.value, ast.Call)
-                and ast.unparse(node.value.func) == 'setup')
-    value = next(item.value for item in call.keywords if item.arg == keyword)
-    if isinstance(value, ast.Dict):
-        value = value.values[[_strings(key, names) for key in value.keys].index(extra)]
-    found = value
-    assert isinstance(found, ast.List)
-    return [_strings(item, names) for item in found.elts]
+def _names(requirements: list[str]) -> set[str]:
+    return {canonicalize_name(Requirement(line).name) for line in requirements}
 
 
 def _manifest() -> 'etree._Element':
     return etree.parse(ROOT / 'package.xml').getroot()
 
 
-def test_setup_names_what_is_imported(imported: set[str]) -> None:
-    """One line for each third-party import, and none that nobody imports."""
+def test_the_metadata_names_what_is_imported(imported: set[str]) -> None:
+    """One line for each third-party import, and none that nothing imports."""
     third_party = {name for name in imported if not ROS.fullmatch(name)}.difference(
-        *EXTRAS.values())
+        OF_PLANNERS, *EXTRAS.values())
     assert third_party == set(THIRD_PARTY)
-    named = {canonicalize_name(Requirement(line).name) for line in _setup('install_requires')}
-    assert named == {pip for pip, _ in THIRD_PARTY.values()} | ROS_FROM_PIP
+    assert _names(_project()['dependencies']) == {
+        pip for pip, _ in THIRD_PARTY.values()} | ROS_FROM_PIP
 
 
 def test_extras_name_what_they_are_for(imported: set[str]) -> None:
     """Each extra brings what its part imports, and the base imports none of it by itself."""
     for extra, names in EXTRAS.items():
         assert names <= imported
-        assert {Requirement(line).name for line in _setup('extras_require', extra)} \
-            == names - OF_EXTRAS
+        assert _names(_project()['optional-dependencies'][extra]) == names - OF_EXTRAS
     text = (ROOT / 'package.xml').read_text(encoding='utf-8')
-    found = re.search(r'Optional, from pip: (.*?)\. -->', text, re.DOTALL)
+    found = re.search(r'Optional, from pip: (.*?);', text, re.DOTALL)
     assert found is not None
     assert {name.strip() for name in found[1].split(',')} == {
         name for names in EXTRAS.values() for name in names - OF_EXTRAS}
+
+
+def test_packages_of_planners_are_pinned_apart(imported: set[str]) -> None:
+    """What only some planners import, with what it needs; nothing that is not free software."""
+    assert OF_PLANNERS.keys() <= imported
+    lines = [line for line in (ROOT / 'requirements-planners.txt').read_text().splitlines()
+             if line and not line.startswith('#')]
+    assert set(OF_PLANNERS.values()) | {'polygon3'} <= _names(lines)
+    for file in ROOT.glob('requirements*.txt'):
+        assert 'triangle' not in file.read_text()
 
 
 def test_manifest_names_what_is_imported(imported: set[str]) -> None:
@@ -132,8 +132,7 @@ def test_manifest_names_what_is_imported(imported: set[str]) -> None:
     assert found is not None
     listed, of_tests = ({name.strip() for name in group.split(',')} for group in found.groups())
     assert listed == {pip for pip, key in THIRD_PARTY.values() if key is None}
-    extra = {canonicalize_name(Requirement(line).name) for line in _setup('extras_require')}
-    assert of_tests <= extra
+    assert of_tests <= _names(_project()['optional-dependencies']['test'])
 
 
 def test_messages_come_with_the_wheels(imported: set[str]) -> None:
@@ -145,30 +144,15 @@ def test_messages_come_with_the_wheels(imported: set[str]) -> None:
 
 def test_both_name_the_same_people_and_place() -> None:
     """One maintainer, whose address can be nobody else's, one page, one licence."""
-    manifest = _manifest()
-    text = (ROOT / 'setup.py').read_text(encoding='utf-8')
-    given = dict(re.findall(r"^    (\w+)='(.*)',$", text, re.MULTILINE))
+    manifest, project = _manifest(), _project()
     maintainer = manifest.find('maintainer')
-    assert (given['maintainer'], given['maintainer_email']) == (
-        maintainer.text, maintainer.get('email'))
-    assert given['author'] == manifest.findtext('author')
-    assert given['url'] == manifest.find("url[@type='website']").text
-    assert given['license'] == manifest.findtext('license')
+    assert project['maintainers'] == [{'name': maintainer.text, 'email': maintainer.get('email')}]
+    assert project['authors'] == [{'name': manifest.findtext('author')}]
+    assert project['urls']['Homepage'] == manifest.find("url[@type='website']").text
+    assert project['license'] == manifest.findtext('license')
     # RFC 6761: nobody can register a name under .invalid, so that nobody gets our mail.
-    for address in (given['maintainer_email'], given['url'].rstrip('/')):
+    for address in (maintainer.get('email'), project['urls']['Homepage'].rstrip('/')):
         assert re.fullmatch(r'.*[@/][a-z-]+\.invalid', address)
-
-
-def test_planners_that_pip_cannot_install_on_3_12_are_left_out_there() -> None:
-    """With them `pip install` would refuse the whole package, or take versions of years ago."""
-    asked = {canonicalize_name(item.name): item
-             for item in map(Requirement, _setup('install_requires'))}
-    conditional = {name for name, item in asked.items() if item.marker is not None}
-    assert conditional == {'commonroad-idm-planner', 'commonroad-reactive-planner'}
-    for name in conditional:
-        marker = asked[name].marker
-        assert marker.evaluate({'python_version': '3.11'})
-        assert not marker.evaluate({'python_version': '3.12'})
 
 
 def test_the_quality_declaration_is_linked_and_names_what_exists() -> None:
@@ -182,9 +166,9 @@ def test_the_quality_declaration_is_linked_and_names_what_exists() -> None:
                 if not link.startswith('https://') and not (ROOT / link).exists()]
 
 
-def test_readme_names_what_comes_from_pip_alone() -> None:
-    """Its list for machines with ROS from Debian packages is the one of package.xml."""
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+def test_the_documents_name_what_comes_from_pip_alone() -> None:
+    """The list for machines with ROS from Debian packages is the one of package.xml."""
+    text = (ROOT / 'docs' / 'installation.md').read_text(encoding='utf-8')
     found = re.search(r'only older than is needed: (.*?)\. ', text, re.DOTALL)
     assert found is not None
     assert set(re.findall(r'`([\w-]+)`', found.group(1))) == {

@@ -22,8 +22,9 @@ from crgame_ros.doctor import (
     check_profile,
     check_python,
     check_ros,
-    DEVELOPMENT,
     format_checks,
+    PINS,
+    PLANNER_PINS,
     read_pins,
 )
 from crgame_ros.ros.environment import loopback_profile, PROFILE_VARIABLES
@@ -36,21 +37,25 @@ def test_python_of_this_run_is_fit() -> None:
     assert check_python().status == 'ok'
 
 
-def test_pins_are_read_with_their_group(project_root: Path) -> None:
-    """The comment above a package is its group."""
-    pins = {name: (group, wanted) for group, name, wanted
-            in read_pins(project_root / 'requirements.txt')}
-    assert pins['commonroad-io'] == ('CommonRoad', '2024.3')
-    assert pins['pytest'][0] in DEVELOPMENT and pins['selenium'][0] in DEVELOPMENT
+def write_pins(folder: Path, pins: str, planners: str = '') -> Path:
+    """Write the two files of pins into a folder."""
+    (folder / PINS).write_text(pins)
+    (folder / PLANNER_PINS).write_text(planners)
+    return folder
+
+
+def test_pins_are_read_without_their_hashes(project_root: Path) -> None:
+    pins = {item.name: str(item.specifier) for item in read_pins(project_root)}
+    assert pins['commonroad-io'] == '==2024.3'
+    assert pins['commonroad-reactive-planner'] == '==2025.1'
+    assert 'pytest' not in pins and 'selenium' not in pins
 
 
 def test_packages_are_compared_with_their_pins(tmp_path: Path) -> None:
-    """Another version warns, a missing package fails; what only developers need is not asked."""
-    requirements = tmp_path / 'requirements.txt'
-    requirements.write_text(f'# Numbers\nnumpy==0.1\nscipy=={version("scipy")}\nno-such-thing==1\n'
-                            + ''.join(f'# {group}\nno-such-tool==2\n'
-                                      for group in DEVELOPMENT))
-    summary, *checks = check_packages(requirements)
+    """Another version warns, a missing package fails."""
+    folder = write_pins(tmp_path, f'# Made.\nnumpy==0.1 \\\n    --hash=sha256:00\n'
+                        f'scipy=={version("scipy")}\nno-such-thing==1\n')
+    summary, *checks = check_packages(folder)
     assert [(check.name, check.status) for check in checks] == [
         ('numpy', 'warn'), ('no-such-thing', 'fail')]
     assert summary.detail == '1 as tried, 2 not'
@@ -76,25 +81,23 @@ def test_an_installed_package_is_judged_by_what_it_asks_for(
     prefix = tmp_path / 'prefix'
     prefix.mkdir()
     monkeypatch.setattr(sys, 'prefix', str(prefix))
-    requirements = tmp_path / 'requirements.txt'
-    requirements.write_text('# Numbers\nno-such-pin==1\n')
-    summary, *checks = check_packages(requirements)
+    folder = write_pins(tmp_path, 'no-such-pin==1\n')
+    summary, *checks = check_packages(folder)
     assert [(check.name, check.status) for check in checks] == [('scipy', 'warn')]
     assert summary.detail == '1 as tried, 1 not'
     (prefix / 'stamp').touch()
-    assert [check.name for check in check_packages(requirements)[1:]] == ['no-such-pin']
+    assert [check.name for check in check_packages(folder)[1:]] == ['no-such-pin']
 
 
 def test_missing_polygon3_is_no_failure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Only two planners need the package that compiles; any other failure beside it counts."""
-    requirements = tmp_path / 'requirements.txt'
-    requirements.write_text('# CommonRoad\npolygon3==3.0.9.1\n')
+    folder = write_pins(tmp_path, '', 'polygon3==3.0.9.1\n')
 
     def absent(name: str) -> str:
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(doctor, 'version', absent)
-    check = check_packages(requirements)[1]
+    check = check_packages(folder)[1]
     assert (check.name, check.status) == ('polygon3', 'warn')
     assert 'gcc' in check.remedy
     (tmp_path / 'needs_polygon.py').write_text('import sys\n'

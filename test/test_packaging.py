@@ -5,15 +5,17 @@
 import ast
 from collections.abc import Iterator
 from configparser import ConfigParser
+import hashlib
 from importlib import import_module
-import mmap
 import os
 from pathlib import Path
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
+import tomllib
 from zipfile import ZipFile
 
 from crgame_ros import __version__
@@ -28,7 +30,11 @@ NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'critica
          'timesync_node', 'recorder_node', 'marker_node', 'cockpit_node',
          'perception_node', 'traffic_node', 'map_node')
 DATA = ('launch', 'config', 'scenarios', 'msg_defs')
+PINS = ('requirements.txt', 'requirements-planners.txt')
 # Modules of ROS packages whose name is no ROS package's.
+# Without uv, wherever this machine has it.
+WITHOUT_UV = os.pathsep.join(folder for folder in os.environ['PATH'].split(os.pathsep)
+                              if not (Path(folder) / 'uv').exists())
 MESSAGE_PACKAGE = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy')
 
 
@@ -56,7 +62,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build a wheel from a copy of the source tree."""
     source = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
                    'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                   'requirements.txt', 'LICENSE',
+                   'requirements.txt', 'requirements-planners.txt', 'LICENSE',
                    *(name for name in ('launch', 'scenarios') if (ROOT / name).is_dir()))
     # As it is where the page has been checked.
     foreign = source / 'test' / 'page' / 'node_modules' / 'somebody'
@@ -76,11 +82,12 @@ def prefix(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-def _pins() -> dict[str, str]:
-    """Read requirements.txt."""
-    lines = (ROOT / 'requirements.txt').read_text(encoding='utf-8').splitlines()
-    return {canonicalize_name(line.split('==')[0]): line.split('==')[1]
-            for line in lines if line and not line.startswith('#')}
+def _pins(name: str) -> dict[str, str]:
+    """Read a file of pins."""
+    lines = (ROOT / name).read_text(encoding='utf-8').splitlines()
+    return {canonicalize_name(item.name): next(iter(item.specifier)).version
+            for item in (Requirement(line.removesuffix('\\')) for line in lines
+                         if '==' in line and not line.startswith('#'))}
 
 
 def test_data_files_are_installed_where_ros_looks(prefix: Path) -> None:
@@ -93,7 +100,7 @@ def test_data_files_are_installed_where_ros_looks(prefix: Path) -> None:
                 if file.is_file() and '__pycache__' not in file.parts}
     installed = {file.relative_to(share) for file in share.rglob('*')
                  if file.is_file() and '__pycache__' not in file.parts}
-    assert installed == expected | {Path('package.xml'), Path('requirements.txt')}
+    assert installed == expected | {Path('package.xml'), *map(Path, PINS)}
     assert all((share / file).read_bytes() == (ROOT / file).read_bytes() for file in expected)
 
 
@@ -175,24 +182,29 @@ def test_every_entry_point_resolves(wheel: Path) -> None:
     assert not missing, '\n'.join(missing)
 
 
-def test_requirements_are_pinned_and_serve_the_installation(wheel: Path) -> None:
-    """One pin a line, sorted in groups, no addresses; they satisfy what setup.py asks for."""
-    text = (ROOT / 'requirements.txt').read_text(encoding='utf-8')
+@pytest.mark.parametrize(('name', 'extras'), [
+    ('requirements.txt', []), ('requirements-dev.txt', ['test', 'docs', 'gym', 'evaluate'])])
+def test_requirements_are_pinned_and_serve_the_installation(name: str, extras: list[str]) -> None:
+    """Each with its hashes and no address; they satisfy what pyproject.toml asks for."""
+    text = (ROOT / name).read_text(encoding='utf-8')
     assert '://' not in text
-    for group in text.split('\n\n')[1:]:
-        title, *lines = group.strip().splitlines()
-        assert title.startswith('# ')
-        assert all(re.fullmatch(r'[\w.-]+==[\w.]+', line) for line in lines)
-        assert lines == sorted(lines, key=lambda line: line.split('==')[0].lower())
-    pins = _pins()
-    with ZipFile(wheel) as archive:
-        name = next(name for name in archive.namelist() if name.endswith('METADATA'))
-        metadata = archive.read(name).decode()
-    asked = [Requirement(line) for line in re.findall('^Requires-Dist: (.+)$', metadata, re.M)]
+    for package in re.split(r'\n(?! )', text.strip()):
+        assert re.match(r'[\w.-]+==[\w.]+ \\\n    --hash=sha256:', package), package
+    pins = _pins(name)
+    project = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['project']
+    optional = project['optional-dependencies']
+    asked = [Requirement(line) for line in
+             (*project['dependencies'], *(line for extra in extras for line in optional[extra]))]
     assert len(asked) > 20
-    wrong = [str(requirement) for requirement in asked
-             if not requirement.specifier.contains(pins[canonicalize_name(requirement.name)])]
+    wrong = [str(item) for item in asked if item.name != 'crgame_ros'
+             and not item.specifier.contains(pins[canonicalize_name(item.name)])]
     assert not wrong
+
+
+def test_what_developers_have_is_what_users_have() -> None:
+    """Tests run on the versions that users get."""
+    pins, of_all = _pins('requirements-dev.txt'), _pins('requirements.txt')
+    assert {name: pins.get(name) for name in of_all} == of_all
 
 
 def test_manifest_names_what_the_package_imports() -> None:
@@ -224,15 +236,13 @@ def _source(tree: Path, then: str = '', **variables: str) -> subprocess.Complete
 
 def _stamped(tree: Path) -> Path:
     """Make a tree with an .venv that is complete as far as scripts/env.sh can tell."""
-    _copy(tree, 'scripts/env.sh', 'requirements.txt', 'config/fastdds_loopback.xml')
+    _copy(tree, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS, 'config/fastdds_loopback.xml')
     libraries = tree / '.venv' / 'lib' / 'python3.11' / 'site-packages' / 'ros_rcl.libs'
     libraries.mkdir(parents=True)
     (tree / '.venv' / 'bin').mkdir()
     (tree / '.venv' / 'bin' / 'python').symlink_to(sys.executable)
-    digest = subprocess.run(['sha256sum'], stdin=(tree / 'requirements.txt').open(),
-                            capture_output=True, text=True, check=True).stdout.strip()
-    (tree / '.venv' / 'stamp').write_text(
-        f'{digest}\n{tree.resolve()}\n{sys.executable}\n3.11\nwheels\ndefault\nnone\n')
+    digest = hashlib.sha256(b''.join((tree / name).read_bytes() for name in PINS)).hexdigest()
+    (tree / '.venv' / 'stamp').write_text(f'{digest}  -\n')
     return tree.resolve()
 
 
@@ -284,39 +294,11 @@ def test_env_keeps_another_ros_apart(tmp_path: Path) -> None:
     assert ':/lib/mine' in done.stdout
 
 
-def test_env_fetches_the_3d_library_into_an_environment_made_before(tmp_path: Path) -> None:
-    """Once; where it cannot be had a line says so, and it is not tried again at once."""
-    tree = _stamped(tmp_path / 'a tree')
-    _copy(tree, 'crgame_ros', 'config/page_libraries')
-    # Else Python takes itself for the one of the link's target.
-    (tree / '.venv' / 'pyvenv.cfg').write_text(f'home = {Path(sys.executable).parent}\n')
-    programs = tmp_path / 'programs'
-    programs.mkdir()
-    for name in ('node', 'npm'):
-        (programs / name).write_text('#!/bin/sh\necho "npm error no network" >&2\nexit 1\n')
-        (programs / name).chmod(0o755)
-    path = f'{programs}:{os.environ["PATH"]}'
-    done = _source(tree, PATH=path, HOME=str(tmp_path))
-    assert done.returncode == 0 and done.stderr.count('\n') == 1
-    assert 'no 3D view yet (error: three.js cannot be fetched: npm says "npm error no network"' \
-        in done.stderr
-    assert _source(tree, PATH=path, HOME=str(tmp_path)).stderr == ''
-    if shutil.which('npm') is None:
-        pytest.skip('three.js is not fetched: npm is missing')
-    (tree / '.venv' / 'three.log').unlink()
-    done = _source(tree)
-    if 'cannot be fetched' in done.stderr:
-        pytest.skip(done.stderr)
-    assert done.stderr == ''
-    fetched = next((tree / '.venv' / 'share' / 'crgame_ros').iterdir())
-    assert (fetched / 'three.module.js').is_file()
-
-
 def test_env_refuses_other_pythons(tmp_path: Path) -> None:
     """Python 3.10 is refused in one line with exit code 2, and nothing is made."""
-    tree = _copy(tmp_path / 'tree', 'scripts/env.sh', 'requirements.txt')
+    tree = _copy(tmp_path / 'tree', 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
     old = tmp_path / 'python3.10'
-    old.write_text('#!/bin/sh\necho "$0 3.10"\n')
+    old.write_text('#!/bin/sh\necho "3.10 $0"\n')
     old.chmod(0o755)
     done = _source(tree, PYTHON=str(old))
     assert done.returncode == 2
@@ -326,67 +308,84 @@ def test_env_refuses_other_pythons(tmp_path: Path) -> None:
     assert not (tree / '.venv').exists()
 
 
-def test_env_leaves_a_foreign_venv_alone(tmp_path: Path) -> None:
-    """An .venv that somebody else made is not emptied."""
-    tree = _copy(tmp_path, 'scripts/env.sh', 'requirements.txt')
-    (tree / '.venv').mkdir()
-    (tree / '.venv' / 'precious').touch()
-    done = _source(tree, PYTHON=sys.executable)
-    assert done.returncode == 1
-    assert 'move it away' in done.stderr
-    assert (tree / '.venv' / 'precious').exists()
-
-
 def test_env_makes_another_one_beside_an_environment_of_another_python(tmp_path: Path) -> None:
     """The first, which may be in use, stays as it is; so it does where the second one fails."""
     tree = _stamped(tmp_path / 'tree')
     other = tmp_path / 'python3.12'
     # A Python that is there, and cannot make a venv after all.
-    other.write_text('#!/bin/sh\ncase "$*" in *_base_executable*) echo "$0 3.12";; '
+    other.write_text('#!/bin/sh\ncase "$*" in *_base_executable*) echo "3.12 $0";; '
                      '*"-m venv"*) exit 1;; esac\n')
     other.chmod(0o755)
     before = (tree / '.venv' / 'stamp').read_text()
-    done = _source(tree, PYTHON=str(other))
+    done = _source(tree, PYTHON=str(other), PATH=WITHOUT_UV)
     assert done.returncode == 1
-    assert 'making .venv-3.12-wheels with Python 3.12' in done.stderr
+    assert 'installing packages into .venv-3.12' in done.stderr
+    assert 'cannot make environments: apt install python3-venv' in done.stderr.splitlines()[-1]
     assert (tree / '.venv' / 'stamp').read_text() == before
     assert (tree / '.venv' / 'bin' / 'python').exists()
-    assert (tree / '.venv-3.12-wheels' / 'key').read_text() == '3.12 wheels\n'
-    # Complete, it is taken by whoever asks for that Python, and the first by whoever does not.
-    (tree / '.venv-3.12-wheels' / 'bin').mkdir()
-    (tree / '.venv-3.12-wheels' / 'bin' / 'python').symlink_to(sys.executable)
-    lines = before.splitlines()
-    (tree / '.venv-3.12-wheels' / 'stamp').write_text('\n'.join(
-        (*lines[:2], str(other), '3.12', 'wheels', str(other), 'none', '')))
-    for variables, name in (({'PYTHON': str(other)}, '.venv-3.12-wheels'), ({}, '.venv')):
+    # Complete, it is used where that Python is asked for, and the first where none is.
+    (tree / '.venv-3.12' / 'bin').mkdir()
+    (tree / '.venv-3.12' / 'bin' / 'python').symlink_to(sys.executable)
+    (tree / '.venv-3.12' / 'stamp').write_text(before)
+    for variables, name in (({'PYTHON': str(other)}, '.venv-3.12'), ({}, '.venv')):
         done = _source(tree, 'echo "$CRGAME_PYTHON"', **variables)
         assert done.stdout == f'{tree}/{name}/bin/python\n', done.stderr
 
 
-def test_env_leaves_one_that_is_in_use_as_it_is(tmp_path: Path) -> None:
-    """Its requirements have changed: the new one is made elsewhere while a process runs in it."""
-    tree = _stamped(tmp_path / 'tree')
-    library = tree / '.venv' / 'lib' / 'loaded.so'
-    library.write_bytes(bytes(4096))
-    with (tree / 'requirements.txt').open('a') as file:
-        file.write('# changed\n')
-    with library.open('rb') as file, mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ):
-        done = _source(tree, PYTHON=sys.executable, PIP_CONFIG_FILE=os.devnull,
-                       PIP_INDEX_URL='http://127.0.0.1:9/simple', PIP_NO_CACHE_DIR='1')
-        assert done.returncode == 1
-        assert library.exists() and (tree / '.venv' / 'stamp').exists()
-    assert re.search(r'making \.venv-3\.11-wheels-[0-9a-f]{8} ', done.stderr)
-
-
 def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:
-    """Without a package index it ends with one clear line, and the next call starts anew."""
-    tree = _copy(tmp_path, 'scripts/env.sh', 'requirements.txt')
-    done = _source(tree, PYTHON=sys.executable, PIP_CONFIG_FILE=os.devnull,
+    """Without a package index it ends with one clear line, and the next call goes on."""
+    tree = _copy(tmp_path, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
+    done = _source(tree, PYTHON=sys.executable, PIP_CONFIG_FILE=os.devnull, PATH=WITHOUT_UV,
                    PIP_INDEX_URL='http://127.0.0.1:9/simple', PIP_NO_CACHE_DIR='1')
     assert done.returncode == 1
-    assert 'the package index cannot be reached' in done.stderr.splitlines()[-1]
+    assert 'uv, which installs packages, cannot be installed: check the network' \
+        in done.stderr.splitlines()[-1]
     assert not (tree / '.venv' / 'stamp').exists()
     assert (tree / '.venv' / 'COLCON_IGNORE').exists()
+
+
+def test_a_checkout_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    tree = _copy(tmp_path, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
+    # Not even root makes a folder where a file is.
+    (tree / '.venv').touch()
+    done = _source(tree, PYTHON=sys.executable)
+    assert done.returncode == 1 and done.stderr.count('\n') == 1
+    assert f'cannot write to {tree.resolve()}/.venv: copy the checkout' in done.stderr
+
+
+def test_ctrl_c_while_packages_are_installed_is_one_line(tmp_path: Path) -> None:
+    """As a terminal does: the whole group gets the signal."""
+    tree = _copy(tmp_path, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
+    uv = tmp_path / 'programs' / 'uv'
+    uv.parent.mkdir()
+    uv.write_text('#!/bin/sh\necho waiting >&2\nexec sleep 600\n')
+    uv.chmod(0o755)
+    with subprocess.Popen(
+            [tree / 'scripts' / 'make_venv.sh', tree / '.venv', sys.executable, 'wheels', 'none'],
+            env=os.environ | {'PATH': f'{uv.parent}:{os.environ["PATH"]}'}, text=True,
+            stderr=subprocess.PIPE, start_new_session=True) as process:
+        assert process.stderr is not None
+        while 'waiting' not in process.stderr.readline():
+            pass
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.stderr.read() == 'crgame: stopped; the next start goes on from here\n'
+    assert process.returncode == 130
+
+
+def test_help_needs_no_environment(tmp_path: Path) -> None:
+    """Neither packages nor a folder to write to, also through a link."""
+    tree = _copy(tmp_path / 'tree', 'scripts/env.sh', 'scripts/make_venv.sh', *PINS, 'run.sh',
+                 'test.sh', 'crgame')
+    (tree / 'crgame_ros').symlink_to(ROOT / 'crgame_ros')
+    (tree / 'msg_defs').symlink_to(ROOT / 'msg_defs')
+    environment = {'PATH': os.environ['PATH'], 'HOME': os.environ.get('HOME', '/')}
+    for name, said in (('run.sh', 'usage: run.sh'), ('crgame', 'usage: crgame'),
+                       ('test.sh', './test.sh --quick')):
+        link = tmp_path / f'link-{name}'
+        link.symlink_to(tree / name)
+        done = subprocess.run([link, '--help'], env=environment, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, '') and said in done.stdout, name
+    assert not (tree / '.venv').exists()
 
 
 def _examples() -> Iterator[tuple[Path, str]]:
@@ -413,6 +412,7 @@ def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:
     """From any directory, through a link, and by its name once env.sh has been sourced."""
     tree = _stamped(tmp_path / 'a tree')
     _copy(tree, 'crgame')
+    (tree / '.venv' / 'bin' / 'crgame').symlink_to('../../crgame')
     (tree / 'crgame_ros').symlink_to(ROOT / 'crgame_ros')
     (tmp_path / 'link').symlink_to(tree / 'crgame')
     # This interpreter, with the packages that it has.
@@ -423,7 +423,7 @@ def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:
     code = f'cd "{tmp_path}"; '
     for command in (f'"{tree}/crgame"', './link', 'crgame'):
         done = _source(tree, f'{code}{command} --help && {command} info no_such_bag')
-        assert 'convert   turn a recording into a CommonRoad scenario' in done.stdout, done
+        assert re.search('convert +turn a recording into a CommonRoad scenario', done.stdout), done
         assert (done.returncode, done.stderr) == (
             2, 'error: no_such_bag: no such file or folder; give a recording\n'), command
 

@@ -131,7 +131,7 @@ def test_errors_of_a_constructor_name_the_place(registry: ModelRegistry, file: s
     ('idm-package', 'commonroad_idm_planner', 'commonroad-idm-planner')])
 def test_planners_without_their_package_say_how_to_get_it(
         planner: str, module: str, package: str) -> None:
-    """On Python 3.12 pip leaves these out: one line, with the command that brings them."""
+    """One line, with the command that installs them."""
     done = subprocess.run(
         [sys.executable, '-c', f'import sys; sys.modules["{module}"] = None\n'
          'from crgame_ros.cli import main\n'
@@ -139,4 +139,4 @@ def test_planners_without_their_package_say_how_to_get_it(
         capture_output=True, text=True, cwd=ROOT, timeout=120)
     assert done.returncode == 2
     assert done.stderr.count('\n') == 1 and package in done.stderr
-    assert f'--ignore-requires-python -r {ROOT / "requirements.txt"}' in done.stderr
+    assert f'--ignore-requires-python -r {ROOT / "requirements-planners.txt"}' in done.stderr
