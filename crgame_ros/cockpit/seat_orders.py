@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.game.seat_documents import SeatDemand, SeatTenant
+from crgame_ros.game.seat_documents import SeatDemand, SeatOccupant
 
 # An order that is published while the simulation loads another game reaches nobody [s].
 AGAIN_S = 0.5
 GIVE_UP_S = 10.0
 
 Seats = Mapping[str, Mapping[str, str]]
-Tenants = Mapping[str, SeatTenant]
+Tenants = Mapping[str, SeatOccupant]
 
 
 @dataclass
@@ -73,7 +73,7 @@ class SeatOrders:
 
 
 def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
-           tenant: SeatTenant | None) -> bool:
+           tenant: SeatOccupant | None) -> bool:
     """Return whether a seat is as ordered."""
     if entry is None:
         return False
@@ -85,7 +85,7 @@ def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
     return not drives or (entry['driver'] == COCKPIT and tenant is None)
 
 
-def _is_in_vain(demand: SeatDemand, tenant: SeatTenant | None) -> bool:
+def _is_in_vain(demand: SeatDemand, tenant: SeatOccupant | None) -> bool:
     """Return whether somebody at another cockpit was quicker."""
     return demand.source == COCKPIT and demand.person is not None and tenant is not None \
         and tenant.here and tenant.person.id not in (demand.person.id, demand.displaced)

@@ -11,7 +11,7 @@ from typing import Any
 from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import SeatTenant
+from crgame_ros.game.seat_documents import SeatOccupant
 
 # So long the seat of somebody whose connection has broken is kept for them [s].
 KEEP_S = 60.0
@@ -40,11 +40,11 @@ class SeatTable:
 
     seats: dict[str, dict[str, str]] = field(default_factory=dict)
     held: dict[str, HeldSeat] = field(default_factory=dict)
-    tenants: dict[str, SeatTenant] = field(default_factory=dict)
+    tenants: dict[str, SeatOccupant] = field(default_factory=dict)
     absent_s: dict[str, float] = field(default_factory=dict)
 
     def update(self, seats: Mapping[str, Mapping[str, str]], awaited: Container[str] = (),
-               tenants: Mapping[str, SeatTenant] | None = None) -> list[HeldSeat]:
+               tenants: Mapping[str, SeatOccupant] | None = None) -> list[HeldSeat]:
         """
         Take what `/seats` says.
 

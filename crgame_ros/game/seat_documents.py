@@ -37,7 +37,7 @@ class SeatPerson:
 
 
 @dataclass(frozen=True)
-class SeatTenant:
+class SeatOccupant:
     """
     Who has a seat, or had it last.
 
@@ -93,7 +93,7 @@ class DrivingSpell:
     until_n: int | None = None
 
 
-def seat_entry(source: str, driver: str, tenant: SeatTenant | None) -> dict[str, Any]:
+def seat_entry(source: str, driver: str, tenant: SeatOccupant | None) -> dict[str, Any]:
     """Write what `/seats` says of a seat."""
     entry: dict[str, Any] = {'source': source, 'driver': driver}
     if tenant is not None:
@@ -101,14 +101,14 @@ def seat_entry(source: str, driver: str, tenant: SeatTenant | None) -> dict[str,
     return entry
 
 
-def parse_tenants(text: str) -> dict[str, SeatTenant]:
+def parse_tenants(text: str) -> dict[str, SeatOccupant]:
     """
     Read who has the seats from `/seats`.
 
     :raises InputError: if it is not what the contract says.
     """
     try:
-        return {str(name): SeatTenant(_person(entry['person']), entry['here'] is True,
+        return {str(name): SeatOccupant(_person(entry['person']), entry['here'] is True,
                                       entry['ready'] is True)
                 for name, entry in json.loads(text).items() if entry.get('person') is not None}
     except (*MALFORMED, InputError) as error:

@@ -13,8 +13,8 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.planner.crew import PlannerCrew, swapped_in
 from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.planner_manager import PlannerManager, swapped_in
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -55,7 +55,7 @@ class PlannerNode(Node):
         self._documents = DocumentCollector()
         self._game: GameDocument | None = None
         self._transform = RigidTransform(0.0, 0.0, 0.0)
-        self._crew: PlannerCrew | None = None
+        self._manager: PlannerManager | None = None
         self._events: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
         self._reader: RequestReader | None = None
         self._frames_skipped = False
@@ -96,9 +96,9 @@ class PlannerNode(Node):
     def _apply_events(self) -> None:
         """Bring the planner up to what events have done in the present run."""
         epoch, fired = self._events
-        if self._crew is None or self._game is None or epoch != self._game.epoch:
+        if self._manager is None or self._game is None or epoch != self._game.epoch:
             return
-        for text in self._crew.apply([event.name for event in fired]):
+        for text in self._manager.apply([event.name for event in fired]):
             self.get_logger().info(f'{self._vehicle_id}: {text} by an event')
 
     def _on_frame_skip(self, message: Bool) -> None:
@@ -116,7 +116,7 @@ class PlannerNode(Node):
             if scenario is not None:
                 self._prepare(scenario)
         except CrgameError as error:
-            self._crew = None
+            self._manager = None
             self.get_logger().error(f'{self._vehicle_id}: {error}')
             return
         waiting, self._waiting = self._waiting, None
@@ -130,7 +130,7 @@ class PlannerNode(Node):
         self._time = RunTime(max(USUAL_NS, 3 * game.scheduler.time_step_ns))
         av = game.av(self._vehicle_id)
         if av is None:
-            self._crew = None
+            self._manager = None
             self.get_logger().warning(f'{self._vehicle_id} takes no part in this game: waiting')
             return
         objects = {item.id: item for item in scenario.objects}
@@ -146,21 +146,21 @@ class PlannerNode(Node):
             game.scheduler.time_step_s, game.scheduler.k0, game.seed, game.drivability.road)
         for planner in (name, *swapped_in(self._vehicle_id, game.events)):
             self._code.check(planner, 'planner')
-        crew = PlannerCrew(context, name, options, game.events, time.perf_counter)
+        manager = PlannerManager(context, name, options, game.events, time.perf_counter)
         self._reader = RequestReader(self._vehicle_id, objects, game.scheduler)
-        self._crew, self._game = crew, game
+        self._manager, self._game = manager, game
         self._transform = av.transform
         gc.collect()
         gc.freeze()
         gc.disable()
-        if crew.failure is None:
+        if manager.failure is None:
             self.get_logger().info(f'{self._vehicle_id}: planner {name} is ready')
         else:
-            self.get_logger().error(f'{self._vehicle_id}: planner {name}: {crew.failure}')
+            self.get_logger().error(f'{self._vehicle_id}: planner {name}: {manager.failure}')
         self._apply_events()
 
     def _on_request(self, message: JointTrajectory) -> None:
-        if self._crew is None or self._reader is None or self._game is None:
+        if self._manager is None or self._reader is None or self._game is None:
             self._waiting = message
             return
         try:
@@ -178,29 +178,29 @@ class PlannerNode(Node):
             # A recording that is played once more: the planner knows nothing of it yet.
             self._prepare(self._scenario)
         self._diagnostics.now_ns = request.stamp_ns
-        plan = self._crew.plan(request)
+        plan = self._manager.plan(request)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)
         self._message = SeriesMessage.for_series(series, self._message)
         self._plans.publish(self._message.fill(series))
         if not self._frames_skipped and self._paths.get_subscription_count():
             self._paths.publish(_path(plan, self._transform))
         self._report(request.k, plan)
-        if self._crew.statistics.plans % COLLECT_EVERY == 0:
+        if self._manager.statistics.plans % COLLECT_EVERY == 0:
             gc.collect()
 
     def _report(self, k: int, plan: Plan) -> None:
         """Tell of a fallback at once, and of the counts every ten requests."""
-        assert self._crew is not None
-        statistics = self._crew.statistics
+        assert self._manager is not None
+        statistics = self._manager.statistics
         if not plan.fallback and statistics.plans % 10:
             return
         self._diagnostics.publish(
             f'planner_node: {self._vehicle_id}',
             DiagnosticStatus.WARN if plan.fallback else DiagnosticStatus.OK,
-            f'braking: {self._crew.last_reason}' if plan.fallback else 'planning',
+            f'braking: {self._manager.last_reason}' if plan.fallback else 'planning',
             {'k': k, 'plans': statistics.plans, 'fallbacks': statistics.fallbacks,
              'plan_time_ms': f'{statistics.durations_s[-1] * 1e3:.3f}',
-             'planner': self._crew.name})
+             'planner': self._manager.name})
 
 
 def _path(plan: Plan, transform: RigidTransform) -> Path:

@@ -85,7 +85,7 @@ class SimNode(Node):
                 f'(n = {simulation.n})')
             if outcome is not Outcome.RESET and self._control.stays and not stop.requested:
                 self.get_logger().info('the page can begin another run; Ctrl-C ends everything')
-                outcome = run.linger()
+                outcome = run.hold_after_end()
             run.destroy()
             if outcome is not Outcome.RESET:
                 return

@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.messages.cdr import message_header
 from crgame_ros.messages.contract import load_contract, Qos
 from crgame_ros.ros.diagnostics import Diagnostics
-from crgame_ros.ros.intake import Intake, message_type, Refusals
+from crgame_ros.ros.message_validator import message_type, MessageValidator, Refusals
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
 from rclpy.node import Node
@@ -134,7 +134,7 @@ class Endpoints:
                      vehicle_id: str = '') -> Subscription:
         """Create a subscription whose callback an executor runs."""
         topic = self._contract.topic(name)
-        intake = Intake(topic, topic.name_for(vehicle_id))
+        intake = MessageValidator(topic, topic.name_for(vehicle_id))
 
         def read(data: bytes) -> None:
             try:
@@ -163,7 +163,7 @@ class Endpoints:
         profile = qos_profile(topic.qos)
         if depth is not None:
             profile.depth = depth
-        intake = Intake(topic, topic.name_for(vehicle_id))
+        intake = MessageValidator(topic, topic.name_for(vehicle_id))
         subscription = self._node.create_subscription(
             message_type(topic.type_name), relative(intake.name), _unused, profile,
             callback_group=self._polled_group, raw=True)

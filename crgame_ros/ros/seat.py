@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import SeatTenant
+from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.ros.endpoints import PolledSubscription
 from crgame_ros.ros.ros_messages import from_joy
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
@@ -52,7 +52,7 @@ class Seat:
         # Whether an AV is driven as it was while somebody had taken it over.
         self.taken_over_again = False
         # Whom a cockpit has put into the seat.
-        self.tenant: SeatTenant | None = None
+        self.tenant: SeatOccupant | None = None
         self._where = f'/{vehicle_id}/driver_command'
         self._watchdog = SeatWatchdog()
         self._last = RELEASED
@@ -97,7 +97,7 @@ class Seat:
         self.source = source
         self._heard_ns = now_ns
 
-    def forgive(self, now_ns: int) -> None:
+    def restart_timeout(self, now_ns: int) -> None:
         """Count silence from now on: a pause is no loss; who was lost before it still is."""
         if self._heard_ns is not None and not self._watchdog.lost:
             self._heard_ns = now_ns

@@ -16,8 +16,8 @@ from crgame_ros.game.seat_documents import (
     parse_demand,
     seat_entry,
     SeatDemand,
+    SeatOccupant,
     SeatPerson,
-    SeatTenant,
     spells_document,
 )
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, SHARED_DEPTH
@@ -93,7 +93,7 @@ class Seats:
     def __init__(self, endpoints: Endpoints, setup: 'Setup', clock_offset_ns: int,
                  sources: MutableMapping[str, str],
                  recorded: 'RecordedInputs | None' = None,
-                 tenants: MutableMapping[str, SeatTenant] | None = None) -> None:
+                 tenants: MutableMapping[str, SeatOccupant] | None = None) -> None:
         drivers = {} if recorded is None else recorded.drivers
         self._intervals_s: list[float] = [] if recorded is None or recorded.intervals_s is None \
             else recorded.intervals_s.tolist()
@@ -232,7 +232,7 @@ class Seats:
         if taker is not None:
             same = seat.tenant is not None and seat.tenant.person.id == taker.id
             self._settle(seat, replace(seat.tenant, person=taker, here=True)
-                         if same and seat.tenant is not None else SeatTenant(taker))
+                         if same and seat.tenant is not None else SeatOccupant(taker))
 
     def _seat_person(self, seat: Seat, demand: SeatDemand) -> None:
         """Take what is said of the person in a seat."""
@@ -246,7 +246,7 @@ class Seats:
                 tenant, person=demand.person,
                 ready=tenant.ready if demand.ready is None else demand.ready))
 
-    def _settle(self, seat: Seat, tenant: SeatTenant) -> None:
+    def _settle(self, seat: Seat, tenant: SeatOccupant) -> None:
         seat.tenant = self._tenants[seat.id] = tenant
 
 

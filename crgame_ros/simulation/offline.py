@@ -14,8 +14,8 @@ from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
-from crgame_ros.planner.crew import PlannerCrew
 from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.planner_manager import PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.av_models import make_perception, published_states
@@ -142,7 +142,7 @@ class PlannerSeat:
             av.id, setup.loaded.scenario, av.planning_problem, av.vehicle, objects,
             setup.scheduler.time_step_s, setup.scheduler.k0, setup.game.seed,
             setup.game.drivability.road)
-        self.crew = PlannerCrew(
+        self.manager = PlannerManager(
             context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
         self.perception: Perception | None = None
         if av.spec.perception is not None:
@@ -154,7 +154,7 @@ class PlannerSeat:
 
     def proceed(self, result: StepResult) -> None:
         """Take in what a step has brought, and hand over what is due."""
-        self.crew.apply([event.name for event in result.fired])
+        self.manager.apply([event.name for event in result.fired])
         if self.id in result.requests:
             self.ask(result.requests[self.id])
         self.deliver()
@@ -164,7 +164,7 @@ class PlannerSeat:
         if self.perception is not None:
             request = self.perception.perceive(request)
             self._simulation.request_perceived(self.id, request)
-        plan = self.crew.plan(self._reader.read(request))
+        plan = self.manager.plan(self._reader.read(request))
         series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
         n = self._simulation.n
         self._due.append((n + (self._latency if n else 0), series))
@@ -177,7 +177,7 @@ class PlannerSeat:
     def record(self) -> PlannerRecord:
         """Sum up what the planner did."""
         av = next(av for av in self._simulation.avs if av.setup.id == self.id)
-        return PlannerRecord(av.counters, self.crew.statistics,
+        return PlannerRecord(av.counters, self.manager.statistics,
                              None if av.execution is None else av.execution.worst,
                              None if av.route_lane is None else av.route_lane.worst)
 

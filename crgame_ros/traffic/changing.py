@@ -19,12 +19,18 @@ from crgame_ros.traffic.lane_change import (
     quintic,
     SHORTEST_CHANGE,
 )
+from crgame_ros.traffic.lane_change_intents import (
+    Destinations,
+    lane_change_intents,
+    Situations,
+    SLOWEST,
+    TOO_NEAR,
+)
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import LaneTable, project_on
 from crgame_ros.traffic.leaders import first_from, Followers, Ways
 from crgame_ros.traffic.placement import Entries, front_within, rear_within
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.wishes import Destinations, Situations, SLOWEST, TOO_NEAR, wishes
 import numpy as np
 from numpy.typing import NDArray
 
@@ -262,7 +268,7 @@ class LaneChanges:
         :param way: of the agents.
         """
         graph = self._graph
-        found = wishes(k, graph.table, self._to, agents.table, slots, at,
+        found = lane_change_intents(k, graph.table, self._to, agents.table, slots, at,
                        self._drivers.change_lanes, self._thoughts)
         if not len(found.slots):
             return

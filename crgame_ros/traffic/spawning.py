@@ -12,7 +12,6 @@ from crgame_ros.traffic.agents import Agents, NOBODY
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.drivers import DesiredSpeeds
 from crgame_ros.traffic.encounters import is_in_the_way
-from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import hold_before
 from crgame_ros.traffic.lane_cells import LaneCells
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
@@ -20,6 +19,7 @@ from crgame_ros.traffic.leaders import ahead, corridors, nearest, own_ways
 from crgame_ros.traffic.longitudinal import COASTING, Longitudinal
 from crgame_ros.traffic.placement import Bodies, place
 from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.stop_lines import StopLines
 from crgame_ros.traffic.world_view import with_agents
 import numpy as np
 
@@ -142,7 +142,7 @@ class Spawner:
     """
 
     def __init__(self, graph: LaneGraph, cells: LaneCells, routes: Routes, conflicts: Conflicts,
-                 speeds: Longitudinal, lines: HaltingLines, adopted: Sequence[Adopted],
+                 speeds: Longitudinal, lines: StopLines, adopted: Sequence[Adopted],
                  flow: float, desired: DesiredSpeeds, time_step_s: float,
                  generator: np.random.Generator) -> None:
         self._graph, self._routes, self._conflicts = graph, routes, conflicts

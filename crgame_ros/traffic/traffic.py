@@ -19,9 +19,9 @@ from crgame_ros.traffic.crossings import AT_LINE, Crossings
 from crgame_ros.traffic.drivers import DesiredSpeeds, Drivers
 from crgame_ros.traffic.encounters import brush
 from crgame_ros.traffic.exit_room import queues
-from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.junctions import arrivals, passages
 from crgame_ros.traffic.lane_cells import LaneCells
+from crgame_ros.traffic.lane_change_intents import Situations
 from crgame_ros.traffic.lane_graph import driving_side, FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.leaders import (
     ahead,
@@ -43,6 +43,7 @@ from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import leaving, Routes
 from crgame_ros.traffic.spawning import CAR, is_long, LARGE_CAR, slot_descriptions, Spawner, TRUCK
+from crgame_ros.traffic.stop_lines import StopLines
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.tightness import tight_lanes
 from crgame_ros.traffic.waiting import (
@@ -54,7 +55,6 @@ from crgame_ros.traffic.waiting import (
     TURNS_OFF,
     WAITS,
 )
-from crgame_ros.traffic.wishes import Situations
 from crgame_ros.traffic.world_view import Others, standing_entries, with_agents, WorldView
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +104,7 @@ class Traffic:
         self._routes = Routes(
             self._graph, np.where(self._conflicts.tapers() | for_cars, TAPER_COST, 0.0),
             for_trucks, side.keeps_left)
-        self._lines = HaltingLines(self._graph, scenario.lanelet_network, movements)
+        self._lines = StopLines(self._graph, scenario.lanelet_network, movements)
         self._followers = Followers(spec.model, spec.options, len(adopted) + self._capacity())
         self._longitudinal = Longitudinal(self._graph, self._routes, self._followers)
         self._crossings = Crossings(self._conflicts, CrossingRules(), time_step_s)

@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.ros.intake import message_type
+from crgame_ros.ros.message_validator import message_type
 from perception_recording import record_perceiving
 import pytest
 from rclpy.serialization import deserialize_message

@@ -8,7 +8,7 @@ from crgame_ros.cockpit.seat_table import KEEP_S, SeatTable
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_seats_document
-from crgame_ros.game.seat_documents import SeatDemand, SeatPerson, SeatTenant
+from crgame_ros.game.seat_documents import SeatDemand, SeatOccupant, SeatPerson
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 import pytest
 
@@ -72,8 +72,8 @@ def test_an_offer_is_declined_withdrawn_or_ends_with_who_was_to_get_it(table: Se
             table.accept('c2', 'hv0')
 
 
-def _driven(person: str = 'p1', here: bool = True) -> tuple[dict, dict[str, SeatTenant]]:
-    return _seats('cockpit'), {'hv0': SeatTenant(SeatPerson(person, 'Ada'), here)}
+def _driven(person: str = 'p1', here: bool = True) -> tuple[dict, dict[str, SeatOccupant]]:
+    return _seats('cockpit'), {'hv0': SeatOccupant(SeatPerson(person, 'Ada'), here)}
 
 
 def test_a_seat_is_kept_for_who_has_gone(table: SeatTable) -> None:

@@ -11,7 +11,7 @@ from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import parse_message
 from crgame_ros.game.documents import objects_document
-from crgame_ros.game.seat_documents import seat_entry, SeatPerson, SeatTenant
+from crgame_ros.game.seat_documents import seat_entry, SeatOccupant, SeatPerson
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
 from crgame_ros.ros.ros_messages import StateMessage
@@ -77,7 +77,7 @@ class Graph:
 
     async def seats(self, source: str, driver: str = SCRIPT, page: Client | None = None) -> None:
         """Say who drives hv0; the person at a page if there is one."""
-        tenant = None if page is None else SeatTenant(SeatPerson(page.person))
+        tenant = None if page is None else SeatOccupant(SeatPerson(page.person))
         await self.say('/seats', String(data=json.dumps({
             'hv0': seat_entry(source, driver, tenant),
             'av0': {'source': 'planner', 'driver': 'idm'}})))

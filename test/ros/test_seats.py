@@ -90,7 +90,7 @@ def _heard(table: Table, command: DriverCommand, source: str = GAME) -> None:
 def test_a_pause_is_no_loss(table: Table) -> None:
     """A pedal that is held goes on being held for as long after the pause as without one."""
     _heard(table, FULL)
-    table.human.forgive(5_000 * MS)
+    table.human.restart_timeout(5_000 * MS)
     assert table.drive(5_000, 5_190) == FULL
     assert table.human.losses == 0
 
@@ -103,7 +103,7 @@ def test_a_pause_gives_a_lost_driver_no_pedals_back(table: Table) -> None:
     # Ten single steps of ten cycles, each after a pause.
     for step in range(10):
         start_ms = 10_000 + 1_000 * step
-        table.human.forgive(start_ms * MS)
+        table.human.restart_timeout(start_ms * MS)
         for now_ms in range(start_ms, start_ms + 100, 10):
             command = table.human.command(now_ms * MS, 0.01, 20.0)
             assert command is not None and command.throttle == 0.0 and command.brake > 0.0

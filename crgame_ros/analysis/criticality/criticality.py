@@ -19,7 +19,7 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision,
     time_to_collision_accelerating,
 )
-from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
+from crgame_ros.analysis.criticality.crossed_ways import EncroachmentDetector, WayCrossed
 from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -168,7 +168,7 @@ class Criticality:
         self._paths = OwnPaths(roads, [
             frozenset() if problem is None else goal_lanelets(roads, problem)
             for problem in run.problems or (None,) * self.vehicles])
-        self._crossings = CrossedWays(self.vehicles, self._footprints.radii)
+        self._crossings = EncroachmentDetector(self.vehicles, self._footprints.radii)
         self._before: tuple[float, FloatArray] | None = None
         self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, []) for item in run.vehicles]
         self.n = -1

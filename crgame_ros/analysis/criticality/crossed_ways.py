@@ -49,7 +49,7 @@ class _Moment(NamedTuple):
     centers: FloatArray
 
 
-class CrossedWays:
+class EncroachmentDetector:
     """
     Follows footprints from tick to tick and finds who crosses whose way.
 

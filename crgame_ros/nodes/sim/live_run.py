@@ -163,7 +163,7 @@ class LiveRun:
             now_ns = time.monotonic_ns()
             self._controller.start(now_ns)
             self._controller.resume(now_ns, self._control.real_time_factor)
-            self._inputs.forgive(now_ns)
+            self._inputs.restart_timeout(now_ns)
             with self._watch:
                 outcome = self._loop()
             self._reason = self._reason or outcome.reason(self._stop.requested)
@@ -176,7 +176,7 @@ class LiveRun:
             self._state.tell('ended', self._reason)
             self._outputs.wait_until_received()
 
-    def linger(self) -> Outcome:
+    def hold_after_end(self) -> Outcome:
         """Show how the run has ended until it is begun anew, or everything is to end."""
         control = self._control
         control.over, control.stop_wanted = True, False
@@ -333,7 +333,7 @@ class LiveRun:
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
         self._watch.begin()
-        self._inputs.forgive(now_ns)
+        self._inputs.restart_timeout(now_ns)
 
     def _cycle(self) -> None:
         """Do the work of one cycle, from reading the inputs to publishing the state."""

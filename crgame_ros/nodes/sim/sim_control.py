@@ -10,7 +10,7 @@ from crgame_ros.driver.source import is_replay
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.game.game_file import load_game
-from crgame_ros.game.seat_documents import SeatTenant
+from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.number_parameters import declare_number
@@ -54,7 +54,7 @@ class SimControl:
         # How long until the run begins [s]; 0 unless everybody is ready and waits for it.
         self.countdown_s = 0
         self.seat_sources: dict[str, str] = {}
-        self.seat_tenants: dict[str, SeatTenant] = {}
+        self.seat_tenants: dict[str, SeatOccupant] = {}
         self._declare()
         # Read at every cycle, so kept beside the parameter.
         self.real_time_factor = float(self._value('real_time_factor'))

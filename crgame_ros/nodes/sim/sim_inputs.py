@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import SeatTenant
+from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.game.task_documents import parse_report, REPORT_TOPIC, TaskReport
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
@@ -45,7 +45,7 @@ class SimInputs:
     def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
                  seat_sources: MutableMapping[str, str],
                  recorded: 'RecordedInputs | None' = None,
-                 tenants: MutableMapping[str, SeatTenant] | None = None) -> None:
+                 tenants: MutableMapping[str, SeatOccupant] | None = None) -> None:
         self._node = node
         self._clock_offset_ns = clock_offset_ns
         endpoints = Endpoints(node)
@@ -72,10 +72,10 @@ class SimInputs:
             self._drivability = {human.id: endpoints.polled('/<v>/drivability', human.id)
                                  for human in setup.humans}
 
-    def forgive(self, now_ns: int) -> None:
+    def restart_timeout(self, now_ns: int) -> None:
         """Begin to count the silence of every driver now."""
         for seat in self.seats.all:
-            seat.forgive(now_ns)
+            seat.restart_timeout(now_ns)
 
     def choose(self, answers: Callable[[str, int], bool],
                awaits: Callable[[int], bool] | None) -> None:

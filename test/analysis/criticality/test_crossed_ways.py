@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """WayCrossed ways: the time between one leaving and the other entering the conflict area."""
 
-from crgame_ros.analysis.criticality.crossed_ways import CrossedWays, WayCrossed
+from crgame_ros.analysis.criticality.crossed_ways import EncroachmentDetector, WayCrossed
 from crgame_ros.geometry.outline import placed
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ def _crossings(starts: Array, velocities: Array, seconds: float = 12.0, dt: floa
     """Let boxes drive straight on, seen from a map that is turned."""
     rotation = np.array(((np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))))
     yaw = np.arctan2(velocities[:, 1], velocities[:, 0]) + turn
-    crossings = CrossedWays(watched, np.full(len(starts), RADIUS))
+    crossings = EncroachmentDetector(watched, np.full(len(starts), RADIUS))
     found = []
     for k in range(round(seconds / dt)):
         centers = (starts + k * dt * velocities) @ rotation + (500.0, -300.0)

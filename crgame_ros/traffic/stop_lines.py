@@ -40,7 +40,7 @@ REACTION = 0.1
 
 
 class LightTable(NamedTuple):
-    """Columns of `HaltingLines` for compiled loops."""
+    """Columns of `StopLines` for compiled loops."""
 
     at: FloatArray
     number: IntArray
@@ -48,7 +48,7 @@ class LightTable(NamedTuple):
     movement: IntArray
 
 
-class HaltingLines:
+class StopLines:
     """
     The stop lines and traffic lights of all lanes.
 

@@ -29,7 +29,7 @@ def message_type(type_name: str) -> Any:
     return getattr(importlib.import_module(f'{package}.{kind}'), name)
 
 
-class Intake:
+class MessageValidator:
     """
     Reads the messages of one topic.
 

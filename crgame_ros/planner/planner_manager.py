@@ -20,7 +20,7 @@ def swapped_in(vehicle_id: str, events: Sequence[EventSpec]) -> tuple[str, ...]:
                  if isinstance(event.action, PlannerSwap) and event.action.av == vehicle_id)
 
 
-class PlannerCrew:
+class PlannerManager:
     """
     Runs the planner in office, and changes it and its roads as events say.
 

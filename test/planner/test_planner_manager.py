@@ -9,9 +9,9 @@ from crgame_ros.errors import InputError, PlanningError
 from crgame_ros.game.events import EventSpec, PlannerSwap, SpeedLimit
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.crew import PlannerCrew
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_planner import initial_state
+from crgame_ros.planner.planner_manager import PlannerManager
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
@@ -52,28 +52,28 @@ def context() -> PlannerContext:
                           load_vehicle_parameters('bmw_320i'), {}, 0.1)
 
 
-def crew_of(context: PlannerContext, *events: EventSpec) -> PlannerCrew:
+def manager_of(context: PlannerContext, *events: EventSpec) -> PlannerManager:
     """Begin with witness a."""
-    return PlannerCrew(context, f'{__file__}:Witness', {'name_tag': 'a'}, events)
+    return PlannerManager(context, f'{__file__}:Witness', {'name_tag': 'a'}, events)
 
 
-def present(crew: PlannerCrew) -> tuple[str, list[float | None]]:
+def present(manager: PlannerManager) -> tuple[str, list[float | None]]:
     """Return who is in office, and which limits it was set up with."""
-    planner = crew.adapter.planner
+    planner = manager.adapter.planner
     return planner.name_tag, [round(limit, 3) for limit in planner.limits]
 
 
 def test_in_office_and_after_each_event(context: PlannerContext) -> None:
     """Whatever comes first, the planner in office knows the limit that holds."""
     town = round(TOWN, 3)
-    crew = crew_of(context, SLOW, SWAP, ELSEWHERE)
-    assert present(crew) == ('a', [town])
-    assert crew.apply(['slow']) == ['speed limit 5 m/s']
-    assert present(crew) == ('a', [town, 5.0])
-    assert crew.apply(['slow', 'elsewhere', 'swap']) == [f'planner {__file__}:Witness']
-    assert present(crew) == ('b', [town, 5.0])
-    assert crew.apply(['slow', 'elsewhere', 'swap']) == []
-    other = crew_of(context, SLOW, SWAP)
+    manager = manager_of(context, SLOW, SWAP, ELSEWHERE)
+    assert present(manager) == ('a', [town])
+    assert manager.apply(['slow']) == ['speed limit 5 m/s']
+    assert present(manager) == ('a', [town, 5.0])
+    assert manager.apply(['slow', 'elsewhere', 'swap']) == [f'planner {__file__}:Witness']
+    assert present(manager) == ('b', [town, 5.0])
+    assert manager.apply(['slow', 'elsewhere', 'swap']) == []
+    other = manager_of(context, SLOW, SWAP)
     # Set up before the run, once: the swap itself costs nothing.
     other.apply(['swap'])
     assert present(other) == ('b', [town])
@@ -85,24 +85,24 @@ def test_in_office_and_after_each_event(context: PlannerContext) -> None:
 
 def test_answers_of_all_planners_are_counted_together(context: PlannerContext) -> None:
     """A swap loses no count."""
-    crew = crew_of(context, SWAP)
+    manager = manager_of(context, SWAP)
     request = PlanRequest(0, 0, 0.1, initial_state(context))
-    crew.plan(request)
-    crew.apply(['swap'])
-    crew.plan(replace(request, stamp_ns=100_000_000, k=1))
-    assert (crew.statistics.plans, crew.statistics.fallbacks) == (2, 2)
-    assert crew.last_reason == 'none'
+    manager.plan(request)
+    manager.apply(['swap'])
+    manager.plan(replace(request, stamp_ns=100_000_000, k=1))
+    assert (manager.statistics.plans, manager.statistics.fallbacks) == (2, 2)
+    assert manager.last_reason == 'none'
 
 
 def test_failure_is_told(context: PlannerContext) -> None:
     """A newcomer that cannot be set up answers by braking, and says why."""
-    crew = crew_of(context, FAILING)
-    assert crew.failure is None
-    assert crew.apply(['failing']) == [f'planner {__file__}:Witness: setup failed: no way']
-    assert crew.plan(PlanRequest(0, 0, 0.1, initial_state(context))).fallback
+    manager = manager_of(context, FAILING)
+    assert manager.failure is None
+    assert manager.apply(['failing']) == [f'planner {__file__}:Witness: setup failed: no way']
+    assert manager.plan(PlanRequest(0, 0, 0.1, initial_state(context))).fallback
 
 
 def test_unknown_planner_is_refused_before_the_run(context: PlannerContext) -> None:
     """Not in the middle of it."""
     with pytest.raises(InputError, match='there is no planner "ghost"'):
-        crew_of(context, EventSpec('swap', PlannerSwap('av0', 'ghost')))
+        manager_of(context, EventSpec('swap', PlannerSwap('av0', 'ghost')))

@@ -68,7 +68,7 @@ class Situations(NamedTuple):
     halt: FloatArray
 
 
-class Wishes(NamedTuple):
+class LaneChangeIntents(NamedTuple):
     """
     Agents (N) that want into the lane beside them, those on the left first.
 
@@ -87,8 +87,9 @@ class Wishes(NamedTuple):
 
 
 @compiled
-def wishes(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
-           at: Situations, allowed: BoolArray, thoughts: int) -> Wishes:
+def lane_change_intents(
+        k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
+        at: Situations, allowed: BoolArray, thoughts: int) -> LaneChangeIntents:
     """
     List who may want to change to which side.
 
@@ -97,13 +98,14 @@ def wishes(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots
     """
     free = np.empty(len(slots), np.bool_)
     room = 2 * len(slots)
-    found = Wishes(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
-                   np.empty(room), np.empty(room))
+    found = LaneChangeIntents(
+        np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
+        np.empty(room), np.empty(room))
     for i, slot in enumerate(slots):
         free[i] = allowed[slot] and _is_free(k, lanes, to, agents, slot, at, i)
     left = _list(k, lanes, to, agents, slots, at, thoughts, free, 1, found, 0)
     count = _list(k, lanes, to, agents, slots, at, thoughts, free, -1, found, left)
-    return Wishes(found.slots[:count], found.side[:count], found.lane[:count],
+    return LaneChangeIntents(found.slots[:count], found.side[:count], found.lane[:count],
                   found.urgency[:count], found.room[:count])
 
 
@@ -148,7 +150,7 @@ def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slo
 
 @bare
 def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
-          at: Situations, thoughts: int, free: BoolArray, side: int, found: Wishes,
+          at: Situations, thoughts: int, free: BoolArray, side: int, found: LaneChangeIntents,
           used: int) -> int:
     """Write who may want to change to a side, from a row on; return where that ends."""
     for i, slot in enumerate(slots):

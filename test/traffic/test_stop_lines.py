@@ -18,9 +18,9 @@ from commonroad.scenario.traffic_light import (
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.road_network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.halting_lines import HaltingLines
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.leaders import Ways
+from crgame_ros.traffic.stop_lines import StopLines
 import numpy as np
 import pytest
 import shapely
@@ -142,7 +142,7 @@ def light(number: int, direction: TrafficLightDirection | None = None) -> Traffi
 def halt(graph: LaneGraph, scenario: Scenario, shown: dict[int, str], ids: list[int],
          speed: float = 8.0, stops: bool = False) -> float:
     """Return where an agent of 4 m, with its centre at x = 50 on lanelets by id, has to halt."""
-    lines = HaltingLines(graph, scenario.lanelet_network)
+    lines = StopLines(graph, scenario.lanelet_network)
     lines.show(shown)
     lanes = np.array([[graph.index[i] for i in ids]])
     offset = np.cumsum(np.concatenate(([[-50.0]], graph.length[lanes[:, :-1]]), axis=1), axis=1)
@@ -235,7 +235,7 @@ def test_a_light_far_before_a_junction_is_not_of_it() -> None:
     roads.find_lanelet_by_id(1).predecessor = [9]
     scenario.add_objects(light(51, TrafficLightDirection.LEFT), {9})
     graph = LaneGraph(RoadNetwork(roads))
-    lines = HaltingLines(graph, roads)
+    lines = StopLines(graph, roads)
     decided = lines.movement[lines.number[[graph.index[9], graph.index[1]]]]
     assert not decided[0].any()
     assert sorted(decided[1].tolist()) == [0, 0, 0, 1, 1, 2, 2, 3, 3]
