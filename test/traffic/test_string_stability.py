@@ -88,7 +88,7 @@ def slopes(model: AdaptiveCruise) -> tuple[float, float, float]:
 
 
 def test_the_law_has_the_slopes_of_fs_3() -> None:
-    """a = (dv + lambda (gap - T v - s0)) / h."""
+    """The law is a = (dv + lambda (gap - T v - s0)) / h."""
     assert slopes(AdaptiveCruise(h=2.0)) == pytest.approx(
         (-(1.0 + 0.4 * 1.5) / 2.0, 0.4 / 2.0, 1.0 / 2.0))
 
