@@ -31,7 +31,7 @@ else:
         return found
 
 __all__ = [
-    '__version__', 'Computing', 'CrgameError', 'evaluate', 'EvaluationPlan', 'export', 'Game',
+    'Computing', 'CrgameError', 'evaluate', 'EvaluationPlan', 'export', 'Game',
     'InputError', 'load_game', 'measure', 'Plan', 'Planner', 'PlannerContext', 'PlanningError',
     'PlanRequest', 'read_run', 'replay', 'report', 'run', 'Run', 'scenarios_directory']
 # The module of each name, within this package.

@@ -217,6 +217,7 @@ def test_the_end_of_the_program_is_no_alarm(page: LivePage) -> None:
     assert launcher.wait() == 0, launcher.text
 
 
+@pytest.mark.exhaustive
 def test_each_run_has_its_own_files(graph: Graph) -> None:
     """Bag, scenario, timing report and game of each, and nothing of another."""
     folders = run_folders(graph.launcher.out)

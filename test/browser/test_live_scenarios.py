@@ -89,6 +89,7 @@ def test_bad_files_are_refused_in_words(page: LivePage, tmp_path: Path, content:
     """The panel says what is wrong, nothing is kept, and the run goes on."""
     path = tmp_path / f'{IMAGE}.xml'
     path.write_text(content)
+    page.run_async('await crgame.scenario.refresh();')
     before = page.run('return document.querySelectorAll("button.scenario").length')
     choose_file(page, path)
     shown = page.wait("""[...document.querySelectorAll('#panel-scenario .field-error')]

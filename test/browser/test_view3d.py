@@ -377,7 +377,7 @@ def test_without_the_library_the_map_works_and_a_line_says_so(
         cockpit: Served, browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing else fails: the page has its map, and no error but the file that is not there."""
     with served(RunBackend(cockpit.backend.run)) as other:
-        monkeypatch.setattr(page_files, 'find_library', lambda: None)
+        monkeypatch.setattr(page_files, 'find_libraries', lambda: None)
         browser.open(other.address)
         browser.wait('crgame.ready && crgame.store.scene && crgame.world.stats.frames > 0')
         # Viewpoints can be chosen where there is a view: on the map one button opens it.

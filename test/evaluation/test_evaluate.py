@@ -124,6 +124,7 @@ def expected(undisturbed: Evaluation) -> list[list[dict[str, Any]]]:
     return undisturbed.tables()
 
 
+@pytest.mark.exhaustive
 def test_tables_have_a_row_for_each_cell(expected: list[list[dict[str, Any]]]) -> None:
     cells, vehicles = expected
     assert [row['seed'] for row in sorted(cells, key=lambda row: row['seed'])] == [*range(CELLS)]
@@ -230,6 +231,7 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path) -> None:
     assert 'Traceback' not in told
 
 
+@pytest.mark.exhaustive
 def test_a_cell_is_run_again_and_reported(tmp_path: Path, undisturbed: Evaluation) -> None:
     """From the files of the evaluation alone, wherever it lies now."""
     shutil.copytree(undisturbed.out, tmp_path / 'elsewhere')

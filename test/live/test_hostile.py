@@ -197,6 +197,7 @@ def test_a_flood_takes_nobodys_place(run: Run) -> None:
     _whole(run, pids)
 
 
+@pytest.mark.exhaustive
 def test_the_run_has_its_files(run: Run) -> None:
     """After all that: bag, scenario, timing and game."""
     launcher, peer = run

@@ -36,6 +36,7 @@ def test_two_graphs_in_one_domain_do_not_touch_each_other(tmp_path: Path) -> Non
         _finished(two)
 
 
+@pytest.mark.exhaustive
 def test_a_second_simulation_in_a_namespace_is_refused(tmp_path: Path) -> None:
     """By the launcher before it starts a node; by a sim_node that is started by hand."""
     game = write_steady_game(tmp_path)
