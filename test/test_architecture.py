@@ -39,6 +39,7 @@ sys.exit(failed)
 """
 
 
+@pytest.mark.slow
 def test_every_folder_imports_from_those_above_it_alone() -> None:
     place = {folder: i for i, folder in enumerate(architecture.FOLDERS)}
     wrong = [line for (folder, other), lines in architecture.imports().items()
@@ -65,6 +66,7 @@ def _import_without_ros(*modules: str) -> 'subprocess.CompletedProcess[str]':
                           capture_output=True, text=True)
 
 
+@pytest.mark.slow
 def test_the_core_runs_without_ros(core: list[str]) -> None:
     """Every module of the core imports where rclpy and all messages are blocked."""
     assert len(core) > 20
@@ -72,6 +74,7 @@ def test_the_core_runs_without_ros(core: list[str]) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_no_function_of_the_core_imports_ros(core: list[str]) -> None:
     """Imports within functions count, too."""
     lower = architecture.FOLDERS[:architecture.FOLDERS.index('ros')]
@@ -92,6 +95,7 @@ def test_blocked_imports_fail() -> None:
     assert _import_without_ros('rclpy', 'sensor_msgs.msg').returncode == 2
 
 
+@pytest.mark.slow
 def test_list_and_picture_are_up_to_date() -> None:
     done = subprocess.run([sys.executable, ROOT / 'scripts' / 'architecture.py', '--check'],
                           capture_output=True, text=True)

@@ -36,6 +36,7 @@ def refusal(command: str, out: Path, full: bool = False) -> str:
     return told[0]
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
@@ -46,6 +47,7 @@ def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
     assert not out.exists() or not any(out.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.skipif(shutil.which('mount') is None, reason='no mount')
 @pytest.mark.parametrize('command', COMMANDS)
@@ -64,6 +66,7 @@ def test_a_file_system_without_room(command: str, tmp_path: Path) -> None:
         subprocess.run(['umount', str(place)], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('command', COMMANDS)
 @pytest.mark.parametrize('name', ['file', 'file/below', 'file.xml', 'folder.xml'])

@@ -90,6 +90,7 @@ def _manifest() -> 'etree._Element':
     return etree.parse(ROOT / 'package.xml').getroot()
 
 
+@pytest.mark.slow
 def test_the_metadata_names_what_is_imported(imported: set[str]) -> None:
     """One line for each third-party import, and none that nothing imports."""
     third_party = {name for name in imported if not ROS.fullmatch(name)}.difference(

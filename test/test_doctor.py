@@ -174,6 +174,7 @@ def test_priority_is_given_back() -> None:
     assert (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) == before
 
 
+@pytest.mark.slow
 def test_two_processes_discover_each_other() -> None:
     """A message crosses between two real processes, and neither listens beyond loopback."""
     discovery, ports = check_discovery()
@@ -186,6 +187,7 @@ def test_two_processes_discover_each_other() -> None:
     assert (ports.status, ports.detail) == ('ok', 'DDS listens at loopback only')
 
 
+@pytest.mark.slow
 def test_ports_beyond_loopback_fail(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A profile without restrictions is found by the sockets it opens."""
     profile = tmp_path / 'open.xml'

@@ -37,6 +37,7 @@ def test_ruff() -> None:
     _run('ruff', 'check', '--no-cache', *map(str, _sources('.py')))
 
 
+@pytest.mark.slow
 def test_mypy() -> None:
     """Everything in the package is annotated, and consistently so (pyproject.toml)."""
     _run('mypy', '--cache-dir', str(ROOT / 'build' / '.mypy_cache'))

@@ -90,6 +90,7 @@ def _pins(name: str) -> dict[str, str]:
                          if '==' in line and not line.startswith('#'))}
 
 
+@pytest.mark.slow
 def test_data_files_are_installed_where_ros_looks(prefix: Path) -> None:
     """The marker, the manifest and every data file are under share/, equal to the source's."""
     share = prefix / 'share' / 'crgame_ros'
@@ -130,6 +131,7 @@ def test_ros2_run_finds_executables(prefix: Path) -> None:
     assert (done.returncode, done.stdout) == (3, 'a b|--ros-args|')
 
 
+@pytest.mark.slow
 def test_only_traffic_waits_for_the_compiler() -> None:
     """Other nodes, and a run without agents, don't load numba: 0.4 s and 60 MB each."""
     others = [name for name in NODES if name != 'traffic_node']
@@ -207,6 +209,7 @@ def test_what_developers_have_is_what_users_have() -> None:
     assert {name: pins.get(name) for name in of_all} == of_all
 
 
+@pytest.mark.slow
 def test_manifest_names_what_the_package_imports() -> None:
     """package.xml has the version, the build type, and every ROS package that is imported."""
     manifest = etree.parse(ROOT / 'package.xml').getroot()
@@ -332,6 +335,7 @@ def test_env_makes_another_one_beside_an_environment_of_another_python(tmp_path:
         assert done.stdout == f'{tree}/{name}/bin/python\n', done.stderr
 
 
+@pytest.mark.exhaustive
 def test_env_says_that_the_index_is_out_of_reach(tmp_path: Path) -> None:
     """Without a package index it ends with one clear line, and the next call goes on."""
     tree = _copy(tmp_path, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
@@ -408,6 +412,7 @@ def test_examples_of_crgame_are_true() -> None:
         assert callable(_build_parser(words[0]).parse_args(words).command), f'{page}: {line}'
 
 
+@pytest.mark.slow
 def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:
     """From any directory, through a link, and by its name once env.sh has been sourced."""
     tree = _stamped(tmp_path / 'a tree')

@@ -35,6 +35,7 @@ def npm() -> None:
         pytest.skip('the libraries are not fetched: npm is missing')
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('npm')
 def test_npm_fetches_what_browsers_need_once(nowhere: Path) -> None:
     """The two scripts and the licence, nothing left beside them, and not again."""

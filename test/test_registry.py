@@ -124,6 +124,7 @@ def test_errors_of_a_constructor_name_the_place(registry: ModelRegistry, file: s
     assert str(caught.value) == 'avs[0].tracker: options of straight: "push" is 9.0; give less'
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize(('planner', 'module', 'package'), [
     ('reactive', 'commonroad_rp', 'commonroad-reactive-planner'),

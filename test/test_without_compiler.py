@@ -72,6 +72,7 @@ def test_monitor_judges_the_road() -> None:
     assert verdicts == [False, False, True, True]
 
 
+@pytest.mark.slow
 def test_offline_run_with_idm() -> None:
     """Every one of the 20 ticks of 2 s is planned, and both cars start on the road."""
     done = run(RUN)
@@ -82,6 +83,7 @@ def test_offline_run_with_idm() -> None:
     assert off_road == [False, False]
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('planner', ['reactive', 'reactive-package', 'idm-package'])
 def test_planners_that_need_it_say_so(planner: str, project_root: Path, tmp_path: Path) -> None:

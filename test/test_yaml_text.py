@@ -37,6 +37,7 @@ HOSTILE = {
     'large': '#' * (40 << 20)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('kind', READERS)
 def test_hostile_yaml_is_refused_in_one_line_by_all_who_read_yaml(
         kind: str, tmp_path: Path) -> None:

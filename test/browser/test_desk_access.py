@@ -68,6 +68,7 @@ def test_the_experimenters_page(new_browser: OpenBrowser, tmp_path: Path, size: 
     assert not found, '\n'.join(found)
 
 
+@pytest.mark.exhaustive
 def test_what_cannot_be_read_is_found(browser: Browser, tmp_path: Path) -> None:
     page = tmp_path / 'grey.html'
     page.write_text('<!DOCTYPE html><html lang="en"><title>grey</title><main><h1>Grey</h1>'

@@ -171,6 +171,7 @@ def test_nothing_is_lost_or_asked_twice_after_a_kill_and_a_reload(browser: Brows
         assert shown['taken_s'] > 0.0
 
 
+@pytest.mark.exhaustive
 def test_a_second_tab_and_a_double_click_do_nothing_twice(browser: Browser,
                                                           tmp_path: Path) -> None:
     """The tab that was opened last is used; the first one takes over when asked to."""

@@ -172,6 +172,7 @@ def test_reset_begins_anew(page: LivePage) -> None:
     assert graph.peer.games[-1].epoch == begin + 1
 
 
+@pytest.mark.exhaustive
 def test_a_planner_is_stopped_and_goes_on(page: LivePage) -> None:
     """By the switch beside its numbers."""
     page.tab('timing')
@@ -191,6 +192,7 @@ def trigger(page: LivePage, label: str) -> None:
     page.click(f'button[aria-label="Trigger {label}"]')
 
 
+@pytest.mark.exhaustive
 def test_a_trigger_lets_the_pedestrian_go(new_run: LivePage) -> None:
     """He stands as drawn until the button is pressed, and walks across the road then."""
     page = new_run

@@ -24,6 +24,8 @@ from lxml import etree
 import pytest
 import yaml
 
+pytestmark = pytest.mark.exhaustive
+
 CUT_IN, TRAFFIC = 'ZAM_CutIn-1_1_T-1', 'ZAM_Intersection-1_1_T-1'
 SCHEMA = Path(commonroad.__file__).parent.joinpath(
     'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')

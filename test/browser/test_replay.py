@@ -133,6 +133,7 @@ def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunLog)
     np.testing.assert_array_equal(after['vehicles'][:, :8], log.vehicle_states[290])
 
 
+@pytest.mark.exhaustive
 def test_states_between_the_ticks(page: Browser, first_run: OfflineResult) -> None:
     """At a simulation step the state is exact, and half way between two in their middle."""
     frame = seek(page, 1234 * 0.01)
@@ -158,6 +159,7 @@ def test_steps_land_on_ticks(page: Browser, log: RunLog) -> None:
         '4.80 / 32.00 s   k 48'
 
 
+@pytest.mark.exhaustive
 def test_slider_is_dragged_and_steered_by_keys(page: Browser, log: RunLog) -> None:
     """A drag to the middle and back shows each place; the slider tells where it is."""
     slider = page.driver.find_element(By.ID, 'timeline-slider')
@@ -232,6 +234,7 @@ def test_events_are_jumped_to(page: Browser) -> None:
     page.wait('crgame.replay.n === 800')
 
 
+@pytest.mark.exhaustive
 def test_documents_follow_the_time_back_too(page: Browser) -> None:
     """Signals, fired events, alarms, plans and the status are those of the time shown."""
     def documents() -> Any:
@@ -284,6 +287,7 @@ def test_another_run_of_the_recording(page: Browser, bag: Path) -> None:
     assert page.run('return crgame.store.scene.benchmark_id') == 'ZAM_ParkedCars-1_1_T-1'
 
 
+@pytest.mark.exhaustive
 def test_criticality_is_measured_and_shown_at_any_time(page: Browser, log: RunLog) -> None:
     """The panel has the smallest distance now and so far, as measured from the bag."""
     found: dict[int, tuple[float, str]] = {}

@@ -76,6 +76,7 @@ def test_plots_are_drawn_and_nothing_is_asked_for(shown: Browser) -> None:
     assert broken == 0 and shown.run('return document.images.length') >= 4
 
 
+@pytest.mark.exhaustive
 def test_a_worst_moment_leads_to_its_frame(shown: Browser) -> None:
     """A click shows the picture, marks it, and marks the time in the plots of the run."""
     _look_at_all(shown)
@@ -96,6 +97,7 @@ def test_a_worst_moment_leads_to_its_frame(shown: Browser) -> None:
     assert [time_s, time_s] in marks
 
 
+@pytest.mark.exhaustive
 def test_all_plots_of_a_run_show_the_same_time(shown: Browser) -> None:
     """Zooming into one zooms the others."""
     _look_at_all(shown)
@@ -139,6 +141,7 @@ def _contrast(first: str, second: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
+@pytest.mark.exhaustive
 def test_it_prints(shown: Browser) -> None:
     """Every plot is on paper, though nobody has scrolled to it; as light as paper."""
     shown.prefer('dark')

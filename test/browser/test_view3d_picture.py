@@ -127,6 +127,7 @@ def test_wheels_of_others_are_turned_as_they_drive(
         assert steering == pytest.approx(math.atan(wheelbase * 0.1 / speed), abs=1e-9)
 
 
+@pytest.mark.exhaustive
 def test_the_view_is_saved_as_it_is_seen(page: Browser, tmp_path: Path) -> None:
     """Though nothing has moved since its last picture: by the button, as PNG with mirrors."""
     page.driver.execute_cdp_cmd('Browser.setDownloadBehavior', {
@@ -155,6 +156,7 @@ def test_the_view_is_saved_as_it_is_seen(page: Browser, tmp_path: Path) -> None:
     assert page.console_errors() == []
 
 
+@pytest.mark.exhaustive
 def test_the_view_shows_that_it_has_the_focus_and_says_what_is_around(page: Browser) -> None:
     """As the map does: with a ring, and the words about those around as its description."""
     # Focus is seen in a page that has it.

@@ -122,6 +122,7 @@ def test_gains_beyond_the_table_are_held() -> None:
     assert tracker.gain(-7.0) == pytest.approx(np.mean((tracker.gain(6.0), tracker.gain(8.0)), 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('speed', 'curvature', 'bound', 'settled'), [
     (5.0, lambda s: 0.0, 1e-9, 1e-9), (15.0, lambda s: 0.0, 1e-9, 1e-9),
     (30.0, lambda s: 0.0, 1e-9, 1e-9),

@@ -55,6 +55,7 @@ def states(*rows: tuple[float, ...]) -> ObjectStates:
     return ObjectStates(table[:, :3], table[:, 3:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('first', 'second'),
                          itertools.product(SHAPES, SHAPES), ids='-'.join)
 @pytest.mark.parametrize('offset', [(0.0, 0.0), (5.6e6, 3.2e5)], ids=['local', 'projected'])
@@ -83,6 +84,7 @@ def test_against_shapely(first: str, second: str, offset: tuple[float, float]) -
     assert seen == {True, False}
 
 
+@pytest.mark.slow
 def test_many_objects_at_once_against_shapely() -> None:
     """57 objects of all shapes and 3 vehicles: every index is that of shapely, 200 times."""
     random = np.random.default_rng(5)

@@ -77,6 +77,7 @@ def cells(process: CellProcess) -> dict[str, Cell]:
     return {cell.planner: cell for cell in make_grid(plan, ContentStore(folder / 'files'))}
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize(('kind', 'status', 'reason'), [
     ('Dividing', 'error', 'its planner failed in 5 of 5 plans: ZeroDivisionError'),

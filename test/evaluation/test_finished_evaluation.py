@@ -11,6 +11,7 @@ GAME = crgame_ros.scenarios_directory() / 'cut_in.yaml'
 PLAN = {'games': [str(GAME)], 'planners': ['constant-velocity'], 'seeds': 2, 'duration': 0.5}
 
 
+@pytest.mark.slow
 def test_cells_are_runs_and_have_scores(tmp_path: Path) -> None:
     """States are those of `crgame_ros.run`; what is finished is not computed again."""
     found = crgame_ros.evaluate(PLAN, tmp_path / 'out', computing=crgame_ros.Computing())

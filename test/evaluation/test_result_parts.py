@@ -103,6 +103,7 @@ def test_what_is_not_wanted_is_put_away_and_comes_back(tmp_path: Path) -> None:
     assert seeds(tmp_path / EARLIER) == [3]
 
 
+@pytest.mark.slow
 def test_a_summary_knows_of_cells_that_are_only_in_the_journal(tmp_path: Path) -> None:
     subprocess.run([sys.executable, '-c', FILL, tmp_path, Path(__file__).parent])
     parts = EvaluatedParts(tmp_path)

@@ -36,6 +36,7 @@ def episode(env: DrivingEnv, seed: int, steps: int) -> list[tuple[object, ...]]:
     return drive
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('game', ['cut_in', 'dense_merge', 'fog'])
 def test_equal_seeds_give_equal_episodes_and_others_do_not(game: str) -> None:
     env = DrivingEnv(game=game, vary={'speed': 2.0})
@@ -75,6 +76,7 @@ def test_a_policy_drives_in_a_run_as_it_did_in_the_environment(seat: str) -> Non
     assert np.abs(np.array(states) - run)[:, :, :4].max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('game', 'seat'), [
     ('two_avs', 'hv0'), ('parked_cars', 'av0'), ('occluded_pedestrian', 'hv0'),
     ('dense_merge', 'av0')])

@@ -23,17 +23,20 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings('error')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('game', shipped_games())
 def test_gymnasium_accepts_every_environment(game: str) -> None:
     # The checker begins a dozen episodes: they share a placement of traffic.
     check_env(gymnasium.make(environment_id(game), worlds=1).unwrapped, skip_render_check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('game', shipped_games())
 def test_pettingzoo_accepts_every_game_with_all_its_seats(game: str) -> None:
     parallel_api_test(ParallelDrivingEnv(game=game, duration=1.0, worlds=1), num_cycles=12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('keywords', [
     {'seat': 'hv0'}, {'seat': 'hv0', 'action': 'pedals'}, {'action': 'pedals'},
     {'observation': {'parts': ['lidar', 'state'], 'rays': 8}}, {'ticks': 5},
@@ -70,6 +73,7 @@ def test_wrong_keywords_are_refused_in_a_line(keywords: dict[str, object], said:
         DrivingEnv(**keywords)
 
 
+@pytest.mark.slow
 def test_games_together_are_the_same_as_one_after_the_other() -> None:
     keywords = {'game': 'merge', 'duration': 4.0, 'vary': {'speed': 4.0, 'along': 20.0}}
     together = GamesTogether(3, **keywords)
@@ -106,6 +110,7 @@ def test_processes_give_the_same_episodes_as_one() -> None:
         apart.close()
 
 
+@pytest.mark.slow
 def test_the_tables_in_the_document_are_up_to_date() -> None:
     done = subprocess.run([sys.executable, ROOT / 'scripts' / 'make_gym_docs.py', '--check'],
                           env=os.environ | {'PYTHONPATH': str(ROOT)}, capture_output=True,

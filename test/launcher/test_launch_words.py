@@ -13,6 +13,7 @@ from crgame_ros.launcher.run_plan import plan_run
 import pytest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('game', 'needed'), [
     ('cut_in', {'planner_node_av0', 'driver_node_hv0'}),
     ('occluded_pedestrian', {'planner_node_av0', 'perception_node_av0'}),

@@ -91,6 +91,7 @@ def test_frames_carry_the_published_poses(graph: Graph, page: PageClient) -> Non
     assert compared > 20
 
 
+@pytest.mark.exhaustive
 def test_plan_frames_are_the_plans(graph: Graph, page: PageClient) -> None:
     """Same rear-axle poses as on /av0/plan, with the time after the request."""
     graph.peer.forget()
@@ -219,6 +220,7 @@ def test_run_control(graph: Graph, page: PageClient) -> None:
     wait_until(lambda: page.documents['status']['run'] == 'running', 'the run of it')
 
 
+@pytest.mark.exhaustive
 def test_planner_stop_and_go(graph: Graph, page: PageClient) -> None:
     """The AV's row says so, and its plans stop coming."""
     assert page.request('planner', av='av0', run=False)['ok']

@@ -40,6 +40,7 @@ def test_a_closed_terminal_is_an_end_in_good_order(tmp_path: Path) -> None:
         assert 'again: ./run.sh' in launcher.lines[-1]
 
 
+@pytest.mark.exhaustive
 def test_a_pipe_that_nobody_reads_any_more_ends_it_without_a_traceback(tmp_path: Path) -> None:
     """`./run.sh | head`: the first line is read, then the pipe is closed."""
     process = subprocess.Popen(

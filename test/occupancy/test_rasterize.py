@@ -89,6 +89,7 @@ def ends(loaded: LoadedScenario) -> shapely.Geometry:
     return shapely.union_all(lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', [
     'ZAM_ParkedCars-1_1_T-1', 'ZAM_Roundabout-1_1_T-1', 'USA_Lanker-1_3_T-1',
     'DEU_Guetersloh-36_1_T-1', 'ZAM_Tutorial-1_2_T-1'])
@@ -333,6 +334,7 @@ occupancy_command.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGINT], ids=['killed', 'interrupted'])
 def test_killed_while_writing(tmp_path: Path, project_root: Path, number: signal.Signals) -> None:
     """With the first of its tiles written, nothing is at the place of the map; nor is a part."""

@@ -41,18 +41,21 @@ def check_rules(root: Path) -> None:
         *(root / pages.relative_to(ROOT) for pages in (PAGE, DESK)), here, cwd=root)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('tools')
 def test_types() -> None:
     """Everything in the page has a type, and is used as that."""
     check_types(ROOT)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('tools')
 def test_rules() -> None:
     """The page and its tests keep the rules of eslint.config.mjs, without a warning."""
     check_rules(ROOT)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('tools')
 def test_units() -> None:
     """What needs no browser computes what it should, in Node's own runner."""

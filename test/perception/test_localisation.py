@@ -37,6 +37,7 @@ def consistency(spec: LocalisationSpec, steps: int = 400,
     return float(mean.mean()), float(((mean > low) & (mean < high)).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('spec', 'steps', 'yaw'), [
     pytest.param(LocalisationSpec(), 400, 3.0, id='default'),
     pytest.param(LocalisationSpec(rate=100.0, position_noise=0.5), 200, -1.2, id='fast'),
@@ -51,6 +52,7 @@ def test_covariance_is_that_of_the_errors(spec: LocalisationSpec, steps: int,
     assert inside > 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('spec', [
     pytest.param(LocalisationSpec(position_bias=(0.2, 0.0)), id='position'),
     pytest.param(LocalisationSpec(yaw_bias=0.02), id='yaw'),
@@ -73,6 +75,7 @@ def test_estimate_takes_the_bias_over() -> None:
                                atol=3.0 * standard_error[:2].max())
 
 
+@pytest.mark.slow
 def test_bias_walks_like_a_random_walk() -> None:
     """After 4 s its standard deviation is the walk times sqrt(4 s), within 95 %."""
     # A filter that trusts nothing but the position shows what it is given.

@@ -68,6 +68,7 @@ def first_met(scan: Scan, things: list[Any], horizon: float) -> tuple[Array, Arr
     return distance, distance.min(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', range(4))
 @pytest.mark.parametrize('kind', KINDS)
 def test_ranges_and_hits_are_those_of_shapely(kind: str, seed: int) -> None:

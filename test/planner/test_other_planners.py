@@ -38,6 +38,7 @@ def accepted(plans: list[Plan], vehicle: VehicleParameters) -> bool:
                           support.DT) is None for plan in plans)
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_stops_behind_a_standing_car(name: str, vehicle: VehicleParameters) -> None:
@@ -49,6 +50,7 @@ def test_stops_behind_a_standing_car(name: str, vehicle: VehicleParameters) -> N
     assert 87.75 - 2.0 * 4.5 < front(plans[-1], vehicle) < 87.75 - 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_reaches_the_desired_speed_on_a_free_road(name: str,
                                                   vehicle: VehicleParameters) -> None:
@@ -57,6 +59,7 @@ def test_reaches_the_desired_speed_on_a_free_road(name: str,
     assert 9.0 < plans[-1].states[0, 3] < 10.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_starts_from_rest(name: str, vehicle: VehicleParameters) -> None:
     plans = support.drive(ready(name, 0.0, v0=10.0), ego(vehicle, 0.0), 50)
@@ -64,6 +67,7 @@ def test_starts_from_rest(name: str, vehicle: VehicleParameters) -> None:
     assert plans[-1].states[0, 3] > 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 @pytest.mark.parametrize('scenario', ['USA_US101', 'ZAM_Tjunction', 'ZAM_Over'])
 def test_real_scenarios_give_accepted_plans(name: str, scenario: str,

@@ -78,6 +78,7 @@ def check_free(plans: list[Plan], road: support.Scenario, cars: tuple[Car, ...],
             assert not ego.collide(pycrcc.RectOBB(HALF_CAR, 0.9, heading, now, car_y)), k
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('speed', [0.0, 5.0])
 def test_passes_a_slow_car_in_the_free_lane_beside(speed: float,
@@ -105,6 +106,7 @@ def test_stays_while_there_is_no_gap(cars: tuple[Car, ...], vehicle: VehiclePara
     assert max(abs(plan.states[0, 1]) for plan in plans) < 0.3
 
 
+@pytest.mark.slow
 def test_does_not_use_the_lane_of_who_comes_towards_it(vehicle: VehicleParameters) -> None:
     road, cars = lanes(2, oncoming=True), ((80.0, 0.0, 0.0, 0.0),)
     plans = drive(road, VehicleState(0.0, 0.0, 0.0, 12.0), cars, 150)
@@ -113,6 +115,7 @@ def test_does_not_use_the_lane_of_who_comes_towards_it(vehicle: VehicleParameter
     assert max(plan.states[0, 1] for plan in plans) < 0.5 * WIDTH
 
 
+@pytest.mark.slow
 def test_stays_where_the_side_lane_ends(vehicle: VehicleParameters) -> None:
     """The lane beside ends 60 m ahead, before a standing car could be passed."""
     x, beyond = np.linspace(-50.0, 60.0, 40), np.linspace(60.0, 900.0, 100)

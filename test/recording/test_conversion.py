@@ -54,6 +54,7 @@ def assert_holds(report: ConversionReport, result: OfflineResult) -> None:
                 report.first_k + step).poses[column, :2]) < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('kind', ['ours', 'mcap', 'sqlite3'])
 def test_recordings_of_every_make(tmp_path: Path, recorder: Any, drive: Drive, kind: str) -> None:
     """The file lies beside the recording, is named by its id, and is dated by the log time."""
@@ -70,6 +71,7 @@ def test_recordings_of_every_make(tmp_path: Path, recorder: Any, drive: Drive, k
     assert etree.parse(str(report.path)).getroot().get('date') == day == '2023-11-14'
 
 
+@pytest.mark.slow
 def test_recording_that_was_cut_off_or_began_late(tmp_path: Path, recorder: Any,
                                                   drive: Drive) -> None:
     """What is there becomes the scenario; the notices say what is not."""
@@ -93,6 +95,7 @@ def test_recording_that_was_cut_off_or_began_late(tmp_path: Path, recorder: Any,
     assert_holds(report, result)
 
 
+@pytest.mark.slow
 def test_place_and_choice(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     """A folder, a file name, an earlier run; a conversion may be repeated, nothing else lost."""
     first, second = drive(CUT_IN, seed=1), drive(TRAFFIC, duration_s=0.5, seed=2)

@@ -63,6 +63,7 @@ def record(recorder: Any, tmp_path_factory: pytest.TempPathFactory,
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', PLANNERS)
 def test_the_same_human_against_the_same_planner_and_another(
@@ -95,6 +96,7 @@ def test_the_same_human_against_the_same_planner_and_another(
         assert len(written.dynamic_obstacles) >= 2
 
 
+@pytest.mark.slow
 def test_traffic_that_reacts_makes_another_world(
         record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An AV that stops in the merge: agents behind it brake, and the table says from when on."""
@@ -107,6 +109,7 @@ def test_traffic_that_reacts_makes_another_world(
     assert f'from {other["others_differ_s"]:.1f} s' in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_folders_are_new_and_files_have_names_of_their_own(
         record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Beside the run, numbered; two planners of one name in two folders."""
@@ -124,6 +127,7 @@ def test_folders_are_new_and_files_have_names_of_their_own(
     assert str(folder / 'replays_2') in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_human_without_inputs_takes_its_recorded_way(
         record: Any, recorder: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of a recording without cycles the inputs are not known, the ways are."""

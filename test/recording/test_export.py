@@ -29,6 +29,7 @@ TRAFFIC = 'ZAM_Traffic-1_1_T-1.xml'
 TWO_AVS = 'C-ZAM_TwoAvs-1_1_T-1.xml'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', [CUT_IN, PARKED, TRAFFIC, TWO_AVS])
 def test_round_trip_of_our_own_scenarios(runs: Any, tmp_path: Path, name: str) -> None:
     """Every pose reads back; roads, signs and location are those of the original."""
@@ -103,6 +104,7 @@ def test_motion_is_feasible_for_the_drivability_checker(runs: Any, tmp_path: Pat
         assert trajectory_feasibility(trajectory, dynamics, 0.1)[0] is feasible
 
 
+@pytest.mark.slow
 def test_run_that_begins_later_in_the_scenario(runs: Any, tmp_path: Path) -> None:
     """With k0 = 7 everything is seven steps earlier: states, goal times, and a notice says so."""
     text = runs.own(TRAFFIC)
@@ -132,6 +134,7 @@ def test_time_step_of_a_fifth_of_a_second(runs: Any, tmp_path: Path) -> None:
     runs.assert_poses(log, exported, scenario)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('given', 'avs', 'expected', 'mended'), [
     ('ZAM_CutIn-1_1_T-1', (), 'ZAM_CutIn-1_1_T-1', False),
     ('ZAM_CutIn-1_1_T-1', None, 'C-ZAM_CutIn-1_1_T-1', False),
@@ -168,6 +171,7 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
         assert list(folder.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('problem', [True, False])
 def test_run_in_which_nobody_drives(runs: Any, tmp_path: Path, problem: bool) -> None:
     """Recorded vehicles alone: the problem stays as it was, or there is one that all meet."""

@@ -20,6 +20,7 @@ CUT_IN = 'ZAM_CutIn-1_1_T-1.xml'
 INTERSECTION = 'ZAM_Intersection-1_1_T-1.xml'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['DEU_AAH1-2_76900_T-7049', 'ZAM_Zip-2_1_T-1'])
 def test_published_files_that_the_schema_refuses(
         name: str, runs: Any, tmp_path: Path, shared_scenarios: Path) -> None:
@@ -62,6 +63,7 @@ def test_goal_refers_to_the_renumbered_lanelet(runs: Any, tmp_path: Path) -> Non
     assert scenario.lanelet_network.find_lanelet_by_id(new) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('pattern', 'replacement', 'told'), [
     ('<isLeftOf ref="[0-9]+"/>', '<isLeftOf ref="98765"/>', 'the schema refuses'),
     ('<incomingLanelet ref="[0-9]+"/>', '', 'the schema refuses'),

@@ -14,6 +14,7 @@ import pytest
 CUT_IN = 'ZAM_CutIn-1_1_T-1.xml'
 
 
+@pytest.mark.slow
 def test_traffic_lights_keep_their_states(
         runs: Any, tmp_path: Path, shared_scenarios: Path) -> None:
     """What a light showed at k of the original it shows at k - k0 of the export."""

@@ -70,6 +70,7 @@ def run(result: OfflineResult, recorder: Any, samples: Any,
     return folder
 
 
+@pytest.mark.slow
 def test_everything_of_a_run_is_drawn(run: Path, tmp_path: Path,
                                       capsys: pytest.CaptureFixture[str]) -> None:
     """Frames, profiles, timing, table: whole files, each named with what it shows; same again."""
@@ -146,6 +147,7 @@ def test_a_run_becomes_a_film(result: OfflineResult, recorder: Any, tmp_path: Pa
     assert not (tmp_path / 'run' / 'figures').exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('words', [
     ('missing',), ('RUN', '--figures', 'frames,maps'), ('RUN', '--format', 'bmp'),
     ('RUN', '--at', '1,x'), ('RUN', '--at', '1:2:0'), ('RUN', '--at', '99', '--figures', 'frames'),

@@ -74,6 +74,7 @@ def test_names_are_there_for_people_editors_and_types() -> None:
     assert all(f'`{name}' in document for name in typed)
 
 
+@pytest.mark.slow
 def test_the_document_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its lines in order, beside the games and a recording; what it promises is so."""
     (tmp_path / 'scenarios').symlink_to(scenarios_directory())
@@ -112,6 +113,7 @@ def test_a_run_is_that_of_the_command(run: OfflineRun, capsys: pytest.CaptureFix
     assert (again.state_hash, again.summary()['events']) == (told['state_hash'], told['events'])
 
 
+@pytest.mark.slow
 def test_a_recording_is_the_same_kind_of_object(
         run: OfflineRun, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same measures as of the run; those of the commands to the last bit."""
@@ -141,6 +143,7 @@ def test_a_recording_is_the_same_kind_of_object(
     assert crgame_ros.replay(folder, 'idm')['idm'].human_differs_s is None
 
 
+@pytest.mark.slow
 def test_an_offline_run_knows_what_a_recording_tells(tmp_path: Path) -> None:
     """Plans, contacts and violations, in tables and in its report, by the run's own records."""
     run = crgame_ros.run(CUT_IN, planner='constant-velocity', duration_s=12.0)

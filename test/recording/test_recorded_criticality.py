@@ -38,6 +38,7 @@ def _flat(found: Any, name: str = '') -> dict[str, Any]:
     return {name: found}
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 def test_one_code_for_runs_logs_and_recordings(
         observed: tuple[Criticality, OfflineResult], recorder: Any, tmp_path: Path) -> None:
@@ -51,6 +52,7 @@ def test_one_code_for_runs_logs_and_recordings(
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_cut_in_is_what_its_trajectories_say(
         recorder: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The smallest distance along the road, by hand from the two cars' states; the command."""

@@ -51,6 +51,7 @@ def _offline(bag: Path, capsys: pytest.CaptureFixture[str], *words: str) -> dict
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', ['USA_Lanker-1_3_T-1', 'more/HRV_Pula-27_3_T-1'])
 def test_replay_alone_is_the_recorded_run(

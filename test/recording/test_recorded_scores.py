@@ -101,6 +101,7 @@ def vehicles(run: Path, tmp_path_factory: pytest.TempPathFactory) -> polars.Data
     return polars.read_parquet(out / 'vehicles.parquet')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('column', COLUMNS)
 def test_the_table_has_what_the_command_says(
         column: str, told: list[dict[str, Any]], vehicles: polars.DataFrame) -> None:
@@ -201,6 +202,7 @@ def test_valid_solution_says_the_same(record: RunRecord,
         == {True, False}
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_same_of_the_recording(
         run: Path, record: RunRecord, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As JSON, in lines, and in files which commonroad-io reads and which score the same."""
@@ -235,6 +237,7 @@ def test_the_command_tells_the_same_of_the_recording(
         assert words in text, words
 
 
+@pytest.mark.slow
 def test_experts_and_solutions_of_a_run(run: Path, tmp_path: Path,
                                         capsys: pytest.CaptureFixture[str]) -> None:
     """A run is its own expert: the human came as far as itself; solutions are scored beside."""

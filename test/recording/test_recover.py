@@ -64,6 +64,7 @@ with BagWriter(Path(sys.argv[1]), now_ns=time.monotonic_ns) as writer:
 """
 
 
+@pytest.mark.slow
 def test_killed_recorder_loses_at_most_its_last_second(tmp_path: Path) -> None:
     """A real process, killed with SIGKILL between two flushes, some way into a second."""
     folder = tmp_path / 'run'

@@ -39,6 +39,7 @@ def session(recorded: Path, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_command_writes_one_file(recorded: Path, tmp_path: Path,
                                      capsys: pytest.CaptureFixture[str]) -> None:
     """Beside the recording or where it is told; the same bytes each time."""
@@ -148,7 +149,7 @@ def test_two_signals_leave_the_report_out_and_all_else_whole(session: Path) -> N
     assert main(['report', str(session)]) == 0
 
 
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('words', [[], ['--no-report']])
 def test_beside_a_graph_that_goes_on(session: Path, words: list[str]) -> None:
     """The process that finishes a run while the program stays for another."""

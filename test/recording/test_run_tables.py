@@ -63,6 +63,7 @@ def tables(recorded: Recorded) -> dict[str, polars.DataFrame]:
             for name in NAMES}
 
 
+@pytest.mark.slow
 def test_states_are_where_everybody_was(recorded: Recorded,
                                         tables: dict[str, polars.DataFrame]) -> None:
     """Centres from rear axles by hand, commands as they were consumed, objects as they moved."""
@@ -185,6 +186,7 @@ def test_dictionary_and_files_agree(recorded: Recorded,
                 assert set(frame[field['name']].drop_nulls()) <= set(constraints['enum'])
 
 
+@pytest.mark.slow
 def test_the_same_recording_gives_the_same_bytes(recorded: Recorded, tmp_path: Path,
                                                  tables: dict[str, polars.DataFrame]) -> None:
     """In both formats; and CSV says the same as Parquet, to the last bit."""

@@ -48,6 +48,7 @@ def digests(folder: Path) -> dict[str, str]:
             for path in sorted(folder.rglob('*')) if path.is_file()}
 
 
+@pytest.mark.slow
 def test_a_trial_that_counts_is_one_row(studied: Studied) -> None:
     trials = table(studied.folder, 'trials')
     assert trials.select('participant', 'trial').rows() == ROWS

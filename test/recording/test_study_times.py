@@ -16,6 +16,7 @@ def answers(folder: Path) -> polars.DataFrame:
     return polars.read_parquet(folder / 'data' / 'answers.parquet')
 
 
+@pytest.mark.exhaustive
 def test_answers_name_their_run_and_its_end(copied: Path) -> None:
     """Those after a trial that was driven again are of the run that they came after."""
     rows = answers(copied).filter(participant='P03', trial=1)

@@ -22,6 +22,7 @@ def start(node: str, *parameters: str) -> subprocess.CompletedProcess[str]:
         timeout=90.0, check=False)
 
 
+@pytest.mark.exhaustive
 def test_whole_numbers_are_numbers_and_a_game_has_a_name() -> None:
     """The factor and the duration as whole numbers, the game by its name alone."""
     done = start('sim_node', 'game:=traffic_jam_no_such', 'duration:=1')

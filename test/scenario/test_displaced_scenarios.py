@@ -62,6 +62,7 @@ def run(scenario: Path, planner: str, with_map: bool) -> OfflineResult:
     return run_offline(setup, duration_s=1.5, drivers={'hv0': ReplayDriver(commands)})
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize(('name', 'planner', 'offset', 'with_map'), [
     ('ZAM_CutIn-1_1_T-1.xml', 'reactive', TILES, True),
@@ -93,6 +94,7 @@ def test_a_run_far_from_the_origin_is_the_run_at_the_origin(
     assert here.planners['av0'].counters == there.planners['av0'].counters
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('lanelet', [0, 1, 2])
 @pytest.mark.parametrize('planner', ['idm', 'reactive', 'constant-velocity'])
 def test_a_lanelet_far_away_is_no_way_to_drive_on(
@@ -145,6 +147,7 @@ def test_time_steps_of_a_millisecond_are_refused(tmp_path: Path) -> None:
     assert "timeStepSize is '0.001'; give seconds from 0.01 to 10" in told
 
 
+@pytest.mark.slow
 def test_bounds_of_thousands_of_points_that_cross_are_refused(tmp_path: Path) -> None:
     """To make a surface of 20,000 points in disorder took gigabytes; in order they are a road."""
     root = etree.parse(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml').getroot()

@@ -45,6 +45,7 @@ def shared(name: str = '') -> Path:
     return SHARED / name
 
 
+@pytest.mark.slow
 def test_all_real_scenarios_load_as_published() -> None:
     """The eleven files' numbers of lanelets, obstacles and problems are those counted in XML."""
     files = sorted(shared().glob('*.xml'))

@@ -50,6 +50,7 @@ def box(state: VehicleState) -> pycrcc.RectOBB:
     return pycrcc.RectOBB(CAR.length / 2, CAR.width / 2, state.yaw, x, y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', NAMES)
 @pytest.mark.parametrize('with_av', [True, False])
 def test_human_is_placed_free_on_the_road_in_its_lane(name: str, with_av: bool) -> None:
@@ -96,6 +97,7 @@ def test_human_stands_beside_and_slightly_behind() -> None:
     assert human.speed == av.speed == 12.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('name', 'ahead', 'aside'), [
     # Dense traffic that does not react: the nearest place behind that nobody runs into.
     ('USA_US101-4_1_T-1', (-50.0, -40.0), (-2.0, 2.0)),
@@ -179,6 +181,7 @@ def test_no_free_place_is_refused() -> None:
                         ObjectStates(np.zeros((1, 3)), np.zeros((1, 3))))
 
 
+@pytest.mark.slow
 def test_problem_pose_is_the_rear_axle_of_a_centre() -> None:
     """The planning problem's position is where the centre of the state is."""
     for name in NAMES:
@@ -201,6 +204,7 @@ def test_problem_pose_has_the_steering_angle_of_its_yaw_rate() -> None:
     assert problem_pose(problem, CAR.rear_to_center, CAR.wheelbase).steering_angle == 0.0
 
 
+@pytest.mark.slow
 def test_lanelet_pose_is_the_foot_on_the_centre_line() -> None:
     """No point of the centre line (shapely) is nearer; the heading is the lane's (CRG III-A1)."""
     loaded = shared('DEU_Flensburg-10_1_T-1.xml')

@@ -69,12 +69,14 @@ def test_idm_brakes_behind_the_human_and_stops(game: Game, latency: int) -> None
     assert 5.5 < human[-1, 0] - av[-1, 0] < 9.5
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('latency', [0, 5])
 def test_reactive_passes_beside(game: Game, latency: int) -> None:
     check_passed(run(game, 'reactive', latency))
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize(('ahead', 'speed'), [(-6.0, 26.0), (4.0, 24.0)],
                          ids=['later', 'slower'])
@@ -84,6 +86,7 @@ def test_both_do_so_in_other_games(game: Game, ahead: float, speed: float) -> No
     assert run(other, 'idm', 5).states_of('av0')[-1, 3] < 0.3
 
 
+@pytest.mark.slow
 def test_exported_cut_in_stays_on_the_road_driven_again(game: Game, tmp_path: Path) -> None:
     """
     Also as the human's planning problem has it, whose route changes lanes to the right.

@@ -53,6 +53,7 @@ def test_every_game_with_engines_is_here() -> None:
                           or any(av.perception for av in game.avs or ())}
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_nobody_touches_anybody(name: str) -> None:
@@ -65,6 +66,7 @@ def test_nobody_touches_anybody(name: str) -> None:
         assert record.accepted_ratio >= 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_runs_repeat_bit_for_bit(name: str) -> None:
@@ -75,6 +77,8 @@ def test_runs_repeat_bit_for_bit(name: str) -> None:
     assert first.object_velocities.tobytes() == second.object_velocities.tobytes()
 
 
+@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_export_is_read_back(name: str, tmp_path: Path) -> None:
     """
@@ -92,6 +96,7 @@ def test_export_is_read_back(name: str, tmp_path: Path) -> None:
         == len(result.object_poses) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_human_makes_the_av_slow_down(name: str) -> None:
@@ -102,6 +107,7 @@ def test_human_makes_the_av_slow_down(name: str) -> None:
     assert least < distances(result, 'av0', 'hv0').min() < most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', GAMES)
 def test_script_survives_an_uneven_clock(name: str) -> None:
     """As `test_scripts_survive_an_uneven_clock` of the other games; the objects stay."""

@@ -103,6 +103,8 @@ def test_every_av_has_an_expected_reaction() -> None:
     assert avs == REACTIONS.keys()
 
 
+@pytest.mark.slow
+@pytest.mark.matrix
 @pytest.mark.parametrize(('name', 'av_id'), REACTIONS, ids=lambda value: str(value))
 def test_human_makes_the_av_react(name: str, av_id: str) -> None:
     """The AV drives as if alone until the human interferes, then slows down and keeps clear."""
@@ -115,6 +117,7 @@ def test_human_makes_the_av_react(name: str, av_id: str) -> None:
     assert expected.gap[0] < _gaps(played, av_id).min() < expected.gap[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', sorted({name for name, _ in REACTIONS}))
 def test_nobody_collides_or_leaves_the_road(name: str) -> None:
     """Neither the scripted human nor an AV behind idm, and every plan is accepted."""
@@ -140,6 +143,7 @@ def test_cut_in_is_the_manoeuvre_of_the_paper() -> None:
     assert _gaps(result, 'av0')[-1] == pytest.approx(2.0, abs=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('path', GAMES, ids=lambda path: str(path.stem))
 def test_scripts_survive_an_uneven_clock(path: Path) -> None:
     """

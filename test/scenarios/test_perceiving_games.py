@@ -62,6 +62,7 @@ def _line_of_sight(result: OfflineResult) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_pedestrian_is_known_from_the_first_line_of_sight_on() -> None:
     """
     Never before; and at most two scans later, when a ray of the fan meets what shows.

@@ -28,6 +28,7 @@ def _setup(path: Path) -> Setup:
     return build_setup(effective_game(RunRequest(scenario=path, driver='idle')))
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('planner', ['idm', 'reactive'])
 @pytest.mark.parametrize('name', NAMES)

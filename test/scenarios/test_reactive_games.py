@@ -14,6 +14,7 @@ import pytest
 WANTED = 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', ['parked_cars', 'roundabout'])
 def test_reactive_planner_answers_and_hits_nobody(name: str, project_root: Path) -> None:

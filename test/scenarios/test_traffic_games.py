@@ -127,6 +127,7 @@ def _passing(result: OfflineResult) -> list[str]:
     return passing
 
 
+@pytest.mark.slow
 def test_agents_swerve_around_the_skip_with_the_stated_clearance() -> None:
     """
     The band keeps 0.5 m between the skip and a vehicle 2 m wide (1.8 m: 0.1 m more).
@@ -164,6 +165,7 @@ def test_agents_that_do_not_swerve_queue_behind_the_skip() -> None:
     assert touching(result) == []
 
 
+@pytest.mark.slow
 def test_oncoming_av_gives_way_to_the_human_but_not_to_agents() -> None:
     """Agents pass the skip in their own lane; only the human makes the AV brake there."""
     result, alone = played('blocked_lane'), play('blocked_lane', without_human)

@@ -84,6 +84,7 @@ def validator(kind: str) -> Draft202012Validator:
     return Draft202012Validator(schema)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('kind', FILES)
 def test_own_files_fit_their_schema(kind: str) -> None:
     assert FILES[kind]
@@ -123,6 +124,7 @@ def mutated(values: Any, luck: random.Random) -> Any:
     return changed
 
 
+@pytest.mark.slow
 def test_reader_and_schema_refuse_the_same() -> None:
     """Of hundreds of games with one mistake each; both outcomes are common."""
     luck, found = random.Random(4), validator('game')

@@ -333,6 +333,7 @@ def test_follower_takes_the_gap_of_the_idm() -> None:
     assert all_gaps.min() > 2.0
 
 
+@pytest.mark.slow
 def test_follower_brakes_as_idm_of_traffic_to_the_last_bit() -> None:
     """The law and its emergency guard are traffic's own, close behind and far, slow and fast."""
     random = np.random.default_rng(0)
@@ -403,6 +404,7 @@ def test_pedestrian_beside_a_parked_car_walks_away() -> None:
     assert poses[-1, 2, :2] == pytest.approx([1.0, 1.4], abs=0.05)
 
 
+@pytest.mark.slow
 def test_random_crossings_end_without_collision() -> None:
     """Twelve walks over one to three lanes, with cars at 4 to 20 m/s at random gaps."""
     rng = np.random.default_rng(4)

@@ -42,6 +42,7 @@ def speeds(result: OfflineResult) -> np.ndarray[Any, np.dtype[np.float64]]:
     return result.states_of('av0')[:, StateColumn.SPEED]
 
 
+@pytest.mark.slow
 def test_av_stops_for_the_pedestrian_that_is_released(game: Game) -> None:
     """Without the trigger it drives past; with it, it halts in front of the walker."""
     passed, stopped = play(game), play(game, (RELEASE_N, 'pedestrian'))
@@ -60,6 +61,7 @@ def test_av_stops_for_the_pedestrian_that_is_released(game: Game) -> None:
         assert result.planners['av0'].counters.refused == 0
 
 
+@pytest.mark.slow
 def test_runs_with_triggers_repeat_to_the_last_bit(game: Game) -> None:
     """The setup is shared and no event leaves a trace in it; a tick later is another run."""
     setup = build_setup(game)
@@ -74,6 +76,7 @@ def test_runs_with_triggers_repeat_to_the_last_bit(game: Game) -> None:
     assert play(game, (RELEASE_N + 1, 'pedestrian')).fired[0].n == RELEASE_N + 10
 
 
+@pytest.mark.slow
 def test_recorded_events_repeat_a_run_as_conditions(game: Game) -> None:
     """The same bits without anybody at the buttons; nothing else fires by itself."""
     clock = read(EventList, [{'name': 'clock', 'when': {'time': 3.0},
@@ -114,6 +117,7 @@ def test_speed_limit_of_one_lanelet(game: Game) -> None:
     assert states[inside, StateColumn.SPEED].max() < 5.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('planner', ['constant-velocity', 'reactive', 'idm-package'])
 def test_planner_is_replaced_in_the_run(game: Game, planner: str) -> None:
     """

@@ -59,6 +59,7 @@ def test_planners_behind_an_adapter_are_not_checked_twice(cut_in: LoadedScenario
     assert run.simulation.offer_plan('av0', leaving(run.result.requests['av0'], -0.002)) is None
 
 
+@pytest.mark.slow
 def test_every_lanelet_of_published_maps_may_be_planned_along(shared_scenarios: Path) -> None:
     """What follows a lanelet's centre is on the road, for vehicles of its width."""
     loaded = load_scenario(shared_scenarios / 'USA_Lanker-1_3_T-1.xml')

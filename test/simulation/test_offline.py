@@ -77,6 +77,7 @@ def ways(result: OfflineResult) -> Array:
     return np.copysign(np.hypot(*moves.T), np.einsum('ij,ij->i', moves, heading))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('latency', range(13))
 @pytest.mark.parametrize(('course', 'distance'), [
     ('constant', 200.0), ('accelerating', 400.0), ('circle', 200.0), ('braking', 50.0)])
@@ -100,6 +101,7 @@ def test_av_covers_the_right_distance(cut_in: LoadedScenario, course: str, dista
     assert steps.max() <= result.states_of('av0')[:, 3].max() * support.DT * 1.001
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('rate', [5.0, 10.0, 20.0, 30.0, 1000.0])
 @pytest.mark.parametrize('latency', [0, 1, 12])
 def test_distance_at_other_rates(cut_in: LoadedScenario, rate: float, latency: int) -> None:

@@ -35,6 +35,7 @@ def moved(result: OfflineResult) -> NDArray[np.float64]:
     return np.hypot(*np.diff(result.states_of('av0')[:, :2], axis=0).T)
 
 
+@pytest.mark.slow
 def test_perfect_sensors_change_nothing() -> None:
     """An AV that sees everything, and knows where it is, drives to the same bits as without."""
     plain = run_offline(perceiving('two_avs', None))
@@ -42,6 +43,7 @@ def test_perfect_sensors_change_nothing() -> None:
     assert plain.state_hash == everything.state_hash
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits() -> None:
     """Noise is drawn from the seeds: of the game, or the perception's own."""
     hashes = [run_offline(perceiving('cut_in', perception), duration_s=6.0).state_hash
@@ -50,6 +52,7 @@ def test_same_seed_same_bits() -> None:
     assert len(set(hashes)) == 3
 
 
+@pytest.mark.slow
 def test_wrong_poses_do_not_make_the_car_jump() -> None:
     """Plans start where the AV believes to be, a metre off; it drives on from where it is."""
     setup = perceiving('parked_cars', NOISY)
@@ -65,6 +68,7 @@ def test_wrong_poses_do_not_make_the_car_jump() -> None:
     assert result.state_hash != run_offline(perceiving('parked_cars', None)).state_hash
 
 
+@pytest.mark.slow
 def test_what_is_not_seen_is_not_reacted_to() -> None:
     """An AV that sees 2 m far runs into the car that cuts in; with a lidar it does not."""
     blind = run_offline(perceiving('cut_in', BLIND))

@@ -137,6 +137,7 @@ def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> Non
     assert not wrong, (count, wrong)
 
 
+@pytest.mark.slow
 def test_run_shows_records_and_exports_it(tmp_path: Path) -> None:
     """The AV leaves the roundabout at the end of its game: from its plan into the file."""
     result = drive('roundabout', 20.0)

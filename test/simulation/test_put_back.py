@@ -208,6 +208,7 @@ def test_the_jump_is_no_change_of_lane(cut_in: LoadedScenario) -> None:
     assert [len(each.changes) for each in keeping] == [1, 0]
 
 
+@pytest.mark.slow
 def test_score_way_and_export_know_of_the_jump(cut_in: LoadedScenario, tmp_path: Path) -> None:
     result = run_with_put_back(cut_in)
     record = run_record_of(result)

@@ -50,6 +50,7 @@ def perfect() -> OfflineResult:
     return run_offline(tracked('parked_cars', execution='perfect'))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('tracker', ['lqr', 'pure-pursuit'])
 @pytest.mark.parametrize('dynamics', ['dynamic-bicycle', 'ks'])
 def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
@@ -68,6 +69,7 @@ def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
     assert result.state_hash != perfect.state_hash
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('name', 'metres'), [
     ('DEU_Flensburg-10_1_T-1', 2.5), ('ZAM_Tjunction-1_42_T-1', 6.0)])
 def test_an_av_far_off_its_path_says_so(name: str, metres: float,
@@ -118,12 +120,14 @@ def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
     assert route_lane.worst == pytest.approx(max(0.3 * width, 1.0), abs=0.05)
 
 
+@pytest.mark.slow
 def test_same_inputs_same_bits() -> None:
     """Tracker and model hold nothing that a second run would find."""
     setup = tracked('cut_in')
     assert run_offline(setup).state_hash == run_offline(setup).state_hash
 
 
+@pytest.mark.slow
 def test_yaw_rate_follows_the_slip() -> None:
     """FS 2 in the run itself: the yaw rate of the states is G_s v / L tan(delta)."""
     slip = 0.8
@@ -141,6 +145,7 @@ def test_yaw_rate_follows_the_slip() -> None:
     np.testing.assert_allclose(turned[turning[1:]], expected[1:][turning[1:]], atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('pose', ['true', 'estimated'])
 def test_a_biased_estimate_puts_the_car_beside_the_lane(pose: str) -> None:
     """Its planner believes to be in the middle of the lane: the car is beside it by the bias."""

@@ -11,6 +11,7 @@ from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
+import pytest
 
 DURATION_S = 6.0
 
@@ -22,6 +23,7 @@ def alone(scenario: Path, seed: int = 0) -> OfflineResult:
     return run_offline(build_setup(game), duration_s=DURATION_S)
 
 
+@pytest.mark.slow
 def test_traffic_runs_alone(shared_scenarios: Path, tmp_path: Path) -> None:
     """
     Agents drive over a real junction by themselves; the hash tells one run from another.

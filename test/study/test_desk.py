@@ -27,6 +27,7 @@ from desk_client import (  # noqa: E402, I100
 )
 
 
+@pytest.mark.slow
 @in_loop
 async def test_a_session_goes_on_by_what_its_page_says(tmp_path: Path) -> None:
     async with served(tmp_path) as running:
@@ -112,6 +113,7 @@ async def test_the_newest_page_is_used_and_an_old_one_takes_over_when_asked(tmp_
             await each.close()
 
 
+@pytest.mark.slow
 @in_loop
 async def test_orders_of_the_experimenter(tmp_path: Path) -> None:
     async with served(tmp_path, step_s=0.4) as running:

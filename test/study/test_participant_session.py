@@ -86,6 +86,7 @@ def test_a_session_is_gone_through_in_order(session: ParticipantSession) -> None
         session.start()
 
 
+@pytest.mark.slow
 def test_after_any_kill_it_goes_on_at_the_right_item(tmp_path: Path) -> None:
     rng = random.Random(11)
     with open_session(tmp_path / 'whole') as whole:

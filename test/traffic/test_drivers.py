@@ -83,6 +83,7 @@ def bits(run: support.Run, *numbers: int) -> bytes:
     return np.array(run.poses)[:, chosen].tobytes() + np.array(run.speeds)[:, chosen].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('given', 'changed'), [
     ({'politeness': 1.0}, {'politeness': 1.0}),
     ({'lane_changes': False}, {'lane_changes': False}),

@@ -50,6 +50,7 @@ def priorities(scenario: Scenario) -> dict[tuple[int, int], int]:
             int(conflicts.priority[i]) for i in range(len(conflicts))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('signs', [True, False])
 @pytest.mark.parametrize('name', ['ZAM_Intersection-1_1_T-1.xml', 'ZAM_TJunction-1_1_T-1.xml'])
 def test_a_mirrored_junction_has_the_same_priorities(maps: Path, name: str, signs: bool) -> None:

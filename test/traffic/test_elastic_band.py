@@ -73,6 +73,7 @@ def test_lanes_without_anything_in_the_way_are_exactly_straight() -> None:
         assert (bands.blocked_from() == math.inf).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('found', [
     obstacles((0, 150.0, 0.0, 2.25, 0.9)),
     obstacles((0, 150.0, -1.4, 2.25, 0.9)),
@@ -150,6 +151,7 @@ def test_the_nearer_side_is_taken_then_the_one_with_more_room(
     assert abs(bands.d[0, 150]) == pytest.approx(0.5 + 1.5 - abs(d), abs=0.06)
 
 
+@pytest.mark.slow
 def test_the_band_has_the_least_energy() -> None:
     """Let scipy solve the bounded least squares min |d - m^2 d''| with low <= d <= high."""
     rng = np.random.default_rng(7)

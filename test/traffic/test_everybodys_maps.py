@@ -54,6 +54,7 @@ def test_nobody_collides_runs_a_light_or_leaves_the_road(name: str) -> None:
     assert found.lateral_p99 <= LATERAL_P99
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_nobody_stands_for_good_where_a_ramp_ends() -> None:
     # Whoever waits at the end of the ramp for somebody who stands behind it in the queue does so
@@ -78,6 +79,7 @@ def test_dense_towns_go_on_without_a_jam_for_good(name: str, seed: int, seconds:
     assert found.mean_speed > speed
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_full_roundabout_stays_open(maps: Path) -> None:
     # Entered by everybody before whom there is room it is full after a minute, all around.

@@ -276,6 +276,7 @@ def test_a_change_taken_back_within_12_s_is_undone(straight: JudgedRoads) -> Non
     assert slowly.changes == 1 and slowly.count('undone') == 0
 
 
+@pytest.mark.slow
 def test_the_judge_uses_no_code_of_ours(project_root: Path) -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import judge.verdict, sys; print(sorted('

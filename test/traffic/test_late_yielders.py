@@ -58,6 +58,7 @@ def test_braking_begins_as_late_as_hard_braking_allows(maps: Path) -> None:
     assert apart[1] < apart[0] - 1.5
 
 
+@pytest.mark.exhaustive
 def test_an_av_with_the_right_of_way_meets_them(shared_scenarios: Path) -> None:
     """
     A recorded car comes to a real junction which the AV crosses first, having the right of way.
@@ -94,6 +95,7 @@ def test_who_meets_nobody_drives_as_everybody(shared_scenarios: Path) -> None:
     assert np.hypot(*(np.nanmax(poses[0], axis=0) - np.nanmin(poses[0], axis=0))[0, :2]) > 30.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', ['more/DEU_TestIntersectionInteract-3_1_T-1',
                                   'more/DEU_AAH1-2_76900_T-7049'])
 def test_in_dense_traffic_they_brake_hard_and_touch_nobody(shared_scenarios: Path,

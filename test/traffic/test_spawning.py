@@ -53,6 +53,7 @@ def test_the_seed_decides(maps: Path) -> None:
     np.testing.assert_array_equal(first.poses[0], own.poses[0])
 
 
+@pytest.mark.slow
 def test_arrivals_come_at_the_given_flow() -> None:
     run = support.Run(one_lane(), TrafficSpec(flow=900.0, truck_share=0.0), 3).ticks(1200)
     present = np.isfinite(np.array(run.poses)[:, :, 0])

@@ -48,6 +48,7 @@ def published(name: str) -> Path:
     return SHARED / name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_lanes_follow_their_lanelets(file: Path) -> None:
     """Centre within 1 cm, widths as the bounds have them, limits as the signs have them."""
@@ -69,6 +70,7 @@ def test_lanes_follow_their_lanelets(file: Path) -> None:
         assert set(here.speed_limit.tolist()) == {np.inf if limit is None else limit}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_links_are_the_lanelets_own(file: Path) -> None:
     """Successors, predecessors and neighbours, these by their direction."""
@@ -144,6 +146,7 @@ def test_a_chain_is_one_lane() -> None:
         lanelet_lane(network, 12345)
 
 
+@pytest.mark.slow
 def test_nearest_lane_against_every_lane() -> None:
     """Lane, s, d and distance are those of the best of all lanes, taken one by one."""
     _, roads = roads_of(scenarios_directory() / 'ZAM_Intersection-1_1_T-1.xml')
@@ -193,6 +196,7 @@ def test_table_is_read(tmp_path: Path) -> None:
     assert roads.lane(9).at(np.array([1.0])).speed_limit.tolist() == [8.3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_table_round_trip_keeps_every_bit(file: Path, tmp_path: Path) -> None:
     """What `to_csv` writes, `from_csv` reads: way-points, widths, limits and links."""

@@ -53,6 +53,7 @@ def changed() -> tuple[DriverBehaviour, ...]:
     return measure_behaviour(_play('lane_change', 12.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', OF_VEHICLES)
 def test_every_measure_of_a_vehicle_is_there(
         name: str, changed: tuple[DriverBehaviour, ...]) -> None:
@@ -187,6 +188,7 @@ def _numbers(found: Sequence[DriverBehaviour]) -> NDArray[np.float64]:
     return np.array(numbers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('angle', [0.5, math.pi / 2, 2.3, -2.9])
 def test_nothing_depends_on_the_maps_axes(
         angle: float, changed: tuple[DriverBehaviour, ...]) -> None:

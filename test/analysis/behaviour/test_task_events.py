@@ -162,6 +162,7 @@ def test_the_take_over_of_an_av_belongs_to_the_request(record: RunRecord) -> Non
     assert take_over.to_hands_on_s == pytest.approx(row.response_time_s)
 
 
+@pytest.mark.slow
 def test_measures_report_and_tables_tell_of_tasks(record: RunRecord) -> None:
     """All from the same rows."""
     told = replace(record, tasks=(*LIGHTS, *(entry for entry in record.tasks

@@ -40,6 +40,7 @@ def test_what_is_undefined() -> None:
     assert [required_acceleration(*each, 0.0) for each in cars] == [0.0, 0.0, 0.0, -inf]
 
 
+@pytest.mark.slow
 def test_accelerating_against_small_steps() -> None:
     """2,000 pairs, standing, braking, reversing and accelerating ones, driven in steps of 1 ms."""
     random = np.random.default_rng(7)

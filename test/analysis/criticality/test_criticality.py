@@ -209,6 +209,7 @@ def _mirrored(description: ObjectDescription, placement: Placement) -> ObjectDes
     return replace(description, shape=replace(shape, vertices=vertices))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', SCENARIOS)
 def test_nothing_depends_on_the_maps_axes_or_numbers(name: str, shared_scenarios: Path) -> None:
     """Turned by eight angles, mirrored, shifted, renumbered: all values equal to 1e-9."""

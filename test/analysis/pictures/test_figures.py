@@ -143,6 +143,7 @@ def test_the_table_is_table_one() -> None:
     assert table.text().splitlines()[1].split() == ['Final', 'Error', '1.00', 'ms', '51.00', 'ms']
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('file_format', FORMATS)
 def test_the_same_run_gives_the_same_bytes(file_format: str, cut_in: RunRecord) -> None:
     """Whatever the user's settings, and without a date; PDF embeds TrueType fonts."""

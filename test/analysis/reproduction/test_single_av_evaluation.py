@@ -27,6 +27,7 @@ def _unmet(run: Alternative, expectations: object) -> list[str]:
     return [each.name for each in judged if not each.is_met]
 
 
+@pytest.mark.slow
 def test_idm(idm: Alternative) -> None:
     """The IDM stops behind the human; it does none of what the reactive planner must do."""
     assert _unmet(idm, IDM_EXPECTATIONS) == []
@@ -46,6 +47,7 @@ def test_nobody_reacts(cut_in: RecordedHuman, unmoved: Alternative) -> None:
         'UNMET: one AV, IDM: comes to a stop: 20.0')
 
 
+@pytest.mark.slow
 def test_reactive() -> None:
     """It goes around the human, whom it has passed after 12.5 s."""
     recorded = record_offline(scenarios_directory() / 'cut_in.yaml', 'constant-velocity', 12.5)

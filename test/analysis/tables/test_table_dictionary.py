@@ -18,6 +18,7 @@ UNITS = {'m/s^3', '1/min', '', '1', 'm', 's', 'rad', 'Hz', 'm/s', 'm/s^2', 'rad/
          'ms'}
 
 
+@pytest.mark.slow
 def test_the_page_is_up_to_date() -> None:
     done = subprocess.run([sys.executable, ROOT / 'scripts' / 'make_table_docs.py', '--check'],
                           capture_output=True, text=True)

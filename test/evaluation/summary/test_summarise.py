@@ -117,6 +117,7 @@ def test_few_scenarios_draw_cells_and_more_draw_scenarios(tmp_path: Path, two: S
     assert two.differences[0].resampled == 'cells'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('scenarios', [3, 12])
 def test_neither_order_nor_parts_matter(tmp_path: Path, scenarios: int) -> None:
     """Whatever part a row is in and wherever, not a bit of the summary differs."""
