@@ -9,7 +9,7 @@ import tempfile
 import time
 
 from crgame_ros.evaluation.evaluation import Computing, evaluate, EvaluationTally
-from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, PlannerChoice
+from crgame_ros.evaluation.plan import EvaluationPlan, PlannerChoice
 from crgame_ros.paths import scenarios_directory
 import pyarrow.dataset as ds
 

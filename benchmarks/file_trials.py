@@ -17,7 +17,7 @@ from crgame_ros import cli
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import InputError
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_log import read_run_log, RunLog

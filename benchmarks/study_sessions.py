@@ -27,8 +27,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'browser'))
 
 from crgame_ros.recording.reader import BagReader  # noqa: E402, I100
+from crgame_ros.study.file import load_study  # noqa: E402
 from crgame_ros.study.participant_session import ParticipantSession  # noqa: E402
-from crgame_ros.study.study_file import load_study  # noqa: E402
 from crgame_ros.yaml_text import read_yaml  # noqa: E402
 from study_people import study_session, StudySession, VICTIMS  # noqa: E402
 import yaml  # noqa: E402

@@ -43,7 +43,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'scripts'))
 from crgame_ros.game.objects import ObjectDescription, Role  # noqa: E402, I100
 from crgame_ros.game.traffic_spec import TrafficSpec  # noqa: E402
 from crgame_ros.geometry.shape import Shape  # noqa: E402
-from crgame_ros.roads.road_network import RoadNetwork  # noqa: E402
+from crgame_ros.roads.network import RoadNetwork  # noqa: E402
 from crgame_ros.traffic.adoption import Adopted  # noqa: E402
 from crgame_ros.traffic.traffic import Traffic  # noqa: E402
 from crgame_ros.traffic.world_view import WorldView  # noqa: E402

@@ -8,7 +8,7 @@ from pathlib import Path
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.outline import outline
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles

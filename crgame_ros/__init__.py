@@ -7,7 +7,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from crgame_ros.errors import CrgameError, InputError, PlanningError
     from crgame_ros.evaluation.evaluation import Computing
-    from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+    from crgame_ros.evaluation.plan import EvaluationPlan
     from crgame_ros.game.game import Game
     from crgame_ros.messages.plan import Plan, PlanRequest
     from crgame_ros.paths import scenarios_directory
@@ -38,7 +38,7 @@ __all__ = [
 _PLACES = {
     '__version__': 'version',
     'CrgameError': 'errors', 'InputError': 'errors', 'PlanningError': 'errors',
-    'Computing': 'evaluation.evaluation', 'EvaluationPlan': 'evaluation.evaluation_plan',
+    'Computing': 'evaluation.evaluation', 'EvaluationPlan': 'evaluation.plan',
     'evaluate': 'python_interface.finished_evaluation', 'scenarios_directory': 'paths',
     'Game': 'game.game', 'Plan': 'messages.plan', 'PlanRequest': 'messages.plan',
     'Planner': 'planner.interface', 'PlannerContext': 'planner.interface',

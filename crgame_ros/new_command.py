@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _new(values: argparse.Namespace) -> int:
     from crgame_ros.driver.source import parse_source
-    from crgame_ros.game.game_file import dump_game
+    from crgame_ros.game.file import dump_game
     from crgame_ros.simulation.setup import build_setup
     if not 1 <= values.humans <= MAX_HUMANS:
         raise InputError(f'is {values.humans}', '--humans', f'give 1 to {MAX_HUMANS}')

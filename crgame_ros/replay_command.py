@@ -58,8 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def replay(values: argparse.Namespace) -> int:
     """Drive against every planner, write the runs and print the comparison."""
-    from crgame_ros.analysis.criticality.recorded_criticality import measure_log
-    from crgame_ros.planner.planner_registry import planner_class
+    from crgame_ros.analysis.criticality.recorded import measure_log
+    from crgame_ros.planner.registry import planner_class
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_log import read_run_log
     _check(values)

@@ -9,7 +9,7 @@ import math
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.spawning import Adopted
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.world_view import WorldView

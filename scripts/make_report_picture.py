@@ -10,9 +10,9 @@ from pathlib import Path
 import tempfile
 
 from cockpit_person import Browser, open_browser
-from crgame_ros.analysis.report.report_file import report_html
-from crgame_ros.analysis.report.report_run import measured_run
-from crgame_ros.game.game_file import load_game
+from crgame_ros.analysis.report.file import report_html
+from crgame_ros.analysis.report.run import measured_run
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory, share_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of

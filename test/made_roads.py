@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 from numpy.typing import NDArray
 

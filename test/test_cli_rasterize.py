@@ -9,8 +9,8 @@ import sys
 from types import SimpleNamespace
 
 from crgame_ros.cli import main
-from crgame_ros.occupancy import occupancy_command
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy import command as occupancy_command
+from crgame_ros.occupancy.tiles import TiledOccupancy
 import pytest
 
 

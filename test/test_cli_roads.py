@@ -8,7 +8,7 @@ import sys
 
 from crgame_ros.cli import main
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.waypoints.waypoint_roads import LaneLinks, WaypointRoads
+from crgame_ros.waypoints.roads import LaneLinks, WaypointRoads
 import pytest
 
 TABLE = """\

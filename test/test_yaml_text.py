@@ -11,8 +11,8 @@ from typing import Any
 from crgame_ros.driver.device_map import load_device_map
 from crgame_ros.driver.timeline_file import read_timeline
 from crgame_ros.errors import InputError, LONGEST
-from crgame_ros.game.game_file import load_game
-from crgame_ros.occupancy.occupancy_map_file import read_map_file
+from crgame_ros.game.file import load_game
+from crgame_ros.occupancy.map_file import read_map_file
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.vehicle.control_settings import load_control_settings
 from crgame_ros.vehicle.parameters import load_vehicle_parameters

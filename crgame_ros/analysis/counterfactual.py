@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs

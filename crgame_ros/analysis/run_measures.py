@@ -5,11 +5,11 @@
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+from crgame_ros.analysis.behaviour.driver import measure_behaviour
 from crgame_ros.analysis.behaviour.task_events import detection_scores, DetectionScore, task_events
-from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.errors import InputError, short
 from crgame_ros.recording.run_record import RunRecord

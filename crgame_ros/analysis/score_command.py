@@ -14,7 +14,7 @@ from typing import Any, TYPE_CHECKING
 from crgame_ros.errors import CrgameError, InputError
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
-    from crgame_ros.analysis.scores.planner_scores import PlannerScores
+    from crgame_ros.analysis.scores.planner import PlannerScores
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 
 DESCRIPTION = """\

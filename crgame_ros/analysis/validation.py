@@ -208,7 +208,7 @@ def _solution(path: Path, _progress: Progress | None) -> FileVerdict:
 
 def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check exported tables by their dictionary."""
-    from crgame_ros.analysis.tables.table_check import table_faults
+    from crgame_ros.analysis.tables.check import table_faults
     count, faults = table_faults(path)
     return FileVerdict(f'{count} tables', tuple(faults[:_SHOWN]))
 
@@ -226,7 +226,7 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     faults = [str(error) for error in wrong]
     remarks: tuple[str, ...] = ()
     if file_kind.declared is Game and not faults:
-        from crgame_ros.game.game_file import parse_game
+        from crgame_ros.game.file import parse_game
         try:
             remarks = build_setup(parse_game(values, str(path), path.parent)).notices
         except InputError as error:

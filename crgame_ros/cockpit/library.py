@@ -16,7 +16,7 @@ from typing import Any, Literal
 from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.planner.planner_registry import planner_names
+from crgame_ros.planner.registry import planner_names
 from crgame_ros.scenario import guard
 from crgame_ros.yaml_text import read_yaml
 

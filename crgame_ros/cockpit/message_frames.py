@@ -5,7 +5,7 @@
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.criticality.criticality_rows import (
+from crgame_ros.analysis.criticality.rows import (
     CRITICALITY_TOPIC,
     most_critical_rows,
     read_criticality_rows,

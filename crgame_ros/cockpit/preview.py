@@ -14,9 +14,9 @@ from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.file import dump_game, load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
-from crgame_ros.game.game_file import dump_game, load_game
-from crgame_ros.planner.planner_registry import create_planner
+from crgame_ros.planner.registry import create_planner
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.simulation.document_writer import game_document

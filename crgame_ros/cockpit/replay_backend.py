@@ -12,8 +12,8 @@ from typing import Any, Literal, TYPE_CHECKING
 
 from aiohttp import web
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.criticality.criticality_rows import criticality_rows, CRITICALITY_TOPIC
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.criticality.rows import criticality_rows, CRITICALITY_TOPIC
 from crgame_ros.cockpit.message_frames import MessageFrames
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
 from crgame_ros.cockpit.replay_index import index_run, RunIndex

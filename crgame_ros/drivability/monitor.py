@@ -21,7 +21,7 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.rigid_transform import Pose, RigidTransform
 from crgame_ros.occupancy.occupancy import OccupancyMap
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.vehicle.state import STATE_WIDTH
 import numpy as np
 from numpy.typing import NDArray

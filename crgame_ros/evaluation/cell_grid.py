@@ -22,9 +22,9 @@ from crgame_ros.evaluation.cell_scene import (
     with_contents,
 )
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
-from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
+from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.cast import OWN
 

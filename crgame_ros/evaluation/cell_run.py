@@ -9,7 +9,7 @@ import resource
 import time
 from typing import Any
 
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 from crgame_ros.driver.replay_driver import ReplayDriver
@@ -17,8 +17,8 @@ from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
 from crgame_ros.evaluation.results.cell_rows import outcome_of, vehicle_rows
+from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game
-from crgame_ros.game.game_file import parse_game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.recording.offline_outcome import offline_outcome

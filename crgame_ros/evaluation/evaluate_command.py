@@ -10,20 +10,20 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from crgame_ros.analysis.report.report_file import write_report
-from crgame_ros.analysis.report.report_run import measured_run
+from crgame_ros.analysis.report.file import write_report
+from crgame_ros.analysis.report.run import measured_run
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell_run import run_cell
-from crgame_ros.evaluation.evaluation_folder import EvaluationFolder, REPORTS
+from crgame_ros.evaluation.folder import EvaluationFolder, REPORTS
 from crgame_ros.evaluation.source_digest import engine_digest
-from crgame_ros.evaluation.summary.summary_command import add_summary_arguments
+from crgame_ros.evaluation.summary.command import add_summary_arguments
 from crgame_ros.recording.export import prepare_folder, write_scenario
 from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.run_record import run_record_of
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
     from crgame_ros.evaluation.evaluation import Computing
-    from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+    from crgame_ros.evaluation.plan import EvaluationPlan
 
 
 def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
@@ -113,7 +113,7 @@ def run_command(values: argparse.Namespace) -> int:
     """Evaluate, or look at an evaluation."""
     from crgame_ros.evaluation.dask_cluster import require_dask
     from crgame_ros.evaluation.evaluation import evaluate
-    from crgame_ros.evaluation.evaluation_progress import EvaluationProgress
+    from crgame_ros.evaluation.progress import EvaluationProgress
     from crgame_ros.recording.progress import Progress
     say = partial(print, file=sys.stderr, flush=True)
     if values.cell or values.summary:
@@ -136,7 +136,7 @@ def run_command(values: argparse.Namespace) -> int:
 
 
 def _look(values: argparse.Namespace) -> int:
-    from crgame_ros.evaluation.summary.summary_command import summarise_command
+    from crgame_ros.evaluation.summary.command import summarise_command
     if values.plan is None or not values.plan.is_dir():
         raise InputError('needs the folder of an evaluation',
                          '--cell' if values.cell else '--summary',
@@ -149,8 +149,8 @@ def _look(values: argparse.Namespace) -> int:
 
 def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
     """Return the plan that the command line asks for, and the folder of its evaluation."""
-    from crgame_ros.evaluation.evaluation_folder import EvaluationFolder
-    from crgame_ros.evaluation.evaluation_plan import parse_plan
+    from crgame_ros.evaluation.folder import EvaluationFolder
+    from crgame_ros.evaluation.plan import parse_plan
     from crgame_ros.yaml_text import read_yaml
     given = _given(values)
     if values.plan is None:

@@ -13,10 +13,10 @@ from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.dask_cluster import check_workers, dask_client
-from crgame_ros.evaluation.evaluation_folder import EvaluationFolder
-from crgame_ros.evaluation.evaluation_plan import EvaluationPlan
+from crgame_ros.evaluation.folder import EvaluationFolder
+from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import CELLS
-from crgame_ros.evaluation.results.result_parts import PART_CELLS, ResultParts
+from crgame_ros.evaluation.results.parts import PART_CELLS, ResultParts
 
 GIGABYTE = 1_000_000_000
 # Cells that are out for each thread that computes: enough that none waits, few enough to hold.

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import crgame_ros
 from crgame_ros import __version__
-from crgame_ros.planner.planner_registry import BUILT_IN, EXTERNAL, planner_class
+from crgame_ros.planner.registry import BUILT_IN, EXTERNAL, planner_class
 
 # More of one planner would better be installed where the workers are [bytes].
 MOST_BYTES = 512 * 1024 * 1024

@@ -331,7 +331,7 @@ class Game:
         """Show it in a notebook as its file says it."""
         from html import escape
 
-        from crgame_ros.game.game_file import dump_game
+        from crgame_ros.game.file import dump_game
         return f'<pre>{escape(dump_game(self))}</pre>'
 
     def check(self) -> None:

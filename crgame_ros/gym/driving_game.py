@@ -26,7 +26,7 @@ from crgame_ros.policy.actions import (
 )
 from crgame_ros.policy.route_guide import RouteGuide, RoutePlace
 from crgame_ros.policy.seat_view import SeatView, Surrounded
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import RunObserver
 from crgame_ros.simulation.offline import offline_driver, perceive, PlannerSeat, show

@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar, TypeVar
 
 from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game, HumanSpec
-from crgame_ros.game.game_file import load_game
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.policy.route_guide import RouteGuide

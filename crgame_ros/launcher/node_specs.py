@@ -10,7 +10,7 @@ from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.launcher.node_process import NodeSpec
 from crgame_ros.launcher.run_plan import RunPlan
-from crgame_ros.planner.planner_registry import BUILT_IN, EXTERNAL
+from crgame_ros.planner.registry import BUILT_IN, EXTERNAL
 from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.simulation.roster import Participants
 

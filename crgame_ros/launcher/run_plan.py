@@ -16,11 +16,11 @@ from crgame_ros.cockpit.opening import check_certificate
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import PlannerSwap
+from crgame_ros.game.file import dump_game, load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
-from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.paths import check_room, default_game, numbered
-from crgame_ros.planner.planner_registry import create_planner, EXTERNAL
+from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.recording.recorded_game import read_recorded_game
 from crgame_ros.recording.recorded_inputs import (

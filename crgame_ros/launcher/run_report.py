@@ -28,8 +28,8 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
     say(f'writing {path} …')
     began_s = time.monotonic()
     # They take some time to import.
-    from crgame_ros.analysis.report.report_file import write_report
-    from crgame_ros.analysis.report.report_run import measured_run
+    from crgame_ros.analysis.report.file import write_report
+    from crgame_ros.analysis.report.run import measured_run
     from crgame_ros.recording.run_record import record_of_log
     watch = Progress(say, f'measuring {finished.bag}') if progress else lambda _: None
     try:

@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.opening import Opening
-from crgame_ros.cockpit.runs.run_archive import RunArchive
-from crgame_ros.cockpit.runs.run_routes import add_run_routes
+from crgame_ros.cockpit.runs.archive import RunArchive
+from crgame_ros.cockpit.runs.routes import add_run_routes
 from crgame_ros.cockpit.server import create_app, listen
-from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
+from crgame_ros.nodes.cockpit.backend import LiveBackend
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.ros.node_main import run_node, StopFlag
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor

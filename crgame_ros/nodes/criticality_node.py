@@ -6,7 +6,7 @@ from array import array
 import time
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES, TickMeasures
-from crgame_ros.analysis.criticality.criticality_rows import (
+from crgame_ros.analysis.criticality.rows import (
     COLUMNS,
     criticality_rows,
     CRITICALITY_TOPIC,

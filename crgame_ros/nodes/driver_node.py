@@ -22,8 +22,8 @@ from crgame_ros.ros.device_delay import DeviceDelay
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.live_force import LiveForce
+from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.ros_messages import from_time, to_joy, to_time
 from crgame_ros.ros.seat import GAME
 from crgame_ros.ros.spinning import prompt_executor, spin
 from crgame_ros.ros.trusted_code import TrustedCode

@@ -8,11 +8,11 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.number_parameters import declare_number
-from crgame_ros.ros.ros_messages import from_time
 from crgame_ros.ros.spinning import poll
 from nav_msgs.msg import OccupancyGrid as OccupancyGridMessage
 import numpy as np

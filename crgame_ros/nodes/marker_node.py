@@ -11,8 +11,8 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.nodes.markers.markers import SceneMarkers
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.ros_messages import from_time
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll

@@ -14,11 +14,11 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.planner_manager import PlannerManager, swapped_in
+from crgame_ros.planner.manager import PlannerManager, swapped_in
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.ros_messages import SeriesMessage, to_time
 from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.spinning import spin

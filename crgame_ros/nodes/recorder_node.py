@@ -19,8 +19,8 @@ from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.recording.writer import BagWriter
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.heard_topics import OFFSET, RECORDED
+from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.ros_messages import from_time
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

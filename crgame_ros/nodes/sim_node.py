@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
+from crgame_ros.game.file import dump_game
 from crgame_ros.game.game import Game
-from crgame_ros.game.game_file import dump_game
+from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_run import LiveRun
 from crgame_ros.nodes.sim.run_state import Outcome
-from crgame_ros.nodes.sim.sim_control import SimControl
 from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.other_simulation import refuse_another

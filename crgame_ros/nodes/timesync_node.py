@@ -14,7 +14,7 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.timing.frame_skipping import FrameSkipping
 from crgame_ros.timing.late_steps import LateSteps
-from crgame_ros.timing.timing_metrics import TimingMetrics
+from crgame_ros.timing.metrics import TimingMetrics
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_msgs.msg import Bool

@@ -15,9 +15,9 @@ from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.outline import placed_polygon
-from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
-from crgame_ros.occupancy.occupancy_sources import MAX_TILES
-from crgame_ros.roads.road_surface import (
+from crgame_ros.occupancy.raster_spec import RasterSpec
+from crgame_ros.occupancy.sources import MAX_TILES
+from crgame_ros.roads.surface import (
     lanelet_polygons,
     polygons_of,
     road_surface,

@@ -20,7 +20,7 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 if TYPE_CHECKING:  # Messages are read by processes that need no scenario.
     from commonroad.planning.planning_problem import PlanningProblem
     from commonroad.scenario.scenario import Scenario
-    from crgame_ros.roads.road_boundary import RoadBoundary
+    from crgame_ros.roads.boundary import RoadBoundary
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class PlannerContext:
     @cached_property
     def road(self) -> 'RoadBoundary':
         """Return the boundary of the scenario's road, made at first use: ask for it in `setup`."""
-        from crgame_ros.roads.road_boundary import RoadBoundary
+        from crgame_ros.roads.boundary import RoadBoundary
         return RoadBoundary(self.scenario.lanelet_network)
 
 

@@ -10,7 +10,7 @@ from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.geometry.curve import arc_length, Curve
 from crgame_ros.geometry.polyline import ReferencePath
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, in_lane, Route, start_lanelet
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState

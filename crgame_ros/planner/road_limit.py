@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # Its collision objects are loaded by those only who have a road to keep to.
-    from crgame_ros.roads.road_boundary import RoadBoundary
+    from crgame_ros.roads.boundary import RoadBoundary
 
 Array = NDArray[np.float64]
 

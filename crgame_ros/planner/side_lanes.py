@@ -7,7 +7,7 @@ import math
 from typing import Literal, NamedTuple, TypeAlias
 
 from crgame_ros.planner.reference_path import DrivingPath
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.vehicle.parameters import VehicleParameters
 import numpy as np
 from numpy.typing import NDArray

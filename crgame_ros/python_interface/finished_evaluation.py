@@ -11,7 +11,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation import evaluation
 from crgame_ros.evaluation.dask_cluster import default_workers, require_dask
 from crgame_ros.evaluation.evaluation import Computing, EvaluationTally
-from crgame_ros.evaluation.evaluation_plan import EvaluationPlan, load_plan, parse_plan
+from crgame_ros.evaluation.plan import EvaluationPlan, load_plan, parse_plan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.python_interface.games import as_path, FileName
 import pyarrow as pa

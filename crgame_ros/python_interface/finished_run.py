@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # They take a second to import, and not everybody asks for measures.
-    from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+    from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
     from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
-    from crgame_ros.analysis.report.report_run import ReportRun
+    from crgame_ros.analysis.report.run import ReportRun
     from crgame_ros.analysis.scores.plan_record import PlanRecord
-    from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+    from crgame_ros.analysis.scores.vehicle import VehicleScores
     from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
     from crgame_ros.recording.recorded_plans import RecordedPlan
     import pyarrow as pa
@@ -146,7 +146,7 @@ class Run(ABC):
     @cached_property
     def usual_criticality(self) -> 'Criticality':
         """Measure its criticality by the usual thresholds."""
-        from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+        from crgame_ros.analysis.criticality.recorded import measure_log
         return measure_log(self.log)
 
     def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':
@@ -155,7 +155,7 @@ class Run(ABC):
 
         :raises InputError: if a threshold is not positive.
         """
-        from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+        from crgame_ros.analysis.criticality.recorded import measure_log
         thresholds.check()
         found = self.usual_criticality if thresholds == USUAL else measure_log(
             self.log, thresholds)
@@ -168,7 +168,7 @@ class Run(ABC):
         :param requests: names of the events that ask to take over an AV.
         :raises InputError: if the run has no such event.
         """
-        from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
+        from crgame_ros.analysis.behaviour.driver import measure_behaviour
         from crgame_ros.analysis.run_measures import check_requests
         check_requests(self.record, requests)
         return {each.vehicle_id: each
@@ -208,7 +208,7 @@ class Run(ABC):
 
         :param key: tells it from others of a report.
         """
-        from crgame_ros.analysis.report.report_run import measured_run
+        from crgame_ros.analysis.report.run import measured_run
         return replace(measured_run(self.name, self.bag, self.record, self.timing,
                                     notices=self.notices, offline=self._offline), key=key)
 
@@ -218,7 +218,7 @@ class Run(ABC):
 
         :raises InputError: if the file cannot be written.
         """
-        from crgame_ros.analysis.report.report_file import check_report_path, write_report
+        from crgame_ros.analysis.report.file import check_report_path, write_report
         file = as_path(path, 'path')
         check_report_path(file)
         write_report([self.reported()], file)

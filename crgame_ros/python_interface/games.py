@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from crgame_ros.errors import InputError, short
-from crgame_ros.game import game_file
+from crgame_ros.game import file as game_file
 from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game

@@ -14,7 +14,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, with_planners
-from crgame_ros.planner.planner_registry import PLANNERS
+from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.argument_names import argument_names
 from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import as_game, FileName

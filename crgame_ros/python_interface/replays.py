@@ -8,7 +8,7 @@ from typing import Literal, TYPE_CHECKING
 
 from crgame_ros.analysis.counterfactual import Alternative, drive_against
 from crgame_ros.errors import InputError
-from crgame_ros.planner.planner_registry import PLANNERS
+from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.argument_names import argument_names
 from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import FileName

@@ -36,7 +36,7 @@ def report(runs: Run | FileName | Sequence[Run | FileName], path: FileName) -> P
     :return: the file.
     :raises InputError: if a run cannot be read, there are too many, or the file cannot be written.
     """
-    from crgame_ros.analysis.report.report_file import (
+    from crgame_ros.analysis.report.file import (
         check_report_path,
         check_report_runs,
         write_report,
@@ -61,8 +61,8 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
     :raises InputError: if a run cannot be read, or the folder not be written.
     """
     from crgame_ros.analysis.tables.run_tables import write_tables
-    from crgame_ros.analysis.tables.table_writer import FORMATS
     from crgame_ros.analysis.tables.tabulated_run import own_id
+    from crgame_ros.analysis.tables.writer import FORMATS
     out = as_path(folder, 'folder')
     file_format = next((name for name in FORMATS if name == to), None)
     if file_format is None:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME_TOPIC, GameDocument
 from crgame_ros.game.events import PlannerSwap
+from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game, PoseSpawn
-from crgame_ros.game.game_file import parse_game
 from crgame_ros.recording.epochs import read_epoch, XML_TOPIC
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario

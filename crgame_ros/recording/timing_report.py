@@ -28,7 +28,7 @@ from crgame_ros.recording.storage import BagMessage
 from crgame_ros.recording.view_periods import SeatSound, ViewPeriods
 from crgame_ros.simulation.contacts import Contact, find_contacts, Motions
 from crgame_ros.timing.late_steps import LateSteps
-from crgame_ros.timing.timing_metrics import TimingMetrics
+from crgame_ros.timing.metrics import TimingMetrics
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray

@@ -4,7 +4,7 @@
 
 from collections.abc import Collection
 
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.turns import Turns
 import numpy as np
 from numpy.typing import NDArray

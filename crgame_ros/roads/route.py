@@ -9,7 +9,7 @@ import math
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 
 # A lane change costs this detour [m], more where the lane is shorter than the change wants to be.

@@ -5,7 +5,7 @@
 from collections.abc import Iterable
 import math
 
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.vehicle.lights import Light
 import numpy as np
 

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 
 from crgame_ros.messages.status_values import status_text
-from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.ros.messages import to_time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.publisher import Publisher

@@ -9,7 +9,7 @@ import time
 from crgame_ros.driver.evdev_device import EvdevDevice
 from crgame_ros.driver.force_feedback import FeltForce, ForceFeedback
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.vehicle.parameters import VehicleParameters
 from sensor_msgs.msg import JointState
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.policy.policy_driver import DrivenSeat, PolicyDriver
+from crgame_ros.policy.driver import DrivenSeat, PolicyDriver
 from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet

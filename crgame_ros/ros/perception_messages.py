@@ -10,7 +10,7 @@ from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.perception.perception import Perception
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import EXACT_VARIANCE, set_time
+from crgame_ros.ros.messages import EXACT_VARIANCE, set_time
 from nav_msgs.msg import Odometry
 import numpy as np
 from numpy.typing import NDArray

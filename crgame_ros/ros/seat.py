@@ -9,7 +9,7 @@ from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.ros.endpoints import PolledSubscription
-from crgame_ros.ros.ros_messages import from_joy
+from crgame_ros.ros.messages import from_joy
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 if TYPE_CHECKING:  # The driver's process needs it not, and it takes long to load.

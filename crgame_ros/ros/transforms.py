@@ -9,7 +9,7 @@ from crgame_ros.game.driven_vehicle import DrivenAv
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.ros.messages import to_time
 from geometry_msgs.msg import TransformStamped
 
 

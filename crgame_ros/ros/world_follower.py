@@ -11,7 +11,7 @@ from crgame_ros.game.objects import ObjectStates
 from crgame_ros.messages.joints import vehicles_from_joints
 from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.run_time import RunTime, TimeCourse
 from crgame_ros.ros.scenario_documents import ScenarioSet
 import numpy as np

@@ -22,7 +22,7 @@ from commonroad.scenario.lanelet import Lanelet
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import InitialState
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.roads.road_surface import lanelet_ring
+from crgame_ros.roads.surface import lanelet_ring
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.format_2017a import upgrade
 from crgame_ros.scenario.heights import LaneletHeights, read_heights

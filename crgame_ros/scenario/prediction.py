@@ -16,7 +16,7 @@ from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.reference_point import beside, joined
 from crgame_ros.roads.lane_lookup import LaneLookup
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np

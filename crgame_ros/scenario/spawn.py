@@ -15,7 +15,7 @@ from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import exact_position, exact_value
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState

@@ -45,8 +45,8 @@ FILE_KINDS = {
                          'Table of steering ratios'),
     'device': FileKind('crgame_ros.driver.device_map', 'DeviceFile', 'Device map'),
     'timeline': FileKind('crgame_ros.driver.timeline_file', 'TimelineFile', 'Scripted driver'),
-    'occupancy': FileKind('crgame_ros.occupancy.occupancy_map_file', 'MapEntry', 'Occupancy map'),
-    'study': FileKind('crgame_ros.study.study_file', 'StudyFile', 'Study'),
+    'occupancy': FileKind('crgame_ros.occupancy.map_file', 'MapEntry', 'Occupancy map'),
+    'study': FileKind('crgame_ros.study.file', 'StudyFile', 'Study'),
     'questionnaire': FileKind('crgame_ros.study.questionnaire', 'Questionnaire', 'Questionnaire'),
     'control': FileKind('crgame_ros.vehicle.control_settings', 'ControlSettings',
                         'Gains and lags')}

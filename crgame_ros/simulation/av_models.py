@@ -12,7 +12,7 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_to_joints, vehicles_from_joints
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.perception.localisation import Localisation
 from crgame_ros.perception.perception import Perception
 from crgame_ros.vehicle.models import VEHICLE_MODELS, VehicleModel

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from crgame_ros.game.event_file import document_entry
-from crgame_ros.game.game_file import dump_game
+from crgame_ros.game.file import dump_game
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.setup import Setup

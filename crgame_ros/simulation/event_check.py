@@ -22,8 +22,8 @@ from crgame_ros.game.events import (
 from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.planner.planner_registry import EXTERNAL
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.planner.registry import EXTERNAL
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 
 MAX_LISTED = 12

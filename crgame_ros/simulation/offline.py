@@ -15,7 +15,7 @@ from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.planner.planner_manager import PlannerManager
+from crgame_ros.planner.manager import PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.autonomous_vehicle import AvCounters
 from crgame_ros.simulation.av_models import make_perception, published_states
@@ -44,7 +44,7 @@ def offline_driver(setup: Setup, index: int) -> DriverSource:
         return IdleDriver()
     if source.kind == 'policy':
         # Few games have one, and others should not wait for what it needs.
-        from crgame_ros.policy.policy_driver import DrivenSeat, PolicyDriver
+        from crgame_ros.policy.driver import DrivenSeat, PolicyDriver
         from crgame_ros.policy.policy_file import load_policy
         transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
         return PolicyDriver(load_policy(source.argument, human.id), DrivenSeat(

@@ -10,7 +10,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.roads.driven_lanes import driven_lanes
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle

@@ -14,7 +14,7 @@ from crgame_ros.messages.joints import (
     without_absent,
 )
 from crgame_ros.messages.request_layout import with_lights
-from crgame_ros.planner.planner_registry import PLANNERS
+from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.prediction import (
     LanePrediction,

@@ -17,14 +17,14 @@ from crgame_ros.game.game import AvSpec, Game, ModelSpec
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.rigid_transform import RigidTransform
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.registry import POLICY
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.export_check import refuse_unwritable
 from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
-from crgame_ros.scripted.scripted_objects import ScriptedObjects
+from crgame_ros.scripted.objects import ScriptedObjects
 from crgame_ros.simulation.av_models import check_models
 from crgame_ros.simulation.cast import cast_avs, Part
 from crgame_ros.simulation.event_check import (
@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from crgame_ros.roads.road_boundary import RoadBoundary
+    from crgame_ros.roads.boundary import RoadBoundary
 
 # A vehicle recorded this close to an AV's start is a recording of the AV [m].
 SAME_PLACE = 1.0
@@ -160,7 +160,7 @@ class Setup:
     @cached_property
     def road(self) -> 'RoadBoundary':
         """Return the road's boundary, made at first use (3 to 50 ms): ask for it before a run."""
-        from crgame_ros.roads.road_boundary import RoadBoundary
+        from crgame_ros.roads.boundary import RoadBoundary
         return RoadBoundary(self.loaded.scenario.lanelet_network)
 
     @property

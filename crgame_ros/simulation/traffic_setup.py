@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles

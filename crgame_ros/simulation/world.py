@@ -7,7 +7,7 @@ from typing import Protocol, TYPE_CHECKING
 
 from crgame_ros.game.events import EventSpec, SpeedLimit, TrafficOrder
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 from crgame_ros.scenario.loading import LoadedScenario

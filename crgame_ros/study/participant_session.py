@@ -10,12 +10,12 @@ from types import TracebackType
 from typing import Any, Self
 
 from crgame_ros.errors import InputError
+from crgame_ros.study.file import Page, Questions, StudyFile
+from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.question import check_answers, Question
 from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_journal import SessionJournal
 from crgame_ros.study.session_script import Fields, PracticeDrives, session_of, SessionItem
-from crgame_ros.study.study_file import Page, Questions, StudyFile
-from crgame_ros.study.study_pages import questionnaire_name
 from crgame_ros.study.trial_plan import PlannedTrial
 
 

@@ -5,7 +5,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from crgame_ros.study.study_file import Block, Break, Practice, Step, StepEntry, StudyFile
+from crgame_ros.study.file import Block, Break, Practice, Step, StepEntry, StudyFile
 from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
 from crgame_ros.study.trial_settings import drawn, laid, TrialSettings
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.study_file import Block, StudyFile
+from crgame_ros.study.file import Block, StudyFile
 from crgame_ros.study.trial_order import order_of
 from crgame_ros.study.trial_settings import drawn, laid, Level, TrialSettings
 

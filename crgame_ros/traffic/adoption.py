@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 from crgame_ros.game.objects import ObjectDescription, Role
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.lane_graph import FloatArray, heading_difference
 import numpy as np
 

@@ -8,7 +8,7 @@ from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.lane_table import LaneTable, point_records, poses_on, project_all
 from crgame_ros.traffic.pursuit import PURSUIT_TIME
 import numpy as np

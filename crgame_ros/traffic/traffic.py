@@ -9,7 +9,7 @@ from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.events import ALL_AGENTS, TrafficChange
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.agents import Agents, centers_of, FREE, NOBODY
 from crgame_ros.traffic.changing import LaneChanges

@@ -23,7 +23,7 @@ from commonroad.scenario.traffic_light import (
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.kernel_cache import marker
 from crgame_ros.traffic.traffic import Traffic

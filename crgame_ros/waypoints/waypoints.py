@@ -11,7 +11,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.geometry.reference_point import beside
-from crgame_ros.waypoints.waypoint_projection import ALONE, CurveIndex, CurvePieces
+from crgame_ros.waypoints.projection import ALONE, CurveIndex, CurvePieces
 import numpy as np
 from numpy.typing import NDArray
 

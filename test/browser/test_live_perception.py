@@ -7,7 +7,7 @@ from io import BytesIO
 from pathlib import Path
 
 from browser_support import Browser
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
 from live_peer import Peer
 import numpy as np

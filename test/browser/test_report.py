@@ -11,9 +11,9 @@ import re
 from typing import Any
 
 from browser_support import Browser
-from crgame_ros.analysis.report.report_file import report_html
-from crgame_ros.analysis.report.report_run import measured_run
-from crgame_ros.game.game_file import load_game
+from crgame_ros.analysis.report.file import report_html
+from crgame_ros.analysis.report.run import measured_run
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of

@@ -11,7 +11,7 @@ from typing import Any
 from browser_support import Browser
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.game.documents import parse_game_document
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.page_libraries import find_libraries

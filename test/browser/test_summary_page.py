@@ -8,8 +8,8 @@ import re
 import sys
 
 from browser_support import Browser
+from crgame_ros.evaluation.summary.html_page import write_summary_page
 from crgame_ros.evaluation.summary.summarise import summarise
-from crgame_ros.evaluation.summary.summary_page import write_summary_page
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'evaluation' / 'summary'))

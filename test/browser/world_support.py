@@ -18,7 +18,7 @@ from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.game.documents import parse_game_document
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

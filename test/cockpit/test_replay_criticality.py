@@ -10,14 +10,14 @@ from urllib.error import HTTPError
 from urllib.request import urlopen
 
 from crgame_ros.analysis.criticality.criticality import MEASURES, most_critical
-from crgame_ros.analysis.criticality.criticality_rows import (
+from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.criticality.rows import (
     COLUMNS,
     criticality_rows,
     CRITICALITY_TOPIC,
     PET,
     PLACE_COLUMNS,
 )
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.cockpit.replay_backend import ReplayBackend
 from crgame_ros.recording.run_log import run_log_of
 from crgame_ros.simulation.offline import OfflineResult

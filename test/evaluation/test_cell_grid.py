@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import cell_of
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.evaluation_plan import load_plan, parse_plan
+from crgame_ros.evaluation.plan import load_plan, parse_plan
 from crgame_ros.paths import scenarios_directory
 import pytest
 

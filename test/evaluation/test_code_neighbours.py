@@ -9,7 +9,7 @@ from crgame_ros.evaluation import cell_scene
 from crgame_ros.evaluation.cell_grid import make_grid
 from crgame_ros.evaluation.cell_run import compute_cell
 from crgame_ros.evaluation.content import ContentStore
-from crgame_ros.evaluation.evaluation_plan import parse_plan
+from crgame_ros.evaluation.plan import parse_plan
 from crgame_ros.evaluation.source_digest import code_neighbours
 from crgame_ros.paths import scenarios_directory
 import pytest

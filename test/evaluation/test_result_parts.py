@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.results.result_parts import EARLIER, ResultParts
+from crgame_ros.evaluation.results.parts import EARLIER, ResultParts
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -17,7 +17,7 @@ import pytest
 FILL = """
 import os, sys
 from pathlib import Path
-from crgame_ros.evaluation.results.result_parts import ResultParts
+from crgame_ros.evaluation.results.parts import ResultParts
 sys.path.insert(0, sys.argv[2])
 from test_result_parts import rows
 parts = ResultParts(Path(sys.argv[1]), part_cells=4)

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.file import dump_game, load_game
 from crgame_ros.game.game import (
     AvSpec,
     DrivabilitySpec,
@@ -17,7 +18,6 @@ from crgame_ros.game.game import (
     PredictionSpec,
     TimingSpec,
 )
-from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.yaml_text import MAX_BYTES
 import pytest

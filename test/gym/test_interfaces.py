@@ -121,7 +121,7 @@ def test_the_tables_in_the_document_are_up_to_date() -> None:
 def test_the_package_says_what_to_install_where_gymnasium_is_missing() -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import sys; sys.modules["gymnasium"] = None\n'
-         'import crgame_ros.cli, crgame_ros.policy.policy_planner\n'
+         'import crgame_ros.cli, crgame_ros.policy.planner\n'
          'try:\n    import crgame_ros.gym\nexcept ImportError as e:\n    print(e)'],
         capture_output=True, text=True, check=True)
     assert done.stdout == ('crgame_ros.gym needs the package gymnasium, which is not installed: '

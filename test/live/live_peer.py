@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from crgame_ros.game.documents import GameDocument, parse_game_document
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.timing.cycle_rows import CycleTable
 from diagnostic_msgs.msg import DiagnosticStatus
 from live_support import PATIENCE_S

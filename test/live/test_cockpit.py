@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 import urllib.request
 
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS, wait_until
 import numpy as np

@@ -8,7 +8,7 @@ import time
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_folder import bags_of, run_folder, run_folders
-from crgame_ros.ros.ros_messages import from_time, to_time
+from crgame_ros.ros.messages import from_time, to_time
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS
 import numpy as np

@@ -5,7 +5,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_cycles import read_cycles

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import vehicles_from_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.roads.signals import TrafficLights
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.simulation.av_models import make_perception
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.simulation.world_reader import WorldReader

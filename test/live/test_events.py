@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 from crgame_ros.game.documents import parse_events_document
 from crgame_ros.game.events import AtStep, FiredEvent
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_inputs import recorded_inputs, with_replayed_events
 from crgame_ros.recording.run_log import read_run_log
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer

@@ -7,7 +7,7 @@ from pathlib import Path
 import resource
 
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, wait_until

@@ -13,7 +13,7 @@ import time
 
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from crgame_ros.timing.late_step import CAUSE_WORDS
 from live_peer import Peer
 from live_support import Launcher

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import plan_from_joints, plan_to_joints
 from crgame_ros.messages.plan import Plan
-from crgame_ros.ros.ros_messages import from_time, to_joint_trajectory
+from crgame_ros.ros.messages import from_time, to_joint_trajectory
 from crgame_ros.vehicle.state import VehicleState
 from live_peer import Peer
 from live_support import wait_until

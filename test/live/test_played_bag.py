@@ -13,7 +13,7 @@ from typing import NamedTuple
 from bag_player import BagPlayer
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_log import read_run_log
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from live_peer import Peer
 from live_support import Launcher, PATIENCE_S, SCENARIOS
 from page_client import PageClient

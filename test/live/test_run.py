@@ -11,15 +11,15 @@ import signal
 import commonroad
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.scenario.obstacle import DynamicObstacle
-from crgame_ros.analysis.criticality.criticality_rows import (
+from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.criticality.rows import (
     COLUMNS,
     criticality_rows,
     CRITICALITY_TOPIC,
     read_criticality_rows,
 )
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
 from crgame_ros.cli import main
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles

@@ -5,7 +5,7 @@
 from collections.abc import Callable, Iterator
 import json
 
-from crgame_ros.ros.ros_messages import from_time, to_joy
+from crgame_ros.ros.messages import from_time, to_joy
 from crgame_ros.vehicle.driver_command import DriverCommand
 from live_peer import Peer
 from live_support import Launcher

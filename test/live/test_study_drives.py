@@ -17,9 +17,9 @@ from crgame_ros.recording.run_log import read_run_log
 from crgame_ros.schema.reading import read
 from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import read_journal
-from crgame_ros.study.study_file import StudyFile
 from live_support import is_node, wait_until
 from page_client import PageClient
 import pytest

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from commonroad.common.file_reader import CommonRoadFileReader
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.recording.export import export_scenario
 from crgame_ros.recording.reader import BagReader

@@ -11,12 +11,12 @@ import sys
 
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.occupancy.command import write_map
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.occupancy.occupancy_command import write_map
-from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.raster_spec import RasterSpec
 from crgame_ros.occupancy.rasterize import draw, Raster
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.occupancy.tiles import TiledOccupancy
+from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 import numpy as np
 from numpy.typing import NDArray
@@ -320,9 +320,9 @@ def test_maps_that_are_refused() -> None:
 SLOW = """
 import os, sys, time
 from pathlib import Path
-from crgame_ros.occupancy import occupancy_command
+from crgame_ros.occupancy import command as occupancy_command
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
+from crgame_ros.occupancy.raster_spec import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster
 
 def progress(done, total):

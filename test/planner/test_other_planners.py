@@ -10,7 +10,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.interface import Planner
 from crgame_ros.planner.plan_check import check_plan
-from crgame_ros.planner.planner_registry import create_planner
+from crgame_ros.planner.registry import create_planner
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

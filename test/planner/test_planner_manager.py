@@ -10,9 +10,9 @@ from crgame_ros.game.events import EventSpec, PlannerSwap, SpeedLimit
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.interface import Planner, PlannerContext
+from crgame_ros.planner.manager import PlannerManager
 from crgame_ros.planner.path_planner import initial_state
-from crgame_ros.planner.planner_manager import PlannerManager
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 import pytest

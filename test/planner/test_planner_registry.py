@@ -8,7 +8,7 @@ from pathlib import Path
 import re
 
 from crgame_ros.errors import InputError
-from crgame_ros.planner import planner_registry
+from crgame_ros.planner import registry as planner_registry
 from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
 from crgame_ros.planner.idm import IdmPlanner

@@ -7,8 +7,8 @@ from crgame_ros.geometry.polyline import ReferencePath
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.plan_check import check_plan
-from crgame_ros.planner.planner_registry import create_planner
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.planner.registry import create_planner
+from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

@@ -8,7 +8,7 @@ from pathlib import Path
 from commonroad.geometry.shape import Rectangle
 from crgame_ros.errors import PlanningError
 from crgame_ros.planner.reference_path import plan_driving_path
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState

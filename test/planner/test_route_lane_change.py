@@ -4,7 +4,7 @@
 
 from commonroad.geometry.shape import Rectangle
 from crgame_ros.messages.plan import Plan
-from crgame_ros.planner.planner_registry import create_planner
+from crgame_ros.planner.registry import create_planner
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

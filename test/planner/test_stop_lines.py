@@ -13,7 +13,7 @@ from commonroad.scenario.traffic_light import (
 from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, TrafficSignIDGermany
 from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.idm import IdmPlanner
-from crgame_ros.planner.planner_registry import create_planner
+from crgame_ros.planner.registry import create_planner
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

@@ -11,9 +11,9 @@ from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.recording.run_folder import FINISHED_MARK
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.study.file import load_study, Page, Questions
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_script import Fields
-from crgame_ros.study.study_file import load_study, Page, Questions
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_plan import PlannedTrial
 import numpy as np

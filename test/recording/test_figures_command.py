@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from crgame_ros.analysis.pictures.followed_plans import read_followed_plans
 from crgame_ros.analysis.pictures.pictured_run import PicturedRun
 from crgame_ros.cli import main
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs

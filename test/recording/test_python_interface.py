@@ -16,7 +16,7 @@ from crgame_ros.cli import main
 from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.constant_velocity import ConstantVelocityPlanner
-from crgame_ros.planner.planner_registry import PLANNERS
+from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.offline_runs import OfflineRun
 import polars
 import pytest

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cli import main
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_log import read_run_log, run_log_of

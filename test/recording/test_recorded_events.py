@@ -9,7 +9,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import AtStep
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
 from crgame_ros.recording.recorded_events import read_run_events

@@ -12,8 +12,8 @@ from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME_TOPIC
+from crgame_ros.game.file import dump_game, load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, ModelSpec, PoseSpawn
-from crgame_ros.game.game_file import dump_game, load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, plan_run
 from crgame_ros.paths import scenarios_directory

@@ -10,8 +10,8 @@ from typing import Any
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
 from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, LaneletSpawn, TimingSpec
-from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
 from crgame_ros.recording.export import write_scenario

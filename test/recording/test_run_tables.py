@@ -10,13 +10,16 @@ import shutil
 import tracemalloc
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.tables import pairs_table, run_tables, states_table, table_writer
+from crgame_ros.analysis.tables import pairs as pairs_table
+from crgame_ros.analysis.tables import run_tables
+from crgame_ros.analysis.tables import states as states_table
+from crgame_ros.analysis.tables import writer as table_writer
 from crgame_ros.analysis.tables.run_tables import TABLES, write_tables
 from crgame_ros.analysis.tables.tabulated_run import run_name, TabulatedRun
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory

@@ -9,8 +9,8 @@ from pathlib import Path
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads import road_boundary
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.roads import boundary as road_boundary
+from crgame_ros.roads.boundary import RoadBoundary
 import numpy as np
 from numpy.typing import NDArray
 import pytest

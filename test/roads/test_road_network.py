@@ -7,7 +7,7 @@ from pathlib import Path
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.errors import InputError
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 import numpy as np
 from numpy.typing import NDArray

@@ -10,7 +10,7 @@ from commonroad.scenario.traffic_sign import (
 )
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 from crgame_ros.scenario.loading import load_scenario
 import numpy as np

@@ -13,8 +13,8 @@ from crgame_ros.cockpit.page_messages import parse_message
 from crgame_ros.game.documents import objects_document
 from crgame_ros.game.seat_documents import seat_entry, SeatOccupant, SeatPerson
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
-from crgame_ros.nodes.cockpit.cockpit_backend import LiveBackend
-from crgame_ros.ros.ros_messages import StateMessage
+from crgame_ros.nodes.cockpit.backend import LiveBackend
+from crgame_ros.ros.messages import StateMessage
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import Setup
 from live_peer import Peer

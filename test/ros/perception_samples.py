@@ -9,9 +9,9 @@ from typing import Any
 
 from cockpit_graph import OFFSET_NS
 from crgame_ros.cli import main
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
-from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.ros.messages import to_time
 from crgame_ros.simulation.setup import build_setup, Setup
 from live_support import CUT_IN
 from nav_msgs.msg import OccupancyGrid, Odometry

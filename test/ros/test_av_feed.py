@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from cockpit_graph import Graph, lived, OFFSET_NS
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
-from crgame_ros.ros.ros_messages import to_time
+from crgame_ros.ros.messages import to_time
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from perception_samples import estimate, grid, perceiving_setup, scan

@@ -13,9 +13,9 @@ from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import events_document
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.status_values import read_status
-from crgame_ros.ros.ros_messages import from_time, to_time
+from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.simulation.setup import build_setup, Setup
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from live_support import SCENARIOS

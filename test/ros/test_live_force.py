@@ -12,8 +12,8 @@ from crgame_ros.nodes.driver_node import DriverNode
 from crgame_ros.ros import live_driver
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_force import LiveForce
+from crgame_ros.ros.messages import from_time, to_time
 from crgame_ros.ros.node_main import StopFlag
-from crgame_ros.ros.ros_messages import from_time, to_time
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from live_peer import Peer
 from live_support import Launcher, SCENARIOS

@@ -8,12 +8,12 @@ from pathlib import Path
 import subprocess
 import sys
 
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names
-from crgame_ros.occupancy.occupancy_command import write_map
-from crgame_ros.occupancy.occupancy_raster_spec import RasterSpec
-from crgame_ros.occupancy.occupancy_tiles import TiledOccupancy
+from crgame_ros.occupancy.command import write_map
+from crgame_ros.occupancy.raster_spec import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster
+from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup

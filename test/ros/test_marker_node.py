@@ -8,14 +8,14 @@ from pathlib import Path
 import threading
 
 from crgame_ros.game.documents import objects_document
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes import marker_node
 from crgame_ros.nodes.marker_node import MarkerNode
-from crgame_ros.nodes.markers.map_markers import NAMESPACES
+from crgame_ros.nodes.markers.roads import NAMESPACES
 from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import from_time, StateMessage
 from crgame_ros.ros.node_main import StopFlag
-from crgame_ros.ros.ros_messages import from_time, StateMessage
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup, Setup
 from live_peer import Peer

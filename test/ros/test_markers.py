@@ -7,16 +7,16 @@ import math
 from pathlib import Path
 
 from crgame_ros.game.documents import objects_document
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.outline import outline
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.messages.joints import JointSeries, object_joint_names, vehicle_joint_names
-from crgame_ros.nodes.markers import marker_style as style
-from crgame_ros.nodes.markers.body_markers import Body
-from crgame_ros.nodes.markers.map_markers import line_segments, map_markers, NAMESPACES
+from crgame_ros.nodes.markers import style
+from crgame_ros.nodes.markers.bodies import Body
 from crgame_ros.nodes.markers.markers import AvPaths, SceneMarkers
+from crgame_ros.nodes.markers.roads import line_segments, map_markers, NAMESPACES
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
 from crgame_ros.simulation.document_writer import game_document

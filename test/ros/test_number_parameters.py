@@ -53,7 +53,7 @@ def test_the_file_of_parameters_lists_every_one(project_root: Path) -> None:
     for path in sorted(nodes.glob('*_node.py')):
         source = path.read_text()
         if path.stem == 'sim_node':
-            source += (nodes / 'sim' / 'sim_control.py').read_text()
+            source += (nodes / 'sim' / 'control.py').read_text()
         declared = set(re.findall(
             r"(?:declare_parameter|declare|text|flag)\(\s*'([a-z_]+)'", source))
         declared |= set(re.findall(r"declare_number\(\s*self(?:\._node)?,\s*'([a-z_]+)'",

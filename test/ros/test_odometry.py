@@ -5,7 +5,7 @@
 import math
 import time
 
-from crgame_ros.nodes.sim.sim_outputs import VehicleOutputs
+from crgame_ros.nodes.sim.outputs import VehicleOutputs
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

@@ -6,7 +6,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.request_layout import request_head
-from crgame_ros.ros.ros_messages import to_joint_trajectory
+from crgame_ros.ros.messages import to_joint_trajectory
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message

@@ -19,7 +19,7 @@ from crgame_ros.messages.joints import (
     vehicles_from_joints,
 )
 from crgame_ros.messages.plan import Plan
-from crgame_ros.ros.ros_messages import (
+from crgame_ros.ros.messages import (
     from_joy,
     from_time,
     SeriesMessage,

@@ -7,7 +7,7 @@ from itertools import permutations
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import objects_document
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup

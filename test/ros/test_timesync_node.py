@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleRows

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 import time
 
 from crgame_ros.game.documents import objects_document
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import StateMessage
+from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
 from crgame_ros.simulation.document_writer import game_document

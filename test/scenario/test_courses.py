@@ -7,7 +7,7 @@ import math
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles

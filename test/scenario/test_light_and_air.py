@@ -7,8 +7,8 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.file import dump_game, load_game, parse_game
 from crgame_ros.game.game import EnvironmentSpec
-from crgame_ros.game.game_file import dump_game, load_game, parse_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import parse_scenario

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.prediction import (

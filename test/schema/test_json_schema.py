@@ -11,8 +11,8 @@ from typing import Any
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
-from crgame_ros.game.game_file import dump_game, load_game, parse_game
-from crgame_ros.occupancy.occupancy_map_file import map_text
+from crgame_ros.game.file import dump_game, load_game, parse_game
+from crgame_ros.occupancy.map_file import map_text
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.schema.file_kinds import FILE_KINDS
 from jsonschema import Draft202012Validator

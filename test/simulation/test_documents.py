@@ -11,8 +11,8 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import objects_document, parse_game_document, parse_objects_document
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import DrivabilitySpec
-from crgame_ros.game.game_file import load_game
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory

@@ -9,8 +9,8 @@ from typing import Any
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import AtStep, AtTime, EventList, FiredEvent
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game
-from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import with_recorded_events
 from crgame_ros.schema.reading import read

@@ -6,7 +6,7 @@ from commonroad.common.util import Interval
 from commonroad.planning.goal import GoalRegion
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import CustomState, InitialState
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.plan_indicator import PlanIndicator
 from crgame_ros.vehicle.lights import Light

@@ -5,7 +5,7 @@
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.game_file import dump_game, parse_game
+from crgame_ros.game.file import dump_game, parse_game
 from crgame_ros.game.objects import Role
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import with_recorded_events

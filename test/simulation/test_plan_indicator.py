@@ -5,11 +5,11 @@
 from pathlib import Path
 
 from commonroad.common.file_reader import CommonRoadFileReader
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_log import run_log_of
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.plan_indicator import PlanIndicator

@@ -10,8 +10,8 @@ from crgame_ros.analysis.behaviour.lane_keeping import keep_lane
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.validation import validate
 from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import DrivabilitySpec, HumanSpec, PoseSpawn
-from crgame_ros.game.game_file import load_game
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario

@@ -9,8 +9,8 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import events_document, parse_events_document, parse_game_document
 from crgame_ros.game.events import EventList, EventSpec, FiredEvent
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, HumanSpec, PoseSpawn
-from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read

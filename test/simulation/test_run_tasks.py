@@ -10,8 +10,8 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.events import EventList
+from crgame_ros.game.file import dump_game, parse_game
 from crgame_ros.game.game import HumanSpec, PoseSpawn
-from crgame_ros.game.game_file import dump_game, parse_game
 from crgame_ros.game.task_documents import (
     log_document,
     PageTimes,

@@ -5,11 +5,11 @@
 from dataclasses import replace
 from typing import ClassVar
 
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import PlannerContext
-from crgame_ros.roads.road_boundary import _tile_at, _united, RoadBoundary
+from crgame_ros.roads.boundary import _tile_at, _united, RoadBoundary
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np

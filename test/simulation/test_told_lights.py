@@ -6,10 +6,10 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.game.game_file import dump_game, parse_game
+from crgame_ros.game.file import dump_game, parse_game
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.planner.planner_registry import BUILT_IN, planner_class
+from crgame_ros.planner.registry import BUILT_IN, planner_class
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.av_models import published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
@@ -183,7 +183,7 @@ def test_only_lights_of_vehicles_in_view_are_told() -> None:
 
 def test_no_planner_of_ours_asks_for_lights() -> None:
     """So that the simulation need not import them to know."""
-    for target in {*BUILT_IN.values(), 'crgame_ros.policy.policy_planner:PolicyPlanner'}:
+    for target in {*BUILT_IN.values(), 'crgame_ros.policy.planner:PolicyPlanner'}:
         spec = importlib.util.find_spec(target.partition(':')[0])
         assert spec is not None and spec.origin is not None
         # Read, not imported: some need packages that are not everywhere.

@@ -16,8 +16,8 @@ from typing import Any
 from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from crgame_ros.cockpit.access import Access
 from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.desk_server import serve_desk
 from crgame_ros.study.desk.participant_document import participant_document
+from crgame_ros.study.desk.server import serve_desk
 from crgame_ros.study.participant_session import ParticipantSession
 import pytest
 

@@ -8,9 +8,9 @@ import sys
 
 from crgame_ros.cockpit.access import Access
 from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.desk_server import serve_desk
+from crgame_ros.study.desk.server import serve_desk
+from crgame_ros.study.file import load_study
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.study_file import load_study
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -9,8 +9,8 @@ import random
 import sys
 
 from aiohttp import ClientSession, CookieJar, WSMsgType, WSServerHandshakeError
-from crgame_ros.study.desk.desk_pages import words_of
-from crgame_ros.study.desk.desk_server import MAX_MALFORMED
+from crgame_ros.study.desk.pages import words_of
+from crgame_ros.study.desk.server import MAX_MALFORMED
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))

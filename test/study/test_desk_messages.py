@@ -7,10 +7,10 @@ from pathlib import Path
 import sys
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.desk.desk_messages import parse_experimenter, parse_participant
-from crgame_ros.study.desk.desk_pages import words_of
+from crgame_ros.study.desk.messages import parse_experimenter, parse_participant
 from crgame_ros.study.desk.page_markdown import picture, read_tree
-from crgame_ros.study.study_file import Page
+from crgame_ros.study.desk.pages import words_of
+from crgame_ros.study.file import Page
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))

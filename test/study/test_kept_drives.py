@@ -9,8 +9,8 @@ import shutil
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.study.desk.page_markdown import pictures_of
-from crgame_ros.study.study_file import load_study
-from crgame_ros.study.study_folder import StudyFolder
+from crgame_ros.study.file import load_study
+from crgame_ros.study.folder import StudyFolder
 import pytest
 import yaml
 

@@ -12,10 +12,10 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
+from crgame_ros.study.file import Page, StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_journal import JOURNAL, read_journal, SessionJournal
 from crgame_ros.study.session_script import PracticeDrives
-from crgame_ros.study.study_file import Page, StudyFile
 from crgame_ros.study.trial_plan import PlannedTrial
 import pytest
 

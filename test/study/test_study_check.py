@@ -9,8 +9,8 @@ from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.schema.reading import read
-from crgame_ros.study.study_check import check_study, length_of
-from crgame_ros.study.study_file import load_study, StudyFile
+from crgame_ros.study.check import check_study, length_of
+from crgame_ros.study.file import load_study, StudyFile
 from crgame_ros.study.trial_game import trial_game
 from crgame_ros.study.trial_plan import conditions_of, plan_trials
 import pytest

@@ -8,8 +8,8 @@ import subprocess
 import sys
 
 from crgame_ros.schema.reading import read
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.session_script import PracticeDrives, session_of
-from crgame_ros.study.study_file import StudyFile
 from crgame_ros.study.trial_order import order_of, ORDERS, rows_of, williams_rows
 from crgame_ros.study.trial_plan import plan_trials
 import pytest

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a trial's row says of its tasks."""
 
-from crgame_ros.analysis.tables.task_tables import DETECTION_SCORES, TAKE_OVER_REQUESTS
+from crgame_ros.analysis.tables.tasks import DETECTION_SCORES, TAKE_OVER_REQUESTS
 from crgame_ros.study.data.trials_table import TASK_COLUMNS, task_values
 import pytest
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import TimingSpec
+from crgame_ros.timing.metrics import TimingMetrics
 from crgame_ros.timing.time_controller import Cycle, TimeController
-from crgame_ros.timing.timing_metrics import TimingMetrics
 import numpy as np
 import pytest
 

@@ -7,8 +7,8 @@ import math
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.game import TimingSpec
+from crgame_ros.timing.metrics import LogHistogram, TimingMetrics, TimingSummary
 from crgame_ros.timing.time_controller import TimeController
-from crgame_ros.timing.timing_metrics import LogHistogram, TimingMetrics, TimingSummary
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -4,7 +4,7 @@
 
 from pathlib import Path
 
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.conflicts import Conflicts, roundabouts
 from crgame_ros.traffic.lane_graph import LaneGraph

@@ -9,7 +9,7 @@ from commonroad.scenario.lanelet import Lanelet, StopLine
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.lane_graph import driving_side, LaneGraph, LEFT_HAND, PRIORITY_TO_THE_RIGHT

@@ -4,7 +4,7 @@
 
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.agents import Agents
 from crgame_ros.traffic.encounters import BEFORE, BESIDE, FIRMEST, needed_braking
 from crgame_ros.traffic.lane_graph import LaneGraph

@@ -7,7 +7,7 @@ from typing import Any
 
 from crgame_ros.game.game import Game
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup

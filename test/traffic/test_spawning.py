@@ -7,7 +7,7 @@ from pathlib import Path
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.traffic.adoption import adoptable, Adopted

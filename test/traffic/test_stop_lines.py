@@ -16,7 +16,7 @@ from commonroad.scenario.traffic_light import (
     TrafficLightState,
 )
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.leaders import Ways

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How fast a swerve may be driven: the tables of `Swerving` against bicycles that drive it."""
 
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries

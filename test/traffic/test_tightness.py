@@ -5,7 +5,7 @@
 from pathlib import Path
 
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.spawning import CAR, LARGE_CAR, TRUCK
 from crgame_ros.traffic.tightness import tight_lanes

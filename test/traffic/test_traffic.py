@@ -7,7 +7,7 @@ from pathlib import Path
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.speed_limits import set_speed_limit
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.car_following import CarFollowing

@@ -9,14 +9,14 @@ import re
 
 import commonroad
 from crgame_ros.errors import InputError
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.waypoints.waypoint_export import Drive, export_roads, ExportedRoads
-from crgame_ros.waypoints.waypoint_roads import LaneLinks, WaypointRoads
+from crgame_ros.waypoints.export import Drive, export_roads, ExportedRoads
+from crgame_ros.waypoints.roads import LaneLinks, WaypointRoads
 from crgame_ros.waypoints.waypoints import WaypointLane
 from lxml import etree
 import numpy as np

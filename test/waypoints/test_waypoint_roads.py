@@ -7,15 +7,15 @@ import time
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.waypoints.waypoint_lanelets import (
+from crgame_ros.waypoints.lanelets import (
     graded,
     lane_of_chain,
     lanelet_chain,
     lanelet_lane,
 )
-from crgame_ros.waypoints.waypoint_roads import LaneLinks, WaypointRoads
+from crgame_ros.waypoints.roads import LaneLinks, WaypointRoads
 from crgame_ros.waypoints.waypoints import WaypointLane
 import numpy as np
 import pytest

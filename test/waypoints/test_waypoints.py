@@ -9,9 +9,9 @@ import time
 
 from crgame_ros.errors import InputError
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.waypoints.waypoint_roads import WaypointRoads
+from crgame_ros.waypoints.roads import WaypointRoads
 from crgame_ros.waypoints.waypoints import WaypointLane
 import numpy as np
 from numpy.typing import NDArray

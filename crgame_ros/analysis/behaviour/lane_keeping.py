@@ -12,7 +12,7 @@ from crgame_ros.analysis.behaviour.lane_strip import LaneStrip, strip_of, wheels
 from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisit, LaneVisits
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np

@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 
 from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisit
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 from numpy.typing import NDArray
 

@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 from numpy.typing import NDArray
 import shapely

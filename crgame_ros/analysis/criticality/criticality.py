@@ -25,7 +25,7 @@ from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
 from crgame_ros.vehicle.state import pose_rates, StateColumn

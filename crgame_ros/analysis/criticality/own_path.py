@@ -9,7 +9,7 @@ from typing import NamedTuple
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.curve import Curve, nearest
 from crgame_ros.geometry.polyline import resample
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, in_lane
 import numpy as np
 from numpy.typing import NDArray

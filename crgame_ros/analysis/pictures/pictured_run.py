@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 import re
 
-from crgame_ros.analysis.criticality.recorded_criticality import measure_log
+from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
 from crgame_ros.analysis.pictures.followed_plans import read_followed_plans
 from crgame_ros.analysis.pictures.scene_frame import FrameScene

@@ -24,7 +24,7 @@ from crgame_ros.analysis.pictures.frame_window import (
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.recording.run_log import RunLog
-from crgame_ros.roads.road_surface import (
+from crgame_ros.roads.surface import (
     lanelet_polygons,
     polygons_of,
     road_surface,

@@ -8,7 +8,7 @@ from io import StringIO
 from typing import NamedTuple
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
-from crgame_ros.timing.timing_metrics import TimingMetrics, TimingSummary
+from crgame_ros.timing.metrics import TimingMetrics, TimingSummary
 
 
 class TimingRow(NamedTuple):

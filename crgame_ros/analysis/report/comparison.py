@@ -9,11 +9,11 @@ from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.report.criticality_section import is_critical, marked
 from crgame_ros.analysis.report.outcome_section import contacts_of_report
 from crgame_ros.analysis.report.planners_section import planners_compared
-from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
-from crgame_ros.analysis.report.report_section import Dash, Plot, PlotLine, Section
-from crgame_ros.analysis.report.report_text import free, NOTHING, number, share, table
+from crgame_ros.analysis.report.run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.run_section import title_of
+from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, Section
 from crgame_ros.analysis.report.story_section import moment
+from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
 from crgame_ros.vehicle.state import StateColumn
 
 # Lines of runs are told apart by these colours, and those of their vehicles by dashes.

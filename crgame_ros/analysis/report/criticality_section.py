@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from crgame_ros.analysis.criticality.criticality import MEASURES, VehicleCriticality
 from crgame_ros.analysis.criticality.thresholds import Thresholds
 from crgame_ros.analysis.report.motion_section import dash_of
-from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
-from crgame_ros.analysis.report.report_section import Plot, PlotLimit, PlotLine, Section
-from crgame_ros.analysis.report.report_text import note, number, plain, table
+from crgame_ros.analysis.report.run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
 from crgame_ros.analysis.report.story_moments import is_told, TWICE, WORDS
 from crgame_ros.analysis.report.story_section import moment
+from crgame_ros.analysis.report.text import note, number, plain, table
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,15 +5,15 @@
 from collections.abc import Iterator, Sequence
 import math
 
-from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
+from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
-from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.analysis.report.motion_section import dash_of
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Plot, PlotLine, Section
-from crgame_ros.analysis.report.report_text import free, note, number, plain, table
+from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.section import Plot, PlotLine, Section
 from crgame_ros.analysis.report.story_section import moment
+from crgame_ros.analysis.report.text import free, note, number, plain, table
 
 # Longer times to the edge of a lane say nothing [s].
 _SHOWN_S = 10.0

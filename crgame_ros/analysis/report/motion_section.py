@@ -4,10 +4,10 @@
 
 from collections.abc import Iterator
 
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Dash, Plot, PlotLine, PlotSpan, Section
-from crgame_ros.analysis.report.report_text import note, NOTHING, number, table
+from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, PlotSpan, Section
+from crgame_ros.analysis.report.text import note, NOTHING, number, table
 from crgame_ros.game.objects import Role
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn

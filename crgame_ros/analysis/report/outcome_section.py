@@ -5,11 +5,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Section
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, table
+from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.story_section import moment
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, table
 
 
 def outcome_section(run: ReportRun) -> Section:

@@ -5,12 +5,12 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Section
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.scores.score_measures import MEASURES
-from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.vehicle import VehicleScores
 
 # Words of a measure and the digits of its values; costs are from hundredths to millions.
 _NUPLAN = {

@@ -5,9 +5,9 @@
 from collections.abc import Iterator
 from datetime import datetime, UTC
 
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Section
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.run import ReportRun
+from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import Role
 

@@ -10,10 +10,10 @@ from crgame_ros.analysis.pictures.critical_moments import (
 )
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Section
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain
+from crgame_ros.analysis.report.run import ReportRun
+from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.story_moments import nearest_moment
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain
 
 # Of a picture [px].
 _WIDTH = 560

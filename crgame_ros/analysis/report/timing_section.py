@@ -5,10 +5,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from crgame_ros.analysis.report.report_run import ReportRun
-from crgame_ros.analysis.report.report_section import Plot, PlotLimit, PlotLine, Section
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, share, table
+from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
+from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, share, table
 from crgame_ros.timing.late_step import CAUSE_WORDS
 
 # Of table I: key of `timing.json`, words, unit, factor, digits.

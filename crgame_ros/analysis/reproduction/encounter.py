@@ -7,7 +7,7 @@ from functools import cached_property
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.recording.run_log import RunLog
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np

@@ -159,7 +159,7 @@ def reproduce(values: argparse.Namespace) -> int:
         evaluate_timing,
         EvaluationRequest,
     )
-    from crgame_ros.planner.planner_registry import planner_class
+    from crgame_ros.planner.registry import planner_class
     formats = _formats(values.format)
     if not 1.0 <= values.duration < math.inf:
         raise InputError(f'is {values.duration:g} s', '--duration', 'give a second or more')

@@ -29,8 +29,8 @@ from crgame_ros.simulation.observer import drivability_monitor
 from crgame_ros.simulation.offline import observed_run, offline_driver, PlannerSeat
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import CycleTable, TIMING_COLUMNS
+from crgame_ros.timing.metrics import TimingMetrics, TimingSummary
 from crgame_ros.timing.time_controller import TimeController
-from crgame_ros.timing.timing_metrics import TimingMetrics, TimingSummary
 import numpy as np
 
 

@@ -3,7 +3,7 @@
 """Who shows how far a vehicle might have come: a recorded human, or whose drive it repeats."""
 
 from commonroad.planning.planning_problem import PlanningProblem
-from crgame_ros.analysis.scores.nuplan_score import Expert
+from crgame_ros.analysis.scores.nuplan import Expert
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.reference_point import shifted

@@ -4,12 +4,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from crgame_ros.analysis.scores.nuplan_score import Expert, NuplanScore, NuplanScorer
+from crgame_ros.analysis.scores.nuplan import Expert, NuplanScore, NuplanScorer
 from crgame_ros.analysis.scores.plan_record import PlanRecord
 from crgame_ros.analysis.scores.run_expert import recorded_expert
 from crgame_ros.analysis.scores.scored_drive import drive_of
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
-from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.recording.run_log import RunLog

@@ -13,13 +13,13 @@ from crgame_ros.analysis.scores.driven_states import (
     goal_step,
     until_goal,
 )
-from crgame_ros.analysis.scores.nuplan_score import Expert
+from crgame_ros.analysis.scores.nuplan import Expert
 from crgame_ros.analysis.scores.plan_record import find_goal, PlanRecord
-from crgame_ros.analysis.scores.planner_scores import PlannerScores, REMARKS
+from crgame_ros.analysis.scores.planner import PlannerScores, REMARKS
 from crgame_ros.analysis.scores.scored_drives import first_ends, score_drives
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
-from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
 

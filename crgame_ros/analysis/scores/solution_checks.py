@@ -15,7 +15,7 @@ from crgame_ros.analysis.scores.trajectory_feasibility import (
 )
 from crgame_ros.errors import one_line
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.roads.boundary import RoadBoundary
 import numpy as np
 from numpy.typing import NDArray
 

@@ -8,13 +8,13 @@ from commonroad.common.solution import PlanningProblemSolution
 from commonroad.scenario.state import TraceState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.analysis.scores.commonroad_costs import evaluate_costs
-from crgame_ros.analysis.scores.planner_scores import SolutionScores
+from crgame_ros.analysis.scores.planner import SolutionScores
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_checks import check_solution
 from crgame_ros.analysis.scores.trajectory_feasibility import (
     check_feasibility,
 )
-from crgame_ros.roads.road_boundary import RoadBoundary
+from crgame_ros.roads.boundary import RoadBoundary
 import numpy as np
 from numpy.typing import NDArray
 

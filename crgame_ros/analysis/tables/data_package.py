@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from crgame_ros import __version__
 from crgame_ros.analysis.tables.column import Column, FLAG, TableDeclaration
-from crgame_ros.analysis.tables.table_writer import Format, FORMULA_GUARD, NOT_A_NUMBER
+from crgame_ros.analysis.tables.writer import Format, FORMULA_GUARD, NOT_A_NUMBER
 
 PACKAGE_FILE = 'datapackage.json'
 CREATOR = 'crgame_ros'

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from crgame_ros.analysis.tables.behaviour_tables import BEHAVIOUR_TABLES, write_behaviour
+from crgame_ros.analysis.tables.behaviour import BEHAVIOUR_TABLES, write_behaviour
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.data_package import (
     CREATOR,
@@ -18,22 +18,22 @@ from crgame_ros.analysis.tables.data_package import (
     PACKAGE_FILE,
     WrittenTable,
 )
-from crgame_ros.analysis.tables.pairs_table import CROSSINGS, PAIRS, write_criticality
-from crgame_ros.analysis.tables.plans_table import plan_rows, PLANS
-from crgame_ros.analysis.tables.runs_table import RUN_PARTS, RUNS
+from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
+from crgame_ros.analysis.tables.part import part_rows
+from crgame_ros.analysis.tables.plans import plan_rows, PLANS
+from crgame_ros.analysis.tables.runs import RUN_PARTS, RUNS
 from crgame_ros.analysis.tables.score_columns import score_vehicles
-from crgame_ros.analysis.tables.states_table import state_rows, STATES
-from crgame_ros.analysis.tables.table_part import part_rows
-from crgame_ros.analysis.tables.table_writer import (
+from crgame_ros.analysis.tables.states import state_rows, STATES
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.tasks import EVENT_PARTS, EVENTS, TASK_TABLES, write_tasks
+from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS, VEHICLES
+from crgame_ros.analysis.tables.writer import (
     Format,
     FORMATS,
     KeptTable,
     TableRows,
     TableWriter,
 )
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
-from crgame_ros.analysis.tables.task_tables import EVENT_PARTS, EVENTS, TASK_TABLES, write_tasks
-from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS, VEHICLES
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder, write_text
 import pyarrow as pa

@@ -5,12 +5,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.plan_record import plans_of_report
-from crgame_ros.analysis.scores.run_scores import scores_of
-from crgame_ros.analysis.scores.score_measures import MEASURES
-from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.analysis.scores.run import scores_of
+from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER, TEXT
-from crgame_ros.analysis.tables.table_part import TablePart
+from crgame_ros.analysis.tables.part import TablePart
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
 
 NOT_SCORED = 'the run was not scored'

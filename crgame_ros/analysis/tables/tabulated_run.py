@@ -9,10 +9,10 @@ from pathlib import Path
 import re
 from typing import Any
 
-from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
-from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+from crgame_ros.analysis.behaviour.driver import measure_behaviour
+from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.analysis.criticality.criticality import VehicleCriticality
-from crgame_ros.analysis.scores.vehicle_scores import VehicleScores
+from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.recorded_plans import read_plans, RecordedPlan

@@ -13,9 +13,9 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.table_part import part_rows
+from crgame_ros.analysis.tables.part import part_rows
 from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
-from crgame_ros.analysis.tables.vehicles_table import VEHICLE_PARTS
+from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.results.result_parts import newest_parts
+from crgame_ros.evaluation.results.parts import newest_parts
 import pyarrow as pa
 import pyarrow.parquet as pq
 

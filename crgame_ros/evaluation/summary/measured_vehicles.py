@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from crgame_ros.evaluation.summary.cell_block import CellBlock, IntArray
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
-from crgame_ros.evaluation.summary.summary_measures import SummaryMeasure
+from crgame_ros.evaluation.summary.measures import SummaryMeasure
 import numpy as np
 from numpy.typing import NDArray
 import pyarrow as pa

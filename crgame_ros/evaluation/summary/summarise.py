@@ -17,14 +17,14 @@ from crgame_ros.evaluation.summary.cell_tally import CellTally, tally_cells
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
 from crgame_ros.evaluation.summary.group_bootstrap import FloatArray, GroupBootstrap, IntArray
 from crgame_ros.evaluation.summary.measured_vehicles import measured_vehicles, MeasuredVehicles
-from crgame_ros.evaluation.summary.paired_cells import paired_cells
-from crgame_ros.evaluation.summary.summary import GroupMeans, PairedDifferences, Summary, WorstCell
-from crgame_ros.evaluation.summary.summary_measures import (
+from crgame_ros.evaluation.summary.measures import (
     chosen_measures,
     MEASURES,
     SummaryMeasure,
     WORST_FIRST,
 )
+from crgame_ros.evaluation.summary.paired_cells import paired_cells
+from crgame_ros.evaluation.summary.summary import GroupMeans, PairedDifferences, Summary, WorstCell
 from crgame_ros.game.game import DEFAULT_PLANNER
 import numpy as np
 import pyarrow as pa

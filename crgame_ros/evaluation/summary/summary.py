@@ -9,7 +9,7 @@ import re
 import shlex
 from typing import Any, Literal
 
-from crgame_ros.evaluation.summary.summary_measures import SummaryMeasure
+from crgame_ros.evaluation.summary.measures import SummaryMeasure
 
 _KEY = re.compile('[0-9a-f]{32}')
 

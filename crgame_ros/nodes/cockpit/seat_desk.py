@@ -16,10 +16,10 @@ from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import parse_seats_document
 from crgame_ros.game.seat_documents import parse_tenants, SeatDemand, SeatPerson
-from crgame_ros.nodes.cockpit.cockpit_feed import CockpitFeed
-from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.nodes.cockpit.feed import CockpitFeed
+from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints
-from crgame_ros.ros.ros_messages import to_joy
+from crgame_ros.ros.messages import to_joy
 from crgame_ros.ros.seat import GAME
 from crgame_ros.vehicle.driver_command import DriverCommand
 from diagnostic_msgs.msg import DiagnosticStatus

@@ -9,16 +9,16 @@ from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joints import JointSeries, vehicle_joint_names
 from crgame_ros.messages.request_layout import RequestLayout
-from crgame_ros.nodes.markers import marker_style as style
-from crgame_ros.nodes.markers.body_markers import (
+from crgame_ros.nodes.markers import style
+from crgame_ros.nodes.markers.bodies import (
     Body,
     Item,
     LIFETIME_S,
     LightMarker,
     Line,
 )
-from crgame_ros.nodes.markers.map_markers import light_positions, map_markers
-from crgame_ros.ros.ros_messages import set_time
+from crgame_ros.nodes.markers.roads import light_positions, map_markers
+from crgame_ros.ros.messages import set_time
 from crgame_ros.ros.scenario_documents import ScenarioSet
 from crgame_ros.vehicle.lights import BRAKING
 from crgame_ros.vehicle.state import StateColumn

@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from crgame_ros.nodes.sim.sim_inputs import SimInputs
-from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.nodes.sim.inputs import SimInputs
+from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.ros.seat import Seat
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.engine import Simulation

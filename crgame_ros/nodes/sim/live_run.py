@@ -9,12 +9,12 @@ import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+from crgame_ros.nodes.sim.control import SimControl
+from crgame_ros.nodes.sim.inputs import SimInputs
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
+from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
 from crgame_ros.nodes.sim.run_state import Outcome, RunState
-from crgame_ros.nodes.sim.sim_control import SimControl
-from crgame_ros.nodes.sim.sim_inputs import SimInputs
-from crgame_ros.nodes.sim.sim_outputs import SimOutputs
 from crgame_ros.nodes.sim.start_gate import ReadyGate, StartGate
 from crgame_ros.nodes.sim.step_watch import StepWatch
 from crgame_ros.ros.endpoints import Endpoints

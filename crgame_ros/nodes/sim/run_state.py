@@ -5,9 +5,9 @@
 from enum import auto, Enum
 import time
 
+from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
-from crgame_ros.nodes.sim.sim_control import SimControl
-from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation
 
 # It was to end with everything else.

@@ -5,9 +5,9 @@
 from collections.abc import Callable, Iterable, Sequence
 import math
 
-from crgame_ros.nodes.sim.sim_control import SimControl
-from crgame_ros.nodes.sim.sim_inputs import SimInputs
-from crgame_ros.nodes.sim.sim_outputs import SimOutputs
+from crgame_ros.nodes.sim.control import SimControl
+from crgame_ros.nodes.sim.inputs import SimInputs
+from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.ros.heard_topics import HeardTopics
 from crgame_ros.ros.seat import GAME
 from crgame_ros.ros.seats import Seats

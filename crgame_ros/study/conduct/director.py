@@ -14,9 +14,9 @@ from crgame_ros.game.documents import (
     parse_game_document,
 )
 from crgame_ros.messages.status_values import read_status
-from crgame_ros.nodes.cockpit.cockpit_orders import CockpitOrders
+from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
-from crgame_ros.ros.ros_messages import from_time
+from crgame_ros.ros.messages import from_time
 from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
 from rclpy.context import Context

@@ -20,9 +20,9 @@ from crgame_ros.software import software_with_commit
 from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.data.study_data_command import add_data_arguments
 from crgame_ros.study.desk.desk import Desk
-from crgame_ros.study.desk.desk_server import serve_desk
+from crgame_ros.study.desk.server import serve_desk
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import ParticipantSession
-from crgame_ros.study.study_file import StudyFile
 
 HOST = '127.0.0.1'
 # From "I am ready" to the first cycle [s].
@@ -185,8 +185,8 @@ def check_command(values: argparse.Namespace) -> int:
     :raises InputError: if the file cannot be read, or names what there is not.
     """
     from crgame_ros.recording.progress import Progress
-    from crgame_ros.study.study_check import check_study, length_of
-    from crgame_ros.study.study_file import load_study
+    from crgame_ros.study.check import check_study, length_of
+    from crgame_ros.study.file import load_study
     from crgame_ros.study.trial_plan import plan_trials
     if not 0 <= values.participants <= 10_000:
         raise InputError(f'is {values.participants}', '--participants', 'give 0 to 10000')
@@ -215,8 +215,8 @@ def run_command(values: argparse.Namespace) -> int:
     """
     from crgame_ros.ros.environment import prepare_environment, require_ros
     from crgame_ros.study.desk.page_markdown import pictures_of
-    from crgame_ros.study.study_file import load_study
-    from crgame_ros.study.study_folder import check_participant, StudyFolder
+    from crgame_ros.study.file import load_study
+    from crgame_ros.study.folder import check_participant, StudyFolder
     require_ros()
     prepare_environment()
     from crgame_ros.launcher.interruption import say

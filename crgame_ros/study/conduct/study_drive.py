@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.game.game_file import dump_game
+from crgame_ros.game.file import dump_game
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_game import seat_of, trial_game
 from crgame_ros.study.trial_plan import PlannedTrial

@@ -14,10 +14,10 @@ from crgame_ros.study.data.study_row_table import (
     score_columns,
     unlike,
 )
+from crgame_ros.study.file import Questions, StudyFile
+from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.questionnaire import load_questionnaire, Questionnaire
 from crgame_ros.study.session_script import session_of, SessionItem
-from crgame_ros.study.study_file import Questions, StudyFile
-from crgame_ros.study.study_pages import questionnaire_name
 from crgame_ros.study.trial_plan import PlannedTrial
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.report.report_text import free, note, number, plain, table
+from crgame_ros.analysis.report.text import free, note, number, plain, table
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER
 from crgame_ros.study.data.condition_means import (
     condition_means,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.data.participant_record import ParticipantRecord, read_participant
-from crgame_ros.study.study_file import load_study, StudyFile
+from crgame_ros.study.file import load_study, StudyFile
 
 STUDY, PARTICIPANTS, DATA = 'study', 'participants', 'data'
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from crgame_ros.errors import InputError
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.session_journal import read_journal
 from crgame_ros.study.session_script import session_of, SessionItem
-from crgame_ros.study.study_file import StudyFile
 from crgame_ros.study.trial_plan import PlannedTrial
 
 Ending = Literal['finished', 'aborted', 'lost', 'open']

@@ -10,9 +10,9 @@ from crgame_ros.study.data.asked_questions import AskedQuestions, plain_answer
 from crgame_ros.study.data.participant_record import ParticipantRecord
 from crgame_ros.study.data.study_row_table import flag_column, question_column, unlike
 from crgame_ros.study.data.trials_table import PARTICIPANT, utc, WALL
+from crgame_ros.study.file import StudyFile
 from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.session_script import Fields
-from crgame_ros.study.study_file import StudyFile
 
 _FIXED = (
     PARTICIPANT, Column('place', INTEGER, '1', 'among all participants, from 1 on'),

@@ -15,7 +15,7 @@ from crgame_ros.analysis.tables.data_package import (
     WrittenTable,
 )
 from crgame_ros.analysis.tables.run_tables import TABLES
-from crgame_ros.analysis.tables.table_writer import TableWriter
+from crgame_ros.analysis.tables.writer import TableWriter
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder, write_text
 from crgame_ros.study.data.study_data import CountedTrial

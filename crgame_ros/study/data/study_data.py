@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.analysis.report.report_command import REPORT_FILE
-from crgame_ros.analysis.report.report_file import write_report
-from crgame_ros.analysis.report.report_run import read_report_run
+from crgame_ros.analysis.report.command import REPORT_FILE
+from crgame_ros.analysis.report.file import write_report
+from crgame_ros.analysis.report.run import read_report_run
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.finish import finish_run

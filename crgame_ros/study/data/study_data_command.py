@@ -70,7 +70,7 @@ def report_command(values: argparse.Namespace) -> int:
 
     :raises InputError: if the folder holds no study, or the file cannot be written.
     """
-    from crgame_ros.analysis.report.report_file import check_report_path
+    from crgame_ros.analysis.report.file import check_report_path
     from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_report import write_study_report
     folder = ConductedStudy(values.folder)

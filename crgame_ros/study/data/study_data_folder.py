@@ -16,7 +16,7 @@ from crgame_ros.analysis.tables.data_package import (
     table_schema,
     WrittenTable,
 )
-from crgame_ros.analysis.tables.table_writer import Format, NOT_A_NUMBER
+from crgame_ros.analysis.tables.writer import Format, NOT_A_NUMBER
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
 from crgame_ros.study.data.paper_section import provenance_of

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.analysis.report.report_document import plain_document
-from crgame_ros.analysis.report.report_text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.document import plain_document
+from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
 from crgame_ros.recording.export import write_text
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section

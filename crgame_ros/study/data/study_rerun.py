@@ -9,7 +9,7 @@ from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.data_package import data_package, PACKAGE_FILE, WrittenTable
-from crgame_ros.analysis.tables.vehicles_table import VEHICLES
+from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
 from crgame_ros.recording.run_cycles import replay_inputs
@@ -105,9 +105,9 @@ def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: in
     """Evaluate, or go on; give the evaluation's names of the recorded runs."""
     from crgame_ros.evaluation.dask_cluster import default_workers
     from crgame_ros.evaluation.evaluation import Computing, evaluate
-    from crgame_ros.evaluation.evaluation_folder import GRID_FILE
-    from crgame_ros.evaluation.evaluation_plan import parse_plan
-    from crgame_ros.evaluation.evaluation_progress import EvaluationProgress
+    from crgame_ros.evaluation.folder import GRID_FILE
+    from crgame_ros.evaluation.plan import parse_plan
+    from crgame_ros.evaluation.progress import EvaluationProgress
     humans = [str(trial.attempt.folder.resolve()) for trial in trials
               if trial.attempt.folder is not None]
     plan = parse_plan({'humans': humans, 'planners': list(planners), 'seeds': [seed]},

@@ -11,7 +11,7 @@ import re
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, FLAG, INTEGER, NUMBER, TableDeclaration, TEXT
-from crgame_ros.analysis.tables.table_writer import NOT_A_NUMBER
+from crgame_ros.analysis.tables.writer import NOT_A_NUMBER
 from crgame_ros.study.question import LikertQuestion, NumberQuestion, Question, SliderQuestion
 from crgame_ros.study.questionnaire import Questionnaire
 import pyarrow as pa

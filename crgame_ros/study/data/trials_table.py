@@ -15,8 +15,8 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.runs_table import RUNS
-from crgame_ros.analysis.tables.vehicles_table import VEHICLES
+from crgame_ros.analysis.tables.runs import RUNS
+from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError
 from crgame_ros.study.data.asked_questions import AskedQuestions
 from crgame_ros.study.data.conducted_study import ConductedStudy

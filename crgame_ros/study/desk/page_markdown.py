@@ -10,8 +10,8 @@ from urllib.parse import unquote, urlsplit
 
 from crgame_ros.cockpit.page_files import PageFile
 from crgame_ros.errors import InputError
-from crgame_ros.study.study_file import Page, StudyFile
-from crgame_ros.study.study_pages import page_file, steps_of
+from crgame_ros.study.file import Page, StudyFile
+from crgame_ros.study.pages import page_file, steps_of
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from markdown_it.tree import SyntaxTreeNode

@@ -9,6 +9,8 @@ from typing import Any
 from crgame_ros.study.desk.desk import DECLINED, Desk, is_driven, UNDER_WAY
 from crgame_ros.study.desk.page_markdown import read_tree
 from crgame_ros.study.drive_state import DrivePhase
+from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
+from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.question import (
     ChoiceQuestion,
@@ -20,8 +22,6 @@ from crgame_ros.study.question import (
 )
 from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
-from crgame_ros.study.study_file import Break, DeviceCheck, Page, Questions
-from crgame_ros.study.study_pages import questionnaire_name
 from crgame_ros.study.trial_plan import PlannedTrial
 
 MOST_ENTRIES = 300

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.analysis.behaviour.driver_controls import DriverControls
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.vehicle.parameters import load_vehicle_parameters, VehicleParameters
 from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 import numpy as np

@@ -9,11 +9,11 @@ import json
 import math
 from typing import Any
 
-from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
-from crgame_ros.analysis.behaviour.driver_behaviour import measure_behaviour
-from crgame_ros.analysis.behaviour.vehicle_behaviour import DriverBehaviour
+from crgame_ros.analysis.behaviour.driver import measure_behaviour
+from crgame_ros.analysis.behaviour.measures import MEASURES
+from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.driver.replay_driver import ReplayDriver
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.paths import scenarios_directory

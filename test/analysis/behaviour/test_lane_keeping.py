@@ -11,7 +11,7 @@ from commonroad.scenario.lanelet import LaneletNetwork
 from crgame_ros.analysis.behaviour.lane_keeping import keep_lane, sdlp, SIDEWAYS
 from crgame_ros.analysis.behaviour.lane_visits import LaneEntry, LaneVisits
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.vehicle.parameters import VehicleParameters

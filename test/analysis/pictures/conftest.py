@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_log import RunLog

@@ -6,9 +6,9 @@ from dataclasses import replace
 import json
 from typing import Any
 
-from crgame_ros.analysis.report.report_run import measured_run, ReportRun
+from crgame_ros.analysis.report.run import measured_run, ReportRun
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game
-from crgame_ros.game.game_file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of

@@ -6,7 +6,7 @@ import base64
 from itertools import pairwise
 import json
 
-from crgame_ros.analysis.report.report_file import (
+from crgame_ros.analysis.report.file import (
     ALL_POINTS,
     columns_for,
     encoded,
@@ -14,7 +14,7 @@ from crgame_ros.analysis.report.report_file import (
     script_json,
     thinned,
 )
-from crgame_ros.analysis.report.report_section import Plot, PlotLimit, PlotLine, PlotSpan
+from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, PlotSpan
 import numpy as np
 import pytest
 

@@ -8,13 +8,13 @@ import hashlib
 import json
 import re
 
-from crgame_ros.analysis.behaviour.behaviour_measures import MEASURES
+from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.report.driving_section import driving_section
+from crgame_ros.analysis.report.file import report_html
 from crgame_ros.analysis.report.planners_section import planners_section
-from crgame_ros.analysis.report.report_file import report_html
-from crgame_ros.analysis.report.report_run import PLOTTED, ReportRun
-from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
-from crgame_ros.analysis.scores.score_measures import MEASURES as MEASURES_OF_SCORES
+from crgame_ros.analysis.report.run import PLOTTED, ReportRun
+from crgame_ros.analysis.scores.measures import MEASURES as MEASURES_OF_SCORES
+from crgame_ros.analysis.scores.run import RunScores, scores_of
 import numpy as np
 from page_reader import Page
 import pytest

@@ -12,7 +12,7 @@ from crgame_ros.analysis.reproduction.synchronization import (
     PAPER_TABLE,
     Synchronization,
 )
-from crgame_ros.game.game_file import load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleTable, TIMING_COLUMNS

@@ -10,7 +10,7 @@ from crgame_ros.analysis.scores.collisions_by_kind import find_collisions
 from crgame_ros.analysis.scores.lanes_driven import find_lanes
 from crgame_ros.analysis.scores.scored_drive import kind_of_type, ScoredDrive, Track
 from crgame_ros.drivability.contact import Course, kind_of, touched_side
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 import pytest
 

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 import sys
 
-from crgame_ros.analysis.scores.nuplan_score import (
+from crgame_ros.analysis.scores.nuplan import (
     BOUNDS,
     Expert,
     measure_comfort,

@@ -7,7 +7,7 @@ import sys
 
 from crgame_ros.analysis.scores.route_progress import ComparedRoute, progress_ratio, route_of
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.roads.road_network import RoadNetwork
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route
 from crgame_ros.scenario.loading import load_scenario
 import numpy as np

@@ -9,7 +9,7 @@ import sys
 from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.data_package import table_schema
-from crgame_ros.analysis.tables.pairs_table import PAIRS
+from crgame_ros.analysis.tables.pairs import PAIRS
 from crgame_ros.analysis.tables.run_tables import TABLES
 import pytest
 

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 from typing import Any
 
-from crgame_ros.analysis.tables import table_writer
+from crgame_ros.analysis.tables import writer as table_writer
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
@@ -18,7 +18,7 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.table_writer import FORMATS, TableWriter
+from crgame_ros.analysis.tables.writer import FORMATS, TableWriter
 import numpy as np
 import pandas
 import polars

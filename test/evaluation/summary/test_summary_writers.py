@@ -9,21 +9,21 @@ import json
 from pathlib import Path
 import re
 
-from crgame_ros.evaluation.summary.summarise import summarise
-from crgame_ros.evaluation.summary.summary import Summary
-from crgame_ros.evaluation.summary.summary_command import (
+from crgame_ros.evaluation.summary.command import (
     add_summary_arguments,
     summarise_command,
     summary_text,
 )
-from crgame_ros.evaluation.summary.summary_markdown import summary_markdown
-from crgame_ros.evaluation.summary.summary_measures import MEASURES
-from crgame_ros.evaluation.summary.summary_page import (
+from crgame_ros.evaluation.summary.html_page import (
     interval_svg,
     PlottedInterval,
     write_summary_page,
 )
-from crgame_ros.evaluation.summary.summary_tables import quantity
+from crgame_ros.evaluation.summary.markdown import summary_markdown
+from crgame_ros.evaluation.summary.measures import MEASURES
+from crgame_ros.evaluation.summary.summarise import summarise
+from crgame_ros.evaluation.summary.summary import Summary
+from crgame_ros.evaluation.summary.tables import quantity
 from evaluation_rows import Evaluation, many
 import numpy as np
 from page_reader import Page

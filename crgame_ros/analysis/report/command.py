@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""`crgame report`: one HTML file that tells of a run, or of several side by side."""
+
+import argparse
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+import sys
+
+REPORT_FILE = 'report.html'
+DESCRIPTION = """\
+Write one HTML file that tells of a recorded run: what was run, its story in pictures, how critical
+it was, what drivers and planners did, and how true to the clock it was. Several runs are compared.
+
+  crgame report runs/NAME
+  crgame report runs/FIRST runs/SECOND --out comparison.html
+
+The file opens in any browser, without network. docs/report.md shows one."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument('runs', type=Path, nargs='+', metavar='RUN',
+                        help='folder of a run, or its recording')
+    parser.add_argument('--out', type=Path, metavar='FILE.html',
+                        help=f'file to write (default: {REPORT_FILE} in the folder of the first '
+                        'run)')
+    parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
+                        '(resets count them from 0; default: the last)')
+    parser.set_defaults(command=report)
+
+
+def report(values: argparse.Namespace) -> int:
+    """Write a report, and print where it is."""
+    from crgame_ros.analysis.report.file import (
+        check_report_path,
+        check_report_runs,
+        write_report,
+    )
+    from crgame_ros.analysis.report.run import read_report_run
+    from crgame_ros.recording.progress import Progress
+    check_report_runs(len(values.runs))
+    out = values.out or _place(values.runs[0])
+    check_report_path(out)
+    say = partial(print, file=sys.stderr, flush=True)
+    runs = [replace(read_report_run(path, values.epoch, Progress(say, f'measuring {path}')),
+                    key=f'run{number}') for number, path in enumerate(values.runs, 1)]
+    write_report(runs, out)
+    print(out)
+    return 0
+
+
+def _place(path: Path) -> Path:
+    """Choose the file of a run's report: in its folder, or beside a recording alone."""
+    folder = path if (path / 'bag').is_dir() else path.parent
+    return folder / REPORT_FILE

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How people drove, in tables: of each vehicle, event, lane change and take-over."""
+
+from collections.abc import Iterable, Mapping, Sequence
+import math
+from typing import Any
+
+from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
+from crgame_ros.analysis.behaviour.measures import MEASURES
+from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TableDeclaration, TEXT
+from crgame_ros.analysis.tables.part import TablePart
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.writer import TableRows
+
+_PER_VEHICLE = tuple(name for name, measure in MEASURES.items() if measure.per == 'vehicle')
+_REACTIONS = ('reaction_throttle', 'reaction_brake', 'reaction_steering')
+_SINCE_START = "since the run's start"
+
+
+def _column(name: str, empty: str) -> Column:
+    """Declare a measure by what it says of itself."""
+    measure = MEASURES[name]
+    return Column(name, NUMBER, measure.unit, measure.definition, measure.reference,
+                  measure.variant, empty)
+
+
+def _vehicles(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    found = run.behaviour
+    return {'driven_s': [each.driven_s for each in found],
+            **{f'drive_{name}': [_known(each.values.get(name, math.nan)) for each in found]
+               for name in _PER_VEHICLE}}
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+VEHICLE_BEHAVIOUR = TablePart((
+    Column('driven_s', NUMBER, 's', 'time in which commands drove it',
+           variant='0 of an AV that followed its plans throughout'),
+    *(Column(f'drive_{name}', NUMBER, column.unit, column.definition, column.reference_point,
+             column.variant, column.empty)
+      for name in _PER_VEHICLE for column in (_column(
+          name, 'there was nothing to measure, or nobody drove it by hand'),))), _vehicles)
+
+_OF = (RUN, Column('vehicle', TEXT, '', 'id of the vehicle'))
+REACTIONS = TableDeclaration(
+    'reactions', 'what a driver did after an event', ('run', 'vehicle', 'event'),
+    (*_OF, Column('event', TEXT, '', 'name of the event'),
+     Column('time_s', NUMBER, 's', f'when it took effect, {_SINCE_START}'),
+     *(_column(name, 'there was no such response in time') for name in _REACTIONS)))
+LANE_CHANGES = TableDeclaration(
+    'lane_changes', 'a change to a neighbouring lane', ('run', 'vehicle', 'number'),
+    (*_OF, Column('number', INTEGER, '1', 'counts the changes of the vehicle from 0'),
+     Column('time_s', NUMBER, 's', f'first wheel across, {_SINCE_START}',
+            empty='it was across at the start'),
+     Column('side', TEXT, '', 'to which it went', values=('left', 'right')),
+     *(column for who in ('leader', 'follower') for column in (
+         Column(who, TEXT, '', f'id of the {who} in the lane entered', empty='there was none'),
+         _column(f'gap_to_{who}', 'there was none'),
+         _column(f'gap_accepted_{who}', 'there was none')))))
+TAKE_OVERS = TableDeclaration(
+    'take_overs', 'somebody driving an AV', ('run', 'vehicle', 'seat_s'),
+    (*_OF, Column('seat_s', NUMBER, 's', f'first command that the AV obeyed, {_SINCE_START}'),
+     Column('end_s', NUMBER, 's', f'last such command, {_SINCE_START}'),
+     Column('request', TEXT, '', '`order` of the seat, or the name of the event or task asking',
+            empty='none is known'),
+     Column('request_s', NUMBER, 's', f'when it was asked for, {_SINCE_START}',
+            empty='no request is known'),
+     Column('hands_on_s', NUMBER, 's', f'first input, {_SINCE_START}', empty='there was none'),
+     Column('stable_s', NUMBER, 's', f'beginning of the first stable second, {_SINCE_START}',
+            empty='there was none'),
+     _column('take_over_hands_on', 'no request or no input is known'),
+     _column('take_over_stable', 'no request or no stable second is known')))
+BEHAVIOUR_TABLES = REACTIONS, LANE_CHANGES, TAKE_OVERS
+
+
+def write_behaviour(run: TabulatedRun, writers: Mapping[str, TableRows]) -> None:
+    """Add the rows of a run to the tables of reactions, lane changes and take-overs."""
+    for table, rows in ((REACTIONS, _reactions(run)), (LANE_CHANGES, _lane_changes(run)),
+                        (TAKE_OVERS, _take_overs(run))):
+        found = list(rows)
+        if found:
+            writers[table.name].add({column.name: [row[column.name] for row in found]
+                                     for column in table.columns})
+
+
+def _reactions(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+    for driver in run.behaviour:
+        for each in driver.reactions:
+            yield {'run': run.id, 'vehicle': driver.vehicle_id, 'event': each.event,
+                   'time_s': each.event_s,
+                   'reaction_throttle': _known(each.reaction.throttle_s),
+                   'reaction_brake': _known(each.reaction.brake_s),
+                   'reaction_steering': _known(each.reaction.steering_s)}
+
+
+def _lane_changes(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+    for driver in run.behaviour:
+        for number, change in enumerate(driver.lane_changes):
+            yield {'run': run.id, 'vehicle': driver.vehicle_id, 'number': number,
+                   'time_s': _known(change.time_s), 'side': change.side,
+                   **_neighbour('leader', change.leader, change.gap.leader),
+                   **_neighbour('follower', change.follower, change.gap.follower)}
+
+
+def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, Any]:
+    return {who: name, f'gap_to_{who}': None if gap is None else gap.gap,
+            f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
+
+
+def _take_overs(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+    for driver in run.behaviour:
+        for each in driver.take_overs:
+            yield {'run': run.id, 'vehicle': driver.vehicle_id, 'seat_s': each.seat_s,
+                   'end_s': each.end_s,
+                   'request': None if each.request is None else each.request.by,
+                   'request_s': None if each.request is None else each.request.time_s,
+                   'hands_on_s': _known(each.hands_on_s), 'stable_s': _known(each.stable_s),
+                   'take_over_hands_on': _known(each.to_hands_on_s),
+                   'take_over_stable': _known(each.to_stable_s)}

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of criticality: what is left to each pair at each step, and whose ways crossed."""
+
+from collections.abc import Callable
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import (
+    COLUMN,
+    Criticality,
+    MEASURES,
+    WITHOUT_LEADER,
+)
+from crgame_ros.analysis.criticality.nearby_footprints import NEAR
+from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.tables.column import (
+    Column,
+    NUMBER,
+    RUN,
+    step_columns,
+    TableDeclaration,
+    TEXT,
+)
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.writer import TableRows
+import numpy as np
+import pyarrow as pa
+
+FOOTPRINTS = 'footprints, bumper to bumper'
+NOT_THE_LEADER = 'the other is not its leader'
+_BUFFERED_ROWS = 8192
+
+
+def measure_column(name: str, prefix: str = '', empty: str = '') -> Column:
+    """
+    Declare a column of a measure of criticality, by what the measure says of itself.
+
+    :param prefix: of the column's name; `worst_` for the worst moment of a run.
+    :param empty: when it has no value, where that is not when the measure is undefined.
+    """
+    measure, place = MEASURES[name], COLUMN[name]
+    following = place < len(WITHOUT_LEADER)
+    never = NOT_THE_LEADER if following and np.isnan(WITHOUT_LEADER[place]) else ''
+    variant = '' if np.isnan(measure.undefined) else (
+        f'{measure.undefined:g} where it is not defined'
+        + (f' and where {NOT_THE_LEADER}' if following and not never else ''))
+    return Column(prefix + name, NUMBER, measure.unit, measure.definition, FOOTPRINTS,
+                  '' if empty else variant, empty or never)
+
+
+PAIRS = TableDeclaration(
+    'pairs', f'a driven vehicle and somebody within {NEAR:g} m of it, at a scenario time step',
+    ('run', 'k', 'subject', 'other'), (
+        RUN, *step_columns('the measurement, of states as they were published'),
+        Column('subject', TEXT, '', 'id of the driven vehicle'),
+        Column('other', TEXT, '', 'id of the other vehicle or object'),
+        *(measure_column(name) for name in MEASURES)))
+CROSSINGS = TableDeclaration(
+    'crossings', 'an occasion on which one crossed the way of another, at 20° to 160°',
+    ('run', 'first', 'second', 'entered_s'), (
+        RUN,
+        Column('first', TEXT, '', 'id of the one that was in the conflict area first'),
+        Column('second', TEXT, '', 'id of the other'),
+        Column('entered_s', NUMBER, 's', "time at which the second entered it, since the run's "
+               'start', FOOTPRINTS),
+        Column('pet_s', NUMBER, 's', 'post-encroachment time: from when the first had left it; '
+               '0 if it had not', FOOTPRINTS)))
+
+
+def write_criticality(run: TabulatedRun, pairs: TableRows, crossings: TableRows,
+                      progress: Callable[[float], object]) -> None:
+    """
+    Measure a run, write both tables as it goes on, and note the worst of each vehicle.
+
+    :raises InputError: if its scenario cannot be used.
+    """
+    collected = _Collected(run, pairs, crossings)
+    criticality = measure_log(run.record.log, progress=progress,
+                              on_tick=collected.look)
+    collected.flush()
+    run.criticality = {found.vehicle_id: found for found in criticality.report()}
+
+
+class _Collected:
+    """Keeps rows of pairs until they are worth writing."""
+
+    def __init__(self, run: TabulatedRun, pairs: TableRows, crossings: TableRows) -> None:
+        self._run, self._pairs, self._crossings = run, pairs, crossings
+        self._ids: pa.Array | None = None
+        self._steps: list[tuple[int, int, int]] = []
+        self._others: list[Any] = []
+        self._values: list[Any] = []
+        self._rows = 0
+
+    def look(self, criticality: Criticality) -> None:
+        """Take what was measured at a step."""
+        if self._ids is None:
+            self._ids = pa.array(criticality.ids, TEXT)
+        k = self._run.record.log.game.scheduler.k(criticality.n)
+        for subject, others, values in criticality.latest:
+            self._steps.append((k, subject, len(others)))
+            self._others.append(others)
+            self._values.append(values)
+            self._rows += len(others)
+        if criticality.new_crossings:
+            found = criticality.new_crossings
+            self._crossings.add({
+                'run': self._run.id, 'first': [criticality.ids[each.first] for each in found],
+                'second': [criticality.ids[each.second] for each in found],
+                'entered_s': [each.entered_s for each in found],
+                'pet_s': [each.pet_s for each in found]})
+        if self._rows >= _BUFFERED_ROWS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand the rows over."""
+        if not self._rows or self._ids is None:
+            return
+        ks, subjects, counts = np.array(self._steps).T
+        ks, subjects = np.repeat(ks, counts), np.repeat(subjects, counts)
+        values = np.concatenate(self._values)
+        self._pairs.add({
+            'run': self._run.id, 'k': ks, 'time_s': self._run.times_s(ks),
+            'subject': self._ids.take(pa.array(subjects)),
+            'other': self._ids.take(pa.array(np.concatenate(self._others))),
+            **{name: values[:, column] for column, name in enumerate(MEASURES)}})
+        self._steps, self._others, self._values, self._rows = [], [], [], 0

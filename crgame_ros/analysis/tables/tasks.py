@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of tasks: stimuli and answers, scores, take-over requests, and what lasted."""
+
+from collections.abc import Iterable, Mapping, Sequence
+import math
+from typing import Any
+
+from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
+from crgame_ros.analysis.tables.column import (
+    Column,
+    INTEGER,
+    NUMBER,
+    RUN,
+    step_columns,
+    TableDeclaration,
+    TEXT,
+)
+from crgame_ros.analysis.tables.part import declare, TablePart
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.writer import TableRows
+from crgame_ros.game.events import ACTIONS
+
+UNKNOWN = 'the game does not know the event: a vehicle touched somebody, or was put back'
+
+
+def _fired(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    game = run.record.log.game
+    specs = {spec.name: spec for spec in game.events}
+    fired = run.record.fired
+    known = [specs.get(event.name) for event in fired]
+    return {
+        'run': [run.id] * len(fired), 'k': [event.k for event in fired],
+        'time_s': [event.n * game.scheduler.dt_s for event in fired],
+        'name': [event.name for event in fired],
+        'kind': [None if spec is None else spec.kind for spec in known],
+        'label': [None if spec is None else spec.label for spec in known],
+        'by': [event.by for event in fired],
+        'object': [None if spec is None else spec.object_id for spec in known]}
+
+
+EVENT_PARTS = (
+    TablePart((
+        RUN, *step_columns('its effect'),
+        Column('name', TEXT, '', 'of the event in the game'),
+        Column('kind', TEXT, '', 'what it does', empty=UNKNOWN, values=tuple(ACTIONS)),
+        Column('label', TEXT, '', 'text for people', empty=UNKNOWN),
+        Column('by', TEXT, '', 'whether somebody triggered it, its condition came true, a driver '
+               'had the vehicle put back, or a contact stopped it',
+               values=('trigger', 'condition', 'driver', 'contact')),
+        Column('object', TEXT, '', 'id of the obstacle that it changes or puts',
+               empty='it changes no obstacle')), _fired),)
+EVENTS = declare('events', 'an event that took effect', ('run', 'name', 'time_s'), EVENT_PARTS)
+
+
+_TASK = Column('task', TEXT, '', 'name of the task')
+_VEHICLE = Column('vehicle', TEXT, '', 'id of the vehicle whose driver it was for')
+_TIME = Column('time_s', NUMBER, 's', "onset, since the run's start")
+_PAGE = "the page's own clock"
+_DELAY = Column(
+    'shown_delay_ms', NUMBER, 'ms', 'from the onset to the first picture that showed it',
+    variant='the page estimates it: since it heard of the onset, and half of the way to the '
+            'server and back', empty='no page showed it')
+_PICTURE = Column('picture_ms', NUMBER, 'ms', 'from that picture to the next', _PAGE,
+                  empty='no page showed it')
+DETECTION_RESPONSES = TableDeclaration(
+    'detection_responses', 'a stimulus of a detection response task, or an answer to none',
+    ('run', 'task', 'time_s', 'number'),
+    (RUN, _TASK, _VEHICLE,
+     Column('number', INTEGER, '1', 'counts the stimuli of the task from 1; 0: an answer to none'),
+     _TIME, _DELAY, _PICTURE,
+     Column('response_time_ms', NUMBER, 'ms', 'from that picture to the answer', _PAGE,
+            'pauses of the run left out', 'there was no answer in time'),
+     Column('paused_ms', NUMBER, 'ms', 'pauses of the run that the response time leaves out',
+            _PAGE, empty='there was no answer in time'),
+     Column('outcome', TEXT, '', 'what became of it', values=(
+         'hit', 'missed', 'premature', 'unseen', 'open', 'unrequested'))))
+DETECTION_SCORES = TableDeclaration(
+    'detection_scores', 'a detection response task of a run', ('run', 'task'),
+    (RUN, _TASK, _VEHICLE,
+     Column('stimuli', INTEGER, '1', 'stimuli that count: hits and misses',
+            variant='those that no page showed, answered too early, or open at the end do not'),
+     Column('hits', INTEGER, '1', 'stimuli answered in time'),
+     Column('misses', INTEGER, '1', 'stimuli without an answer in time'),
+     Column('premature', INTEGER, '1', 'stimuli answered too early'),
+     Column('unrequested', INTEGER, '1', 'answers to no stimulus',
+            variant='a second answer to one, and one too late, too'),
+     Column('hit_rate', NUMBER, '1', 'hits over hits and misses', variant='ISO 17488',
+            empty='there was neither'),
+     Column('response_mean_s', NUMBER, 's', 'mean response time of the hits', _PAGE,
+            empty='there was none'),
+     Column('response_sd_s', NUMBER, 's', 'standard deviation of it', _PAGE, 'N - 1',
+            'there were fewer than two'),
+     Column('response_median_s', NUMBER, 's', 'median of it', _PAGE, empty='there was none')))
+TAKE_OVER_REQUESTS = TableDeclaration(
+    'take_over_requests', 'a request to take over that a task made', ('run', 'task', 'number'),
+    (RUN, _TASK, _VEHICLE, Column('number', INTEGER, '1', 'counts the requests from 1'), _TIME,
+     Column('duration_s', NUMBER, 's', 'until the vehicle was driven or the request disappeared'),
+     _DELAY, _PICTURE,
+     Column('first_input_s', NUMBER, 's', 'from the onset to the first input', 'consumed command',
+            'of an AV hands on, as in take_overs; of a vehicle that somebody drives already the '
+            'first response of reactions', 'there was none'),
+     Column('outcome', TEXT, '', 'whether there was a first input', values=('taken', 'none'))))
+TASK_SPANS = TableDeclaration(
+    'task_spans', 'a stretch in which a task lasted', ('run', 'task', 'time_s'),
+    (RUN, _TASK, _VEHICLE,
+     Column('kind', TEXT, '', 'of task', values=('detection_response', 'secondary_task')), _TIME,
+     Column('duration_s', NUMBER, 's', 'until its end, or that of the run')))
+TASK_TABLES = DETECTION_RESPONSES, DETECTION_SCORES, TAKE_OVER_REQUESTS, TASK_SPANS
+
+
+def write_tasks(run: TabulatedRun, writers: Mapping[str, TableRows]) -> None:
+    """Add the rows of a run to the tables of tasks."""
+    events = task_events(run.record)
+    for table, rows in (
+            (DETECTION_RESPONSES, _responses(events)),
+            (DETECTION_SCORES, ({**score.as_dict(), 'vehicle': score.seat}
+                                for score in detection_scores(events))),
+            (TAKE_OVER_REQUESTS, _requests(events)), (TASK_SPANS, _spans(events))):
+        found = [{'run': run.id, **row} for row in rows]
+        if found:
+            writers[table.name].add({column.name: [row[column.name] for row in found]
+                                     for column in table.columns})
+
+
+def _common(event: TaskEvent) -> dict[str, Any]:
+    return {'task': event.name, 'vehicle': event.seat, 'number': event.value,
+            'time_s': event.onset_s, 'shown_delay_ms': event.times.delay_ms,
+            'picture_ms': event.times.picture_ms, 'outcome': event.outcome}
+
+
+def _responses(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
+    for event in events:
+        if event.what in ('stimulus', 'unrequested'):
+            yield {**_common(event), 'response_time_ms': event.times.response_ms,
+                   'paused_ms': event.times.paused_ms}
+
+
+def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
+    for event in events:
+        if event.what == 'request':
+            first_s = event.response_time_s
+            yield {**_common(event), 'duration_s': event.duration_s,
+                   'first_input_s': None if math.isnan(first_s) else first_s}
+
+
+def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
+    for event in events:
+        if event.what == 'span':
+            yield {'task': event.name, 'vehicle': event.seat, 'kind': event.kind,
+                   'time_s': event.onset_s, 'duration_s': event.duration_s}

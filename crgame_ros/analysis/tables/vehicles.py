@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of driven vehicles: who drove, how far and how well, and the worst moments."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import MEASURES
+from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
+from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
+from crgame_ros.analysis.tables.pairs import FOOTPRINTS, measure_column
+from crgame_ros.analysis.tables.part import declare, TablePart
+from crgame_ros.analysis.tables.score_columns import VEHICLE_SCORES
+from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
+from crgame_ros.vehicle.state import StateColumn
+import numpy as np
+
+REAR_AXLE = 'rear axle'
+AT_STEPS = 'at the scenario steps'
+NOBODY = 'it was never defined: nobody was near'
+HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
+# Of `timing.json`, with what each counts.
+COUNTS = {
+    'requests': 'plan requests', 'accepted': 'plans that were accepted',
+    'refused': 'plans that were refused', 'skipped': 'requests left out while one was open',
+    'timed_out': 'requests that were not answered in time',
+    'realigned': 'plans that were aligned to where the AV was',
+    'steps_without_plan': 'simulation steps without a plan to follow'}
+
+
+def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    vehicles, driven = run.record.log.vehicles, run.driven
+    return {
+        'run': [run.id] * len(vehicles), 'id': [item.id for item in vehicles],
+        'role': [item.role.value for item in vehicles],
+        'driver': [item.driver if isinstance(item, DrivenHuman) else
+                   item.planner if isinstance(item, DrivenAv) else '' for item in driven],
+        'vehicle_model': [item.vehicle.name for item in driven],
+        'length': [item.shape.length for item in vehicles],
+        'width': [item.shape.width for item in vehicles],
+        'wheelbase': [item.vehicle.wheelbase for item in driven],
+        'rear_to_center': [item.rear_to_center for item in vehicles],
+        'planning_problem': [item.planning_problem if isinstance(item, DrivenAv) else None
+                             for item in driven]}
+
+
+def _drive(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    states = run.record.log.vehicle_states
+    speeds, accelerations = (states[..., column] for column in (
+        StateColumn.SPEED, StateColumn.ACCELERATION))
+    return {'distance': run.record.ways(), 'mean_speed': speeds.mean(axis=0),
+            'max_speed': speeds.max(axis=0),
+            'max_acceleration': accelerations.max(axis=0),
+            'min_acceleration': accelerations.min(axis=0)}
+
+
+def _criticality(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    found = [run.criticality.get(item.id) for item in run.record.log.vehicles]
+    columns: dict[str, list[Any]] = {}
+    for name in MEASURES:
+        worst = [None if each is None else each.worst.get(name) for each in found]
+        columns[f'worst_{name}'] = [None if each is None else each.value for each in worst]
+        columns[f'worst_{name}_of'] = [None if each is None else each.other for each in worst]
+        columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s
+                                           for each in worst]
+    columns['tet_s'] = [None if each is None else each.tet_s for each in found]
+    columns['tit'] = [None if each is None else each.tit for each in found]
+    columns['crossings'] = [None if each is None else len(each.crossings) for each in found]
+    columns['worst_pet_s'] = [None if each is None else min(
+        (crossing.pet_s for crossing in each.crossings), default=None) for each in found]
+    return columns
+
+
+def _worst_columns() -> list[Column]:
+    columns = []
+    for name in MEASURES:
+        value = measure_column(name, 'worst_', NOBODY)
+        columns += [
+            value,
+            Column(f'{value.name}_of', TEXT, '', f'id of whom the worst {name} is of',
+                   empty=NOBODY),
+            Column(f'{value.name}_time_s', NUMBER, 's', f'time of the worst {name}, since the '
+                   'start of the run', variant='the first such moment', empty=NOBODY)]
+    return columns
+
+
+def _planning(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+    ids = [item.id for item in run.record.log.vehicles]
+    planners = {} if run.outcome is None else run.outcome['planners']
+    tallies = [run.tallies.get(name) for name in ids]
+    latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s
+                 for tally in tallies]
+    return {
+        **{f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key:
+           [planners.get(name, {}).get(key) for name in ids] for key in COUNTS},
+        'fallbacks': [planners.get(name, {}).get('fallback') for name in ids],
+        'plans': [None if tally is None else tally.answers for tally in tallies],
+        'plans_passing': [None if tally is None or tally.checked < tally.answers
+                          else tally.passing for tally in tallies],
+        'latency_p50_s': [None if each is None else float(np.percentile(each, 50))
+                          for each in latencies],
+        'latency_max_s': [None if each is None else max(each) for each in latencies]}
+
+
+VEHICLE_PARTS = (
+    TablePart((
+        RUN, Column('id', TEXT, '', 'of the vehicle'),
+        Column('role', TEXT, '', 'who drives it', values=('human', 'autonomous')),
+        Column('driver', TEXT, '', "the game's driver of a human, or the AV's planner",
+               empty='the game does not say'),
+        Column('vehicle_model', TEXT, '', 'name of its vehicle type'),
+        Column('length', NUMBER, 'm', 'extent along its heading'),
+        Column('width', NUMBER, 'm', 'extent across its heading'),
+        Column('wheelbase', NUMBER, 'm', 'between the axles'),
+        Column('rear_to_center', NUMBER, 'm', 'from the rear axle forward to the center'),
+        Column('planning_problem', INTEGER, '', "id of the AV's planning problem", empty=HUMAN),
+    ), _identity),
+    TablePart((
+        Column('distance', NUMBER, 'm', 'length of its way', REAR_AXLE,
+               'straight between scenario steps, forwards and backwards alike'),
+        Column('mean_speed', NUMBER, 'm/s', 'mean of its signed speed', REAR_AXLE, AT_STEPS),
+        Column('max_speed', NUMBER, 'm/s', 'greatest signed speed', REAR_AXLE, AT_STEPS),
+        Column('max_acceleration', NUMBER, 'm/s^2', 'greatest acceleration along its heading',
+               REAR_AXLE, AT_STEPS),
+        Column('min_acceleration', NUMBER, 'm/s^2', 'least, which is the hardest braking while '
+               'it drives forwards', REAR_AXLE, AT_STEPS)), _drive),
+    TablePart((
+        *_worst_columns(),
+        Column('tet_s', NUMBER, 's', f'time with a ttc below {USUAL.ttc_s:g} s', FOOTPRINTS,
+               'each step that it is below counts in full'),
+        Column('tit', NUMBER, 's^2', f'integral of what the ttc is below {USUAL.ttc_s:g} s',
+               FOOTPRINTS, 'rectangles of a scenario step'),
+        Column('crossings', INTEGER, '1', 'rows of crossings with it'),
+        Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
+               empty='it crossed nobody')), _criticality),
+    TablePart((
+        *(Column(f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key, INTEGER,
+                 '1', what, variant='as the engine told last', empty=UNRECORDED)
+          for key, what in COUNTS.items()),
+        Column('fallbacks', INTEGER, '1', 'plans that braked because the planner failed',
+               empty=UNRECORDED),
+        Column('plans', INTEGER, '1', 'rows of plans of it', empty=UNRECORDED),
+        Column('plans_passing', INTEGER, '1', 'of these, how many pass the check',
+               empty=f'{UNRECORDED}, or the requests of some were not'),
+        Column('latency_p50_s', NUMBER, 's', 'median latency, of all answers with one',
+               variant='interpolated linearly', empty=UNRECORDED),
+        Column('latency_max_s', NUMBER, 's', 'greatest latency, that of the first plan included',
+               empty=UNRECORDED)), _planning),
+    VEHICLE_BEHAVIOUR, VEHICLE_SCORES)
+VEHICLES = declare('vehicles', 'a driven vehicle of a run', ('run', 'id'), VEHICLE_PARTS)

@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The runs that a page may look back at: those of the session, and of the folder around it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from crgame_ros.cockpit.page_messages import clean_text
+from crgame_ros.cockpit.run_files import RUN_FILES, run_id
+from crgame_ros.errors import InputError
+from crgame_ros.game.file import load_game
+from crgame_ros.recording.metadata import METADATA_FILE
+from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
+
+MAX_RUNS = 500
+MAX_TITLE = 80
+GAME = 'game.yaml'
+# Says that the processes of a session are alive, or were killed.
+CLAIM = '.started'
+PICTURE = '.picture.svg'
+_TIMES = re.compile(r'nanoseconds(?:_since_epoch)?: (\d{1,19})')
+
+
+@dataclass(frozen=True)
+class PastRun:
+    """
+    A run that was recorded by this program.
+
+    :param id: by which pages name it; says nothing of where it is.
+    :param folder: its files.
+    :param session: folder of its session.
+    """
+
+    id: str  # noqa: A003
+    folder: Path
+    session: Path
+
+    @property
+    def name(self) -> str:
+        """Return what people call it: its session and, of a later run of that, its own folder."""
+        return self.folder.relative_to(self.session.parent).as_posix()
+
+    @property
+    def bag(self) -> Path:
+        """Name its first recording."""
+        return self.folder / 'bag'
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether its last recording has been closed, so that it can be read whole."""
+        bags = bags_of(self.folder)
+        return bool(bags) and (bags[-1] / METADATA_FILE).is_file()
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nobody writes to it any more: its session is over, or has done with it."""
+        return not (self.session / CLAIM).exists() or (self.folder / FINISHED_MARK).exists()
+
+    def files(self) -> dict[str, Path]:
+        """Return its files by the names that pages know."""
+        return {path.relative_to(self.folder).as_posix(): path
+                for kind in RUN_FILES for found in sorted(self.folder.glob(kind))
+                for path in _plain_files(found)}
+
+
+class RunArchive:
+    """
+    Finds runs, and deletes what somebody wants to be rid of.
+
+    :param session: folder of the session that goes on.
+    :param root: folder of other sessions; None for none.
+    """
+
+    def __init__(self, session: Path, root: Path | None = None) -> None:
+        self.session = session.resolve()
+        self._root = None if root is None else root.resolve()
+        self._told: dict[tuple[Path, int], Mapping[str, Any]] = {}
+
+    def runs(self) -> dict[str, PastRun]:
+        """Find the runs that are there now, the latest first, by their ids."""
+        sessions = [self.session]
+        if self._root is not None and self._root.is_dir():
+            others = (path for path in self._root.iterdir()
+                      if path.is_dir() and not path.is_symlink() and path != self.session)
+            sessions += sorted(others, key=lambda path: path.name, reverse=True)
+        found: dict[str, PastRun] = {}
+        for session in sessions:
+            for folder in reversed(run_folders(session)):
+                if len(found) < MAX_RUNS and _is_run(folder):
+                    found[run_id(folder)] = PastRun(run_id(folder), folder, session)
+        return found
+
+    def run(self, key: str) -> PastRun:
+        """
+        Return a run by its id.
+
+        :raises InputError: if there is none.
+        """
+        try:
+            return self.runs()[key]
+        except KeyError:
+            raise InputError('there is no such run', 'id', 'load the page again') from None
+
+    def listing(self) -> dict[str, Any]:
+        """Return the answer of /api/runs."""
+        return {'runs': [self._entry(run) for run in self.runs().values()]}
+
+    def delete(self, key: str) -> str:
+        """
+        Delete the files of a run, and its folder where nothing else is in it.
+
+        :return: what was done, for people.
+        :raises InputError: if there is no such run, it is still being written, or its files cannot
+            be removed.
+        """
+        run = self.run(key)
+        if not run.is_finished:
+            raise InputError('is being recorded, or its files are being written', run.name,
+                             'delete it when its run is over')
+        try:
+            _remove(run)
+        except OSError as error:
+            raise InputError(f'cannot be deleted ({error.strerror})', run.name,
+                             'see whose files they are') from error
+        return f'{run.name} is deleted'
+
+    def _entry(self, run: PastRun) -> dict[str, Any]:
+        files = run.files()
+        return {'id': run.id, 'name': run.name, **self._facts(run),
+                'finished': run.is_finished, 'closed': run.is_closed,
+                'own': run.session == self.session,
+                'bytes': sum(_size(path) for path in files.values()),
+                'files': [{'name': name, 'bytes': _size(path)} for name, path in files.items()]}
+
+    def _facts(self, run: PastRun) -> Mapping[str, Any]:
+        """Read what does not change once a run is over, once."""
+        timing = run.folder / 'timing.json'
+        metadata = run.bag / METADATA_FILE
+        changed = max((path.stat().st_mtime_ns for path in (timing, metadata) if path.is_file()),
+                      default=0)
+        key = (run.folder, changed)
+        if key not in self._told:
+            self._told[key] = {**_game_facts(run.folder / GAME), **_bag_facts(metadata),
+                               'contacts': _contacts(timing)}
+        return self._told[key]
+
+
+def _is_run(folder: Path) -> bool:
+    """Return whether this program has recorded a run there."""
+    return (folder / GAME).is_file() and (folder / 'bag').is_dir() and not folder.is_symlink()
+
+
+def _plain_files(path: Path) -> Iterator[Path]:
+    """Yield a file, or those of a recording; nothing that leads elsewhere."""
+    if path.is_symlink():
+        return
+    if path.is_file():
+        yield path
+    elif path.is_dir():
+        yield from (item for item in sorted(path.iterdir())
+                    if item.is_file() and not item.is_symlink())
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
+def _game_facts(path: Path) -> dict[str, Any]:
+    try:
+        game = load_game(path)
+    except InputError:
+        # Of another version, or changed by somebody: it can still be fetched and deleted.
+        return {'title': '', 'scenario': ''}
+    return {'title': clean_text(game.title or '', MAX_TITLE),
+            'scenario': clean_text(game.scenario.stem, MAX_TITLE)}
+
+
+def _bag_facts(path: Path) -> dict[str, Any]:
+    """Read from when on and how long a recording goes, without reading what it says of topics."""
+    try:
+        with path.open(encoding='utf-8', errors='replace') as stream:
+            found = _TIMES.findall(stream.read(1000))
+    except OSError:
+        found = []
+    lasted_ns, began_ns = (*map(int, found[:2]),) if len(found) >= 2 else (None, None)
+    return {'began_ms': None if began_ns is None else began_ns // 10**6,
+            'duration_s': None if lasted_ns is None else lasted_ns / 1e9}
+
+
+def _contacts(path: Path) -> int | None:
+    """Count the contacts of which the timing report tells; None where there is none."""
+    try:
+        return len(json.loads(path.read_text(encoding='utf-8')).get('contacts') or [])
+    except (OSError, ValueError, AttributeError, TypeError):
+        return None
+
+
+def _remove(run: PastRun) -> None:
+    """Remove a run's files; until the last is gone it is listed, and can be deleted again."""
+    game = run.folder / GAME
+    own = [path for path in run.files().values() if path != game]
+    for path in (*own, run.folder / PICTURE, run.folder / FINISHED_MARK, game):
+        path.unlink(missing_ok=True)
+    left = [*bags_of(run.folder), run.folder]
+    for folder in left:
+        try:
+            folder.rmdir()
+        except OSError:
+            # Something else is in it: another run of the session, or what somebody put there.
+            continue

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading runs for the page, in a process of its own (`job_loop`): scores, pictures, reports."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import math
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.analysis.pictures.frame_svg import frame_svg
+from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.report.file import write_report
+from crgame_ros.analysis.report.run import measured_run
+from crgame_ros.analysis.scores.measures import MEASURES
+from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
+from crgame_ros.analysis.scores.run import scores_of
+from crgame_ros.cockpit.job_loop import serve_jobs
+from crgame_ros.errors import CrgameError
+from crgame_ros.recording.export import write_text
+from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_record import read_run_record
+from crgame_ros.recording.timing_report import timing_report
+import numpy as np
+
+# Hours of a run take some time; several are compared.
+MOST_CPU_S = 120.0
+# Of a picture [px].
+_WIDTH = 420
+# In which words the parts of a score are told.
+_WORDS = {
+    'no_collision_at_fault': 'No collision at fault', 'drivable_area': 'On the road',
+    'driving_direction': 'With the traffic', 'making_progress': 'Made headway',
+    'progress': 'Progress', 'time_to_collision': 'Kept its distance',
+    'speed_limit': 'Kept the speed limit', 'comfort': 'Comfort'}
+
+
+def score(path: Path) -> dict[str, Any]:
+    """
+    Score a run by nuPlan's measures, which need no more than how everybody moved.
+
+    :param path: its recording.
+    :return: the answer of /api/runs/score.
+    :raises InputError: if it cannot be read.
+    """
+    record = read_run_record(path)
+    scores = scores_of(record, {}, drives_only=True)
+    return {'vehicles': [
+        {'vehicle': each.vehicle_id, 'role': each.role, **_told(each.nuplan),
+         **_motion(record.log, number), 'remarks': list(each.remarks)}
+        for number, each in enumerate(scores.vehicles)], 'refusal': scores.refusal}
+
+
+def picture(path: Path, out: str) -> dict[str, Any]:
+    """
+    Draw the end of a run, and the ways of the driven vehicles until there.
+
+    :param path: its recording.
+    :param out: the file to write, SVG.
+    :raises InputError: if it cannot be read.
+    """
+    log = read_run_record(path).log
+    scene = FrameScene(log)
+    last = int(log.ks[-1])
+    spread = range(0, len(log.ks), max(1, len(log.ks) // 20))
+    window = scene.windows([*spread, scene.row(last)])[-1]
+    frame = scene.at(last, window, trace_s=math.inf if len(log.ks) < 2 else float(
+        len(log.ks) * log.game.scheduler.time_step_s))
+    write_text(frame_svg(frame, _WIDTH), Path(out))
+    return {}
+
+
+def compare(path: Path, others: Sequence[str], names: Sequence[str], out: str) -> dict[str, Any]:
+    """
+    Write one report of several runs.
+
+    :param path: recording of the first.
+    :param others: those of the others.
+    :param names: what people call them, in that order.
+    :param out: the file to write, HTML.
+    :raises InputError: if one of them cannot be read.
+    """
+    runs = []
+    for number, (bag, name) in enumerate(zip((path, *map(Path, others)), names, strict=True), 1):
+        record = read_run_record(bag)
+        notices: tuple[str, ...] = ()
+        timing: Mapping[str, Any] | None = None
+        try:
+            timing = timing_report(bag, log=record.log)
+        except CrgameError as error:
+            notices = (str(error),)
+        runs.append(replace(measured_run(name, bag, record, timing, notices=notices,
+                                         drives_only=True), key=f'run{number}'))
+    write_report(runs, Path(out))
+    return {}
+
+
+def _told(found: NuplanScore | None) -> dict[str, Any]:
+    if found is None:
+        return {'score': None, 'parts': []}
+    parts = [(name, value, 0.0) for name, value in found.multipliers.items()]
+    parts += [(name, value, WEIGHTS[name]) for name, value in found.weighted.items()]
+    return {'score': _number(found.score), 'parts': [
+        {'name': _WORDS[name], 'value': _number(value), 'weight': weight,
+         'definition': MEASURES[name].definition} for name, value, weight in parts]}
+
+
+def _motion(log: RunLog, number: int) -> dict[str, Any]:
+    """Return how far and how fast a vehicle came [m, m/s]."""
+    states = log.vehicle_states[:, number]
+    states = states[np.isfinite(states[:, 0])]
+    ways = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    return {'distance': _number(float(ways.sum())),
+            'fastest': _number(float(np.abs(states[:, 3]).max(initial=0.0)))}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def main() -> None:
+    """Answer jobs until the standard input ends."""
+    serve_jobs({'score': score, 'picture': picture, 'compare': compare}, 'run', MOST_CPU_S)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The HTTP interface of past runs: list, pictures, scores, files, comparison, deletion, replay."""
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator, Mapping
+import hashlib
+from pathlib import Path
+from urllib.parse import quote
+import zipfile
+
+from aiohttp import hdrs, web
+from crgame_ros.cockpit.job_process import JobProcess
+from crgame_ros.cockpit.library_routes import (
+    Answer,
+    asked_id,
+    asker_gone,
+    MAX_TEXT,
+    refusable,
+)
+from crgame_ros.cockpit.request_rights import actor
+from crgame_ros.cockpit.runs.archive import PastRun, PICTURE, RunArchive
+from crgame_ros.cockpit.runs.replays import RunReplays
+from crgame_ros.cockpit.server import HUB
+from crgame_ros.errors import InputError
+
+_CHUNK_BYTES = 256 * 1024
+
+
+class _Pending:
+    """What has been written and not yet been sent; it cannot be sought in."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+
+    def write(self, data: bytes, /) -> int:
+        self._parts.append(bytes(data))
+        return len(data)
+
+    def flush(self) -> None:
+        """Do nothing: what is written is there."""
+
+    def close(self) -> None:
+        """Do nothing: who sends it knows its end."""
+
+    def take(self) -> bytes:
+        data = b''.join(self._parts)
+        self._parts.clear()
+        return data
+
+
+def zip_chunks(name: str, files: Mapping[str, Path]) -> Iterator[bytes]:
+    """
+    Pack files.
+
+    :param name: of the folder in the archive.
+    :param files: by their names in that folder.
+    :return: the archive, piece by piece; a file that has gone meanwhile is left out.
+    """
+    pending = _Pending()
+    # Recordings are compressed already.
+    with zipfile.ZipFile(pending, 'w', zipfile.ZIP_STORED) as archive:
+        for inside, path in files.items():
+            try:
+                source = path.open('rb')
+            except OSError:
+                continue
+            entry = zipfile.ZipInfo.from_file(path, f'{name}/{inside}', strict_timestamps=False)
+            with source, archive.open(entry, 'w', force_zip64=True) as target:
+                while data := source.read(_CHUNK_BYTES):
+                    target.write(data)
+                    yield pending.take()
+    yield pending.take()
+
+
+READER = 'crgame_ros.cockpit.runs.jobs'
+READ_S = 120.0
+MOST_COMPARED = 6
+SCORES_KEPT = 100
+# A report brings scripts and styles of its own: it may run them, away from the cockpit.
+_REPORT = ("sandbox allow-scripts allow-downloads; default-src 'none'; "
+           "script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:")
+_PICTURE = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+
+
+def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> None:
+    """
+    Add /api/runs and what is below it, and /replay/.
+
+    :param archive: the runs.
+    :param work: folder for comparisons.
+    """
+    routes, hub = RunRoutes(archive, work), app[HUB]
+
+    def guarded(handler: Answer, kind: str) -> Answer:
+        async def answer(request: web.Request) -> web.StreamResponse:
+            actor(request, hub, kind)
+            return await handler(request)
+        return refusable(answer)
+
+    for method, path, handler in (
+            ('GET', '', routes.runs), ('GET', '/picture', routes.picture),
+            ('GET', '/score', routes.score), ('GET', '/file', routes.file),
+            ('GET', '/zip', routes.zip), ('GET', '/comparison', routes.comparison)):
+        app.router.add_route(method, f'/api/runs{path}', guarded(handler, 'runs'))
+    app.router.add_post('/api/runs/delete', guarded(routes.delete, 'delete'))
+    app.router.add_get('/replay/{run}/{rest:.*}', guarded(routes.replay, 'runs'))
+
+    async def lifetime(_: web.Application) -> AsyncIterator[None]:
+        warming = asyncio.create_task(routes.warm_up())
+        yield
+        warming.cancel()
+        await asyncio.gather(warming, return_exceptions=True)
+        await routes.close()
+
+    app.cleanup_ctx.append(lifetime)
+
+
+class RunRoutes:
+    """
+    Answers what pages ask of runs.
+
+    :param archive: the runs.
+    :param work: folder for comparisons.
+    """
+
+    def __init__(self, archive: RunArchive, work: Path) -> None:
+        self._archive = archive
+        self._work = work.resolve()
+        # Two: a score is wanted at once, while pictures of a long list are drawn.
+        self._scorer = JobProcess(READER, 'run', READ_S)
+        self._painter = JobProcess(READER, 'run', READ_S)
+        self._replays = RunReplays()
+        self._scores: dict[str, bytes] = {}
+
+    async def warm_up(self) -> None:
+        """Start what scores: when a run is over somebody waits for it."""
+        await self._scorer.start()
+
+    async def close(self) -> None:
+        """End what still runs."""
+        await self._scorer.close()
+        await self._painter.close()
+        await self._replays.close()
+
+    async def runs(self, _: web.Request) -> web.Response:
+        """List the runs."""
+        return web.json_response(await asyncio.to_thread(self._archive.listing))
+
+    async def picture(self, request: web.Request) -> web.StreamResponse:
+        """Return how a run went, as a picture that is drawn once."""
+        run = await self._closed(request)
+        path = run.folder / PICTURE
+        if not path.is_file():
+            await self._painter.run('picture', path=str(run.bag), out=str(path),
+                                    unwanted=asker_gone(request))
+        return web.FileResponse(path, headers={
+            'Content-Security-Policy': _PICTURE, hdrs.CONTENT_TYPE: 'image/svg+xml'})
+
+    async def score(self, request: web.Request) -> web.Response:
+        """Return how well everybody drove in a run."""
+        run = await self._closed(request)
+        if run.id not in self._scores:
+            answer = await self._scorer.run('score', path=str(run.bag),
+                                            unwanted=asker_gone(request))
+            if len(self._scores) >= SCORES_KEPT:
+                self._scores.pop(next(iter(self._scores)))
+            self._scores[run.id] = answer
+        return web.Response(body=self._scores[run.id], content_type='application/json')
+
+    async def file(self, request: web.Request) -> web.StreamResponse:
+        """Send one file of a run; its report to be looked at, others to be kept."""
+        run = await self._run(request)
+        name = request.query.get('file', '')[:MAX_TEXT]
+        path = run.files().get(name)
+        if path is None:
+            raise InputError('there is no such file', 'file', 'load the page again')
+        if path.suffix == '.html':
+            return web.FileResponse(path, headers={'Content-Security-Policy': _REPORT})
+        saved = f'{run.name}_{name}'.replace('/', '_')
+        return web.FileResponse(path, headers={
+            hdrs.CONTENT_TYPE: 'application/octet-stream',
+            hdrs.CONTENT_DISPOSITION: _attachment(saved)})
+
+    async def zip(self, request: web.Request) -> web.StreamResponse:  # noqa: A003
+        """Send all files of a run as one archive."""
+        run = await self._closed(request)
+        name = run.name.replace('/', '_')
+        response = web.StreamResponse(headers={
+            hdrs.CONTENT_TYPE: 'application/zip',
+            hdrs.CONTENT_DISPOSITION: _attachment(f'{name}.zip')})
+        await response.prepare(request)
+        chunks = zip_chunks(name, run.files())
+        # Beside the loop, in which somebody's hands may be on the wheel.
+        while (chunk := await asyncio.to_thread(next, chunks, None)) is not None:
+            if chunk:
+                await response.write(chunk)
+        await response.write_eof()
+        return response
+
+    async def comparison(self, request: web.Request) -> web.StreamResponse:
+        """Write and show one report of several runs."""
+        keys = request.query.get('ids', '')[:MAX_TEXT].split(',')
+        if not 2 <= len(keys) <= MOST_COMPARED or len(set(keys)) != len(keys):
+            raise InputError(f'choose 2 to {MOST_COMPARED} runs', 'comparison')
+        known = await asyncio.to_thread(self._archive.runs)
+        runs = [_readable(known.get(key)) for key in keys]
+        name = hashlib.sha256(','.join(keys).encode()).hexdigest()[:16]
+        path = self._work / 'comparisons' / f'{name}.html'
+        if not path.is_file():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            await self._painter.run(
+                'compare', path=str(runs[0].bag), others=[str(run.bag) for run in runs[1:]],
+                names=[run.name for run in runs], out=str(path), unwanted=asker_gone(request))
+        return web.FileResponse(path, headers={'Content-Security-Policy': _REPORT})
+
+    async def delete(self, request: web.Request) -> web.Response:
+        """Delete a run."""
+        key = asked_id(await request.read())
+        await self._replays.end(key)
+        text = await asyncio.to_thread(self._archive.delete, key)
+        self._scores.pop(key, None)
+        return web.json_response({'ok': True, 'text': text})
+
+    async def replay(self, request: web.Request) -> web.StreamResponse:
+        """Pass a request on to the process that shows a run."""
+        known = await asyncio.to_thread(self._archive.runs)
+        run = _readable(known.get(request.match_info['run']))
+        return await self._replays.forward(run, request.match_info['rest'], request)
+
+    async def _run(self, request: web.Request) -> PastRun:
+        return await asyncio.to_thread(self._archive.run,
+                                       request.query.get('id', '')[:MAX_TEXT])
+
+    async def _closed(self, request: web.Request) -> PastRun:
+        return _readable(await self._run(request))
+
+
+def _readable(run: PastRun | None) -> PastRun:
+    if run is None:
+        raise InputError('there is no such run', 'id', 'load the page again')
+    if not run.is_closed:
+        raise InputError('is being recorded', run.name, 'wait until its run is over')
+    return run
+
+
+def _attachment(name: str) -> str:
+    return f"attachment; filename*=UTF-8''{quote(name, safe='')}"

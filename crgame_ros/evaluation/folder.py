@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What lies beside the tables of an evaluation: its plan and its files, to run any cell again."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from crgame_ros import __version__
+from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.data_package import PACKAGE_FILE, PROFILE, table_schema
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell import Cell
+from crgame_ros.evaluation.cell_grid import CellGrid
+from crgame_ros.evaluation.content import ContentStore
+from crgame_ros.evaluation.plan import EvaluationPlan
+from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
+from crgame_ros.recording.export import prepare_folder, write_text
+from crgame_ros.schema.writing import write
+
+GRID_FILE, FILES, REPORTS = 'evaluation.json', 'files', 'reports'
+FORMAT = 1
+
+
+class EvaluationFolder:
+    """
+    An evaluation on disk.
+
+    :param path: of its folder; it is made if it is not there.
+    :raises InputError: if it cannot be written, or something else is in it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.store = ContentStore(path / FILES)
+
+    def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:
+        """
+        Note what is evaluated.
+
+        :raises InputError: if the folder cannot be written, or is somebody else's.
+        """
+        prepare_folder(self.path)
+        if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \
+                and {item.name for item in self.path.iterdir()} - {FILES}:
+            raise InputError('something else is in it', str(self.path), 'name another folder')
+        note = {'format': FORMAT, 'version': __version__, 'plan': write(plan),
+                'base': str(plan.base.resolve()),
+                'grid': grid.as_dict()}
+        write_text(json.dumps(note, indent=1) + '\n', self.path / GRID_FILE)
+        package = {
+            '$schema': PROFILE.format('datapackage'),
+            'name': 'evaluation', 'description': 'Cells of an evaluation; SI units and radians.',
+            'resources': [_resource(table) for table in TABLES_OF_CELLS]}
+        write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n',
+                   self.path / PACKAGE_FILE)
+
+    def find(self, key: str) -> Cell:
+        """
+        Find a cell by its key, or by as many of its first digits as tell it.
+
+        :raises InputError: if there is none, or several.
+        """
+        found = [cell for cell in self.grid() if cell.key.startswith(key)]
+        if len(found) != 1:
+            raise InputError(f'{"no" if not found else len(found)} cells begin with it', key,
+                             'the column "cell" of the tables has their keys')
+        return found[0]
+
+    def grid(self) -> CellGrid:
+        """
+        Read which cells there are, as they were planned.
+
+        :raises InputError: if the folder holds no evaluation.
+        """
+        return CellGrid.from_dict(self._note()['grid'])
+
+    def plan_values(self) -> dict[str, Any]:
+        """
+        Read the plan's values.
+
+        :raises InputError: if the folder holds no evaluation.
+        """
+        values: dict[str, Any] = self._note()['plan']
+        return values
+
+    @property
+    def base(self) -> Path:
+        """Name the directory against which the plan's file names are resolved."""
+        return Path(self._note()['base'])
+
+    def _note(self) -> dict[str, Any]:
+        path = self.path / GRID_FILE
+        try:
+            note: dict[str, Any] = json.loads(path.read_bytes())
+            if note['format'] != FORMAT:
+                raise InputError(f'is of format {note["format"]}, not {FORMAT}', str(path),
+                                 'use the version that wrote it')
+        except OSError as error:
+            raise InputError(f'holds no evaluation ({error.strerror})', str(self.path),
+                             'name the folder that `crgame evaluate` wrote') from error
+        except (ValueError, LookupError, TypeError) as error:
+            raise InputError('is damaged', str(path), 'run the plan again in another folder') \
+                from error
+        return note
+
+
+def _resource(table: TableDeclaration) -> dict[str, Any]:
+    schema = table_schema(table)
+    schema.pop('foreignKeys', None)
+    return {'name': table.name, 'type': 'table', 'path': f'{table.name}/*.parquet',
+            'format': 'parquet', 'description': f'One row is {table.row}.', 'schema': schema}

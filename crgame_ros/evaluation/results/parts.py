@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of an evaluation on disk: parts that are whole, and a journal of what is newer."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+import fcntl
+from functools import partial
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, IO, Self
+
+from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.writer import TableWriter
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.results.cell_rows import (
+    CELLS,
+    TABLES_OF_CELLS,
+    VEHICLES_OF_CELLS,
+)
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+PART_CELLS = 256
+JOURNAL, LOCK = 'journal', '.lock'
+EARLIER = 'earlier'
+
+
+def part_name(number: int) -> str:
+    """Name the file of a part."""
+    return f'part-{number:06}.parquet'
+
+
+class ResultParts:
+    """
+    Keeps the rows of finished cells; whatever ends the process, no finished cell is lost.
+
+    Rows go into a journal, a line for each cell, and with every `part_cells` of them into a part
+    of each table. The part of `cells` comes last: where it is, the part is whole.
+
+    :param folder: of the evaluation; is made.
+    :param part_cells: cells of a part.
+    :raises InputError: if it cannot be written, or somebody else writes there.
+    """
+
+    def __init__(self, folder: Path, part_cells: int = PART_CELLS) -> None:
+        self.folder, self._part_cells = folder, part_cells
+        try:
+            for table in TABLES_OF_CELLS:
+                (folder / table.name).mkdir(parents=True, exist_ok=True)
+            self._lock = (folder / LOCK).open('w')
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError('another evaluation writes there', str(folder),
+                             'wait for it, or name another folder') from error
+        except OSError as error:
+            raise _refusal(folder, error) from error
+        self._rows: list[dict[str, Any]] = []
+        self._journal: IO[str] | None = None
+        self._journal_path = folder
+        self._start_journal(self._recover())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def add(self, rows: Mapping[str, Any]) -> None:
+        """
+        Keep the rows of a cell.
+
+        :param rows: `cell`, `vehicles`, `work`, with the columns that all have.
+        :raises InputError: if they cannot be written.
+        """
+        try:
+            assert self._journal is not None
+            self._journal.write(json.dumps(rows) + '\n')
+            self._journal.flush()
+            os.fsync(self._journal.fileno())
+            self._rows.append(dict(rows))
+            if len(self._rows) >= self._part_cells:
+                self.finish_part()
+        except OSError as error:
+            raise _refusal(self.folder, error) from error
+
+    def finish_part(self) -> None:
+        """Write the rows that are only in the journal as a part."""
+        if not self._rows:
+            return
+        _write_part(self.folder, self._number, self._rows)
+        self._rows = []
+        self._start_journal(self._number + 1)
+
+    def close(self) -> None:
+        """Let go of the folder, as it is."""
+        if self._journal is not None:
+            self._journal.close()
+        if not self._rows:
+            with suppress(OSError):
+                self._journal_path.unlink()
+        self._lock.close()
+
+    def keys(self) -> Iterator[str]:
+        """Yield the keys of all cells that are kept."""
+        for path in sorted((self.folder / CELLS.name).glob('part-*.parquet')):
+            yield from _column(path, 'cell')
+        for rows in self._rows:
+            yield rows['cell']['cell']
+
+    def keep_wanted(self, wanted: Callable[[str, str], bool]) -> int:
+        """
+        Put away the rows of cells that are not wanted, and take back those that are again.
+
+        :param wanted: tells it of a key and a status.
+        :return: how many were put away.
+        """
+        self.finish_part()
+        earlier, away = self.folder / EARLIER, 0
+        before = _part_names(self.folder)
+        for name in _part_names(earlier):
+            _move(earlier, name, self.folder, partial(_is_new, wanted, set(self.keys())))
+        for name in before:
+            away += _move(self.folder, name, earlier,
+                          lambda key, status: not wanted(key, status))
+        self._start_journal(_next_number(self.folder))
+        return away
+
+    def _start_journal(self, number: int) -> None:
+        """Begin the journal of a part; an empty one of another is removed."""
+        if self._journal is not None:
+            self._journal.close()
+            self._journal_path.unlink()
+        self._number = number
+        self._journal_path = self.folder / f'{JOURNAL}-{number:06}.jsonl'
+        self._journal = self._journal_path.open('a', encoding='utf-8')
+
+    def _recover(self) -> int:
+        """Take up what an earlier process left; give the number of the part to come."""
+        number = _next_number(self.folder)
+        for path in sorted(self.folder.glob(f'{JOURNAL}-*.jsonl')):
+            if _journal_number(path) < number:
+                # It died between writing the part and this.
+                path.unlink()
+                continue
+            self._rows += _journal_lines(path)
+            _write_lines(path, self._rows)
+        return number
+
+
+def _write_lines(path: Path, rows: list[dict[str, Any]]) -> None:
+    part = path.with_suffix('.part')
+    part.write_text(''.join(json.dumps(row) + '\n' for row in rows), encoding='utf-8')
+    part.replace(path)
+
+
+def _is_new(wanted: Callable[[str, str], bool], known: set[str], key: str, status: str) -> bool:
+    return wanted(key, status) and key not in known
+
+
+def _part_names(folder: Path) -> list[str]:
+    return sorted(path.name for path in (folder / CELLS.name).glob('part-*.parquet'))
+
+
+def _next_number(folder: Path) -> int:
+    return max((int(Path(name).stem.rpartition('-')[2]) for name in _part_names(folder)),
+               default=-1) + 1
+
+
+def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
+    """
+    Return the rows that are only in a journal yet as a part of each table, as its file would be.
+
+    :return: by the table's name; empty where there is no such row.
+    """
+    journals = {path: _journal_lines(path) for path in sorted(folder.glob(f'{JOURNAL}-*.jsonl'))}
+    # Only now, because a journal is removed after its part is written.
+    number = _next_number(folder)
+    cells = [rows for path, found in journals.items() if _journal_number(path) >= number
+             for rows in found]
+    parts: dict[str, pa.Buffer] = {}
+    if cells:
+        for table in TABLES_OF_CELLS:
+            sink = pa.BufferOutputStream()
+            _write_rows(table, cells, sink)
+            parts[table.name] = sink.getvalue()
+    return parts
+
+
+def _journal_number(path: Path) -> int:
+    return int(path.stem.rpartition('-')[2])
+
+
+def _journal_lines(path: Path) -> list[dict[str, Any]]:
+    """Read the rows of a journal; of one that was removed meanwhile there are none."""
+    try:
+        lines = path.read_text(encoding='utf-8').splitlines()
+    except FileNotFoundError:
+        return []
+    rows = []
+    for line in lines:
+        # The last may be cut off: its cell was not finished.
+        with suppress(ValueError):
+            rows.append(json.loads(line))
+    return rows
+
+
+def _write_rows(table: TableDeclaration, cells: list[dict[str, Any]],
+                sink: Path | pa.NativeFile) -> None:
+    """Write the rows that cells have in a table."""
+    rows = [row for each in cells for row in _rows_of(table, each)]
+    with TableWriter(table, sink, 'parquet') as writer:
+        if rows:
+            writer.add({column.name: [row.get(column.name) for row in rows]
+                        for column in table.columns})
+
+
+def _rows_of(table: TableDeclaration, cell: Mapping[str, Any]) -> list[dict[str, Any]]:
+    if table is VEHICLES_OF_CELLS:
+        rows: list[dict[str, Any]] = cell['vehicles']
+        return rows
+    return [cell['cell'] if table is CELLS else cell['work']]
+
+
+def _write_part(folder: Path, number: int, cells: list[dict[str, Any]]) -> None:
+    """Write rows as a part of every table."""
+    def write(table: TableDeclaration, path: Path) -> None:
+        _write_rows(table, cells, path)
+    _replace_part(folder, part_name(number), write)
+
+
+def _replace_part(folder: Path, name: str,
+                  write: Callable[[TableDeclaration, Path], object]) -> None:
+    """Write a part of every table, whole or not at all; that of `cells` comes last."""
+    for table in reversed(TABLES_OF_CELLS):
+        (folder / table.name).mkdir(parents=True, exist_ok=True)
+        path = folder / table.name / name
+        part = path.with_suffix(f'.{os.getpid()}.part')
+        write(table, part)
+        with part.open('rb') as stream:
+            os.fsync(stream.fileno())
+        part.replace(path)
+
+
+def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bool]) -> int:
+    """Move the chosen cells of a part into a part of another folder; give how many there were."""
+    cells = pq.read_table(source / CELLS.name / name, columns=['cell', 'status'])
+    keys = {row['cell'] for row in cells.to_pylist() if chosen(row['cell'], row['status'])}
+    if keys:
+        for folder, new, inside in ((target, part_name(_next_number(target)), True),
+                                    (source, name, False)):
+            _replace_part(folder, new, partial(_write_filtered, source, name, keys, inside))
+    return len(keys)
+
+
+def _write_filtered(source: Path, name: str, keys: set[str], inside: bool,
+                    table: TableDeclaration, path: Path) -> None:
+    """Write those rows of a part whose cells are among the keys, or are not."""
+    rows = pq.read_table(source / table.name / name)
+    pq.write_table(rows.filter(pa.array(
+        [(key in keys) is inside for key in rows['cell'].to_pylist()], pa.bool_())), path,
+        compression='zstd')
+
+
+def _column(path: Path, name: str) -> list[str]:
+    values: list[str] = pq.read_table(path, columns=[name])[name].to_pylist()
+    return values
+
+
+def _refusal(folder: Path, error: OSError) -> InputError:
+    return InputError(f'cannot be written ({error.strerror})', str(folder),
+                      'choose a folder that can be written, on a disk with room')

@@ -1,0 +1,181 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is summed up of cells: one row of a table for each measure."""
+
+from collections.abc import Iterable, Sequence
+import math
+from typing import Literal, NamedTuple
+
+from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
+from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
+from crgame_ros.analysis.tables.vehicles import VEHICLES
+from crgame_ros.errors import InputError, short
+import numpy as np
+from numpy.typing import NDArray
+
+Test = Literal['<', '>', 'known', 'true']
+_NUMERIC = {column.name: column for column in VEHICLES.columns
+            if column.type in (NUMBER, INTEGER, FLAG)}
+
+
+class SummaryMeasure(NamedTuple):
+    """
+    Something of which there is a mean.
+
+    :param name: by which it is asked for.
+    :param label: for people.
+    :param column: of the table `vehicles`; empty of what is told by the cell alone.
+    :param better: the greater (1) or the smaller (-1) values are; 0 for neither.
+    :param test: with `limit` makes a share of it: of the values that pass; empty for a mean.
+    :param limit: of the test.
+    :param empty: what an empty value counts as; NaN leaves its row out.
+    :param where: another column that has to be known, or the row is left out; empty for none.
+    :param what: its definition in a sentence; empty where that of the column says it.
+    :param most: greater values count as this one: they come of speeds that are almost equal, or
+        of gaps that are almost closed, and a mean would be of them alone.
+    """
+
+    name: str
+    label: str
+    column: str
+    better: int
+    test: Test | Literal[''] = ''
+    limit: float = 0.0
+    empty: float = math.nan
+    where: str = ''
+    what: str = ''
+    most: float = math.inf
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name the columns that it is made of."""
+        return tuple(filter(None, (self.column, self.where)))
+
+    @property
+    def is_share(self) -> bool:
+        """Return whether it is a share, from 0 to 1."""
+        return bool(self.test) or not self.column
+
+    @property
+    def unit(self) -> str:
+        """Return the unit as tables write it; 1 of a share or a count."""
+        if self.is_share or self.column not in _NUMERIC:
+            return '1'
+        return _NUMERIC[self.column].unit or '1'
+
+    @property
+    def definition(self) -> str:
+        """Return in a sentence what it is."""
+        if self.what:
+            return self.what
+        column = _NUMERIC.get(self.column)
+        what = self.column if column is None else column.definition
+        if not self.test:
+            return what if math.isinf(self.most) \
+                else f'{what}; greater ones count as {self.most:g}'
+        condition = (f'is {self.test}' if self.test in ('known', 'true')
+                     else f'is {self.test} {self.limit:g}')
+        return f'share of AVs of which {self.column} {condition} ({what})'
+
+    def values(self, *columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Make values to average of its columns; NaN where there is none.
+
+        :param columns: (N) as `columns` names them, NaN where one is empty.
+        """
+        numbers = columns[0]
+        if self.where:
+            return np.where(np.isnan(columns[1]), np.nan, self._replace(where='').values(numbers))
+        missing = np.isnan(numbers)
+        if not self.test:
+            # The mean of something infinite says nothing.
+            return np.where(np.isfinite(numbers), np.minimum(numbers, self.most), self.empty)
+        with np.errstate(invalid='ignore'):
+            passed = {'<': numbers < self.limit, '>': numbers > self.limit, 'known': ~missing,
+                      'true': numbers > 0.0}[self.test]
+        return np.where(missing & (self.test != 'known'), self.empty, passed.astype(float))
+
+
+# Nobody was near where nothing is known of a gap: nothing critical.
+MEASURES = {measure.name: measure for measure in (
+    SummaryMeasure('failed', 'cells that failed', '', -1,
+                   what='share of all finished cells that did not end well'),
+    SummaryMeasure('collision', 'AVs with a collision', 'collided', -1, 'true',
+                   what='share of AVs that touched anything'),
+    SummaryMeasure('off_road', 'AVs off the road', 'left_road', -1, 'true',
+                   what='share of AVs of which a part of the footprint was off the road'),
+    SummaryMeasure('critical_ttc', f'AVs with a TTC below {USUAL.ttc_s:g} s', 'worst_ttc', -1,
+                   '<', USUAL.ttc_s, 0.0),
+    SummaryMeasure('critical_drac', f'AVs with a DRAC above {USUAL.drac:g} m/s²', 'worst_drac',
+                   -1, '>', USUAL.drac, 0.0),
+    # Never reached, and not scored at all, leave it empty alike.
+    SummaryMeasure('goal_reached', 'AVs that reached their goal', 'score_reached_s', 1, 'known',
+                   where='score_valid'),
+    SummaryMeasure('valid', 'AVs with a valid solution', 'score_valid', 1, 'true'),
+    SummaryMeasure('feasible', 'AVs with a feasible drive', 'score_feasible', 1, 'true'),
+    SummaryMeasure('nuplan', 'nuPlan score', 'score_nuplan', 1),
+    SummaryMeasure('no_collision_at_fault', 'nuPlan: no collision at fault',
+                   'score_no_collision_at_fault', 1),
+    SummaryMeasure('drivable_area', 'nuPlan: drivable area', 'score_drivable_area', 1),
+    SummaryMeasure('driving_direction', 'nuPlan: driving direction', 'score_driving_direction', 1),
+    SummaryMeasure('progress', 'nuPlan: progress', 'score_progress', 1),
+    SummaryMeasure('time_to_collision', 'nuPlan: time to collision', 'score_time_to_collision', 1),
+    SummaryMeasure('speed_limit', 'nuPlan: speed limit', 'score_speed_limit', 1),
+    SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
+    SummaryMeasure('worst_ttc', 'least TTC', 'worst_ttc', 1, most=20.0),
+    SummaryMeasure('worst_thw', 'least THW', 'worst_thw', 1, most=20.0),
+    SummaryMeasure('worst_min_distance', 'least distance', 'worst_min_distance', 1),
+    SummaryMeasure('worst_drac', 'greatest DRAC', 'worst_drac', -1, most=20.0),
+    SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
+    SummaryMeasure('tet_s', 'time with a critical TTC', 'tet_s', -1),
+    SummaryMeasure('tit', 'TTC below its threshold, over time', 'tit', -1),
+    SummaryMeasure('distance', 'way', 'distance', 0),
+    SummaryMeasure('mean_speed', 'mean speed', 'mean_speed', 0),
+    SummaryMeasure('min_acceleration', 'hardest braking', 'min_acceleration', 1),
+    SummaryMeasure('accepted', 'answers accepted', 'accepted_ratio', 1,
+                   what="share of the planner's answers that were accepted and no fallback"),
+    SummaryMeasure('fallbacks', 'plans that braked instead', 'fallbacks', -1),
+    SummaryMeasure('plans_refused', 'plans refused', 'plans_refused', -1),
+    SummaryMeasure('timed_out', 'requests without an answer', 'timed_out', -1),
+    SummaryMeasure('latency_p50_s', 'median latency', 'latency_p50_s', -1),
+    SummaryMeasure('latency_max_s', 'greatest latency', 'latency_max_s', -1),
+)}
+# The worst cells: contacts first, then by what was left.
+WORST_FIRST = ('collision', 'worst_ttc')
+
+
+def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
+                    ) -> tuple[SummaryMeasure, ...]:
+    """
+    Choose what is summed up.
+
+    :param names: of measures, or of numeric columns of the table `vehicles`; None for all
+        measures.
+    :param known: columns that the evaluation has.
+    :raises InputError: if a name is neither, or its column is in no part.
+    """
+    known = set(known)
+    there = {name: measure for name, measure in MEASURES.items()
+             if known.issuperset(measure.columns)}
+    if names is None:
+        return tuple(there.values())
+    found = []
+    for name in dict.fromkeys(names):
+        if name in there:
+            found.append(there[name])
+        elif name in _NUMERIC and name in known:
+            found.append(SummaryMeasure(name, name.replace('_', ' '), name, _better(name)))
+        else:
+            more = sorted(known & _NUMERIC.keys() - there.keys())
+            raise InputError(f'no measure {short(name)} here', '--measure',
+                             f'there are {", ".join([*there, *more])}')
+    if not found:
+        raise InputError('no measure is named', '--measure', 'name one, or leave it out for all')
+    return tuple(found)
+
+
+def _better(column: str) -> int:
+    """Return which values of a column are better: those less critical, of criticality."""
+    measure = CRITICALITY.get(column.removeprefix('worst_'))
+    return -measure.worst if measure is not None and column.startswith('worst_') else 0

@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of a summary, whatever they are written as."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import math
+from typing import NamedTuple
+
+from crgame_ros.evaluation.summary.evaluated_parts import FACTORS
+from crgame_ros.evaluation.summary.group_bootstrap import FEWEST_SCENARIOS
+from crgame_ros.evaluation.summary.measures import SummaryMeasure
+from crgame_ros.evaluation.summary.summary import (
+    Estimate,
+    GroupMeans,
+    PairedDifferences,
+    Summary,
+)
+
+NOTHING = '-'
+_ALWAYS_TOLD = ('scenario', 'planner', 'seed')
+# As tried with made-up evaluations (docs/evaluation.md).
+_MANY_UNITS = 20
+_SHARE_OF_NONE = ('an interval from 0 to 0 is that of the resamples: what never happened in n may '
+                  'still happen as often as 3/n')
+_BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing '
+              'differs one interval in twenty is, by chance')
+
+
+class SummaryCell(NamedTuple):
+    """
+    What stands in a cell of a table.
+
+    :param text: what counts.
+    :param detail: of less weight; empty for none.
+    :param mark: `better` or `worse` of a difference that is one; empty otherwise.
+    """
+
+    text: str
+    detail: str = ''
+    mark: str = ''
+
+
+@dataclass(frozen=True)
+class SummaryTable:
+    """
+    A table of a summary.
+
+    :param key: tells it from the others.
+    :param title: of it.
+    :param caption: what its rows are.
+    :param head: names of the columns.
+    :param rows: each as long as the head.
+    :param notes: what has to be known to read it.
+    :param keys: column in which there are keys of cells; -1 for none.
+    """
+
+    key: str
+    title: str
+    caption: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[SummaryCell, ...], ...]
+    notes: tuple[str, ...] = ()
+    keys: int = -1
+
+
+def summary_title(summary: Summary) -> str:
+    """Name an evaluation by its folder."""
+    return summary.folder.resolve().name
+
+
+def summary_lead(summary: Summary) -> str:
+    """Return how much there is."""
+    baseline = f', compared with {summary.baseline}' if summary.baseline else ''
+    return (f'{summary.cells} cells finished, {summary.failed} of them failed; by '
+            f'{" × ".join(summary.by)}: {len(summary.groups)}{baseline}; '
+            f'scenarios: {summary.scenarios}')
+
+
+def summary_tables(summary: Summary) -> Iterator[SummaryTable]:
+    """Yield the tables of a summary in their order."""
+    yield _means(summary)
+    if summary.differences:
+        yield _differences(summary)
+    if summary.worst:
+        yield _worst(summary)
+    if summary.failures:
+        yield _failures(summary)
+
+
+def group_name(labels: Sequence[str]) -> str:
+    """Name a group by its labels."""
+    return ' × '.join(label or NOTHING for label in labels)
+
+
+def known_measures(summary: Summary) -> Iterator[tuple[int, SummaryMeasure]]:
+    """Yield the measures of which something is known, with their places."""
+    for place, measure in enumerate(summary.measures):
+        if any(group.estimates[place].n for group in summary.groups):
+            yield place, measure
+
+
+def measure_label(measure: SummaryMeasure) -> str:
+    """Name a measure with its unit."""
+    unit = '%' if measure.is_share else measure.unit.replace('^2', '²').replace('^3', '³')
+    return measure.label if unit == '1' else f'{measure.label} [{unit}]'
+
+
+def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str:
+    """Write a value in the unit of `measure_label` to three digits."""
+    if math.isnan(value):
+        return NOTHING
+    if measure.is_share:
+        value *= 100.0
+    if math.isinf(value):
+        return 'inf' if value > 0.0 else '-inf'
+    digits = max(0, min(5, 2 - math.floor(math.log10(abs(value) or 1.0))))
+    text = f'{value:{"+" if signed else ""}.{digits}f}'
+    return text if float(text) else '0'
+
+
+def _means(summary: Summary) -> SummaryTable:
+    counts = SummaryCell('cells finished'), *(SummaryCell(
+        str(group.cells), f'{group.scenarios} scenarios') for group in summary.groups)
+    rows = [counts]
+    for place, measure in known_measures(summary):
+        rows.append((SummaryCell(measure_label(measure)), *(
+            _estimate(group.estimates[place], measure) for group in summary.groups)))
+    known = {place for place, _ in known_measures(summary)}
+    unknown = [measure.label for place, measure in enumerate(summary.measures)
+               if place not in known]
+    notes = [
+        'means over the n AVs with a value in cells that ended well (of the share that failed: '
+        'over all cells); what is not defined, such as the TTC of who has nobody ahead, is left '
+        'out', f'95 % intervals: percentile bootstrap, {summary.resamples} resamples, seed '
+        f'{summary.seed}', *_drawn(summary.groups)]
+    bounds = [f'{measure.label} {measure.most:g} {measure.unit}' for _, measure
+              in known_measures(summary) if math.isfinite(measure.most)]
+    if bounds:
+        notes.append(f'greater values count as these: {", ".join(bounds)}')
+    if any(measure.is_share and not group.estimates[place].value
+           for place, measure in known_measures(summary) for group in summary.groups):
+        notes.append(_SHARE_OF_NONE)
+    if unknown:
+        notes.append(f'of no AV: {", ".join(unknown)}')
+    return SummaryTable('means', 'Means', 'Mean, 95 % interval and n',
+                        ('', *map(_group, summary.groups)), tuple(rows), tuple(notes))
+
+
+def _group(group: GroupMeans | PairedDifferences) -> str:
+    return group_name(group.labels)
+
+
+def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterator[str]:
+    """Yield what was drawn for intervals, and what they speak of."""
+    kinds: dict[str, list[str]] = {}
+    for group in groups:
+        kinds.setdefault(group.resampled, []).append(_group(group))
+    what = 'pairs' if groups and isinstance(groups[0], PairedDifferences) else 'cells'
+    for kind, names in sorted(kinds.items()):
+        whose = '' if len(kinds) == 1 else f'of {", ".join(names)}: '
+        if kind == 'scenarios':
+            yield (f'{whose}drawn are scenarios, each with all its {what}, for {what} of one '
+                   'scenario are alike (cluster bootstrap): the intervals speak of scenarios '
+                   'like these')
+        else:
+            yield (f'{whose}drawn are {what}, because there are fewer than {FEWEST_SCENARIOS} '
+                   'scenarios: the intervals speak of these scenarios alone')
+        if min(_units(group) for group in groups if group.resampled == kind) < _MANY_UNITS:
+            drawn = what if kind == 'cells' else kind
+            yield (f'{whose}of fewer than {_MANY_UNITS} {drawn} they are too narrow: of ten they '
+                   'hold the truth in 90 %, of five in 84 %')
+
+
+def _units(group: GroupMeans | PairedDifferences) -> int:
+    """Count what is drawn from."""
+    if group.resampled == 'scenarios':
+        return group.scenarios
+    return group.cells if isinstance(group, GroupMeans) else group.pairs
+
+
+def _estimate(found: Estimate, measure: SummaryMeasure, signed: bool = False) -> SummaryCell:
+    if not found.n:
+        return SummaryCell(NOTHING)
+    side = found.side * measure.better if signed else 0
+    detail = f'{quantity(found.low, measure, signed)} to {quantity(found.high, measure, signed)}'
+    if math.isnan(found.low):
+        detail = 'no interval'
+    return SummaryCell(quantity(found.value, measure, signed), f'{detail}, n {found.n}',
+                       {1: 'better', -1: 'worse'}.get(side, ''))
+
+
+def _differences(summary: Summary) -> SummaryTable:
+    groups = summary.differences
+    rows = [(SummaryCell(words), *(SummaryCell(str(getattr(group, name))) for group in groups))
+            for name, words in (
+                ('pairs', 'pairs of which both ended well'),
+                ('failed', 'pairs of which it alone failed'),
+                ('baseline_failed', 'pairs of which the baseline alone failed'),
+                ('both_failed', 'pairs of which both failed'),
+                ('unpaired', 'cells that the baseline has not'))]
+    rows += [(SummaryCell(measure_label(measure)), *(
+        _estimate(group.estimates[place], measure, signed=True) for group in groups))
+        for place, measure in known_measures(summary)]
+    notes = (f'each minus {summary.baseline} in the same cell: all factors but the planner alike, '
+             'the mean of its AVs; n counts the pairs of which both have a value',
+             *_drawn(groups), _BY_CHANCE)
+    return SummaryTable('differences', f'Differences from {summary.baseline}',
+                        'Mean difference, 95 % interval and n', ('', *map(_group, groups)),
+                        tuple(rows), notes)
+
+
+def _worst(summary: Summary) -> SummaryTable:
+    # What all cells have alike is told once.
+    told = [column for column, name in enumerate(FACTORS) if name in _ALWAYS_TOLD
+            or len({cell.factors[column] for cell in summary.worst}) > 1]
+    alike = [f'{name} {label}' for column, (name, label) in enumerate(zip(
+        FACTORS, summary.worst[0].factors, strict=True)) if label and column not in told]
+    head = ('cell', *(FACTORS[column] for column in told), 'vehicle',
+            *map(_worst_label, summary.worst_by))
+    rows = tuple((SummaryCell(cell.key), *(SummaryCell(cell.factors[column] or NOTHING)
+                                           for column in told), SummaryCell(cell.vehicle), *(
+        SummaryCell(_worst_value(value, measure))
+        for value, measure in zip(cell.values, summary.worst_by, strict=True)))
+        for cell in summary.worst)
+    by = ', then '.join(measure.label for measure in summary.worst_by)
+    notes = (f'by the worst AV of each: {by}',
+             *((f'all of them with {", ".join(alike)}',) if alike else ()))
+    return SummaryTable('worst', f'The {len(rows)} worst cells', 'The worst first', head, rows,
+                        notes, keys=0)
+
+
+def _worst_label(measure: SummaryMeasure) -> str:
+    return measure.name.replace('_', ' ') if measure.is_share else measure_label(measure)
+
+
+def _worst_value(value: float, measure: SummaryMeasure) -> str:
+    if measure.is_share and not math.isnan(value):
+        return 'yes' if value else 'no'
+    return quantity(value, measure)
+
+
+def _failures(summary: Summary) -> SummaryTable:
+    rows = tuple((
+        SummaryCell(failure.status), SummaryCell(failure.reason or NOTHING),
+        SummaryCell(str(failure.count), ', '.join(
+            f'{group_name(labels)} {count}' for labels, count in failure.cells)),
+        SummaryCell(failure.example)) for failure in summary.failures)
+    return SummaryTable('failures', 'Failures', 'The most frequent first',
+                        ('how', 'why', 'cells', 'such as'), rows, keys=3)

@@ -1,0 +1,299 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The live run behind the page: everything the page shows and orders, in one asyncio task."""
+
+import asyncio
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+import time
+from typing import Any, Literal, NamedTuple
+
+from crgame_ros.cockpit.client import Client, Sound
+from crgame_ros.cockpit.held_seat import HeldSeat
+from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.seen_view import SeenView
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.task_documents import PageTimes, TaskReport
+from crgame_ros.nodes.cockpit.feed import CockpitFeed
+from crgame_ros.nodes.cockpit.orders import CockpitOrders
+from crgame_ros.nodes.cockpit.seat_desk import PeopleFeed, SeatDesk
+from crgame_ros.ros.diagnostics import Diagnostics
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.spinning import attempt
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+
+REPORT_PERIOD_S = 1.0
+
+
+class _Told(NamedTuple):
+    state: Sound | SeenView
+    at_s: float
+
+
+class PageReport:
+    """
+    Tells of the page of each held seat how it sounds and what it shows: each second, at a change.
+
+    :param diagnostics: of the node.
+    """
+
+    def __init__(self, diagnostics: Diagnostics) -> None:
+        self._diagnostics = diagnostics
+        self._told: dict[str, _Told] = {}
+
+    def tell(self, seats: Iterable[HeldSeat], clients: Mapping[str, Client],
+             stamp_ns: int) -> None:
+        """
+        Publish what has changed, and what has not been told for a second.
+
+        :param clients: by id.
+        :param stamp_ns: simulation time [ns]
+        """
+        now_s = time.monotonic()
+        told = {}
+        for seat in seats:
+            client = clients.get(seat.holder)
+            if client is None:
+                continue
+            for subject, state in ((f'{seat.id} sound', client.sound),
+                                   (f'{seat.id} view', client.view)):
+                before = self._told.get(subject)
+                if before is not None and state == before.state \
+                        and now_s - before.at_s < REPORT_PERIOD_S:
+                    told[subject] = before
+                    continue
+                told[subject] = _Told(state, now_s)
+                text, values = _words(state)
+                self._diagnostics.publish(f'cockpit_node: {subject}', DiagnosticStatus.OK, text,
+                                          values, stamp_ns)
+        self._told = told
+
+
+def _words(state: Sound | SeenView) -> tuple[str, dict[str, object]]:
+    if isinstance(state, Sound):
+        return 'sounds' if state.on else 'is silent', {
+            'on': state.on, 'volume': f'{state.volume:.2f}', 'rumble': f'{state.rumble:.2f}'}
+    return f'shows {state.shown or "nothing yet"}', {
+        'shown': state.shown, 'inset': state.inset, 'plans': state.plans,
+        'mirrors': state.mirrors, 'bare': state.bare, 'across_deg': _number(state.across_deg, 1),
+        'screen_width_m': _number(state.screen_width_m, 3),
+        'eye_distance_m': _number(state.eye_distance_m, 3),
+        'width_px': _number(state.width_px, 0), 'height_px': _number(state.height_px, 0),
+        'ratio': _number(state.ratio, 3), 'rate_hz': _number(state.rate_hz, 1),
+        'renderer': state.renderer, 'software': state.software}
+
+
+def _number(value: float | None, digits: int) -> str:
+    return '' if value is None else f'{value:.{digits}f}'
+
+
+# Half a cycle at 100 Hz: a state is passed on, and answered with a command, well within it [s].
+PERIOD_S = 0.004
+# While people only watch, and while nobody does [s].
+WATCH_PERIOD_S = 0.01
+IDLE_PERIOD_S = 0.05
+# Between two looks at what may wait: services, names of people, orders without an answer [s].
+SERVE_PERIOD_S = 0.1
+# Of one line about messages that cannot be read: peers repeat them [s].
+COMPLAIN_S = 1.0
+# In which a game that somebody uploaded has to begin, for them to get its seat [s].
+BEGINS_WITHIN_S = 60.0
+_DEEDS = {'start': 'started the run', 'pause': 'paused the run', 'step': 'stepped through the run',
+          'reset': 'reset the run', 'stop': 'stopped the run'}
+
+
+class LiveBackend:
+    """
+    Stands behind the page of a live run.
+
+    :param node: owner of the endpoints.
+    :param runs: folder of the session's files; None where nobody keeps any.
+    """
+
+    mode: Literal['live', 'replay'] = 'live'
+
+    def __init__(self, node: Node, runs: Path | None = None) -> None:
+        self._node = node
+        self._runs = runs
+        self._endpoints = Endpoints(node)
+        self._orders = CockpitOrders(node, self._endpoints)
+        self._page_report = PageReport(self._endpoints.diagnostics)
+        self._seat_slot = self._endpoints.polled('/seats')
+        self._served_s = 0.0
+        self._lost: dict[str, bool] = {}
+        self._pump: asyncio.Task[None] | None = None
+        # Who gets the seat of a game to come, after which epoch, and until when.
+        self._expected: tuple[Client, int, float] | None = None
+
+    async def start(self, hub: Hub) -> None:
+        """Begin to pass the run on."""
+        self._hub = hub
+        self._feed = CockpitFeed(self._endpoints, hub, self._runs)
+        self._desk = SeatDesk(self._node, self._endpoints, self._orders, hub, self._feed)
+        self._people = PeopleFeed(
+            self._endpoints, hub, self._desk.table, self._feed.status)
+        self._pump = asyncio.create_task(self._run())
+
+    async def stop(self) -> None:
+        """Let go of every seat and end."""
+        self._desk.close()
+        if self._pump is not None:
+            self._pump.cancel()
+            await asyncio.gather(self._pump, return_exceptions=True)
+        self._orders.close()
+
+    async def _run(self) -> None:
+        """Pass the run on until stopped; no part ends it or keeps the others from their work."""
+        while True:
+            attempt(self._node, self._pass_on)
+            attempt(self._node, self._desk.drive)
+            if time.monotonic() - self._served_s >= SERVE_PERIOD_S:
+                self._served_s = time.monotonic()
+                attempt(self._node, self._serve)
+            await asyncio.sleep(self._period_s())
+
+    def _period_s(self) -> float:
+        if self._desk.table.held:
+            return PERIOD_S
+        return WATCH_PERIOD_S if self._hub.clients else IDLE_PERIOD_S
+
+    def _pass_on(self) -> None:
+        for problem in self._feed.poll():
+            self._node.get_logger().error(problem[:500], throttle_duration_sec=COMPLAIN_S)
+        message = self._seat_slot.latest()
+        if message is not None:
+            try:
+                self._desk.take_seats(message.data)
+            except InputError as error:
+                self._node.get_logger().warning(str(error), throttle_duration_sec=COMPLAIN_S)
+        if self._lost != self._feed.status.seats_lost:
+            self._lost = dict(self._feed.status.seats_lost)
+            self._desk.show()
+
+    def _serve(self) -> None:
+        self._orders.serve()
+        self._seat_who_chose()
+        # People come and change their names.
+        self._desk.serve()
+        self._people.tell(time.monotonic())
+        if self._feed.scenario is not None:
+            self._page_report.tell(
+                self._desk.table.held.values(), self._hub.clients,
+                self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
+
+    def _seat_who_chose(self) -> None:
+        """Put whoever uploaded the game that has begun into its seat."""
+        scenario = self._feed.scenario
+        if self._expected is None or scenario is None:
+            return
+        client, epoch, until_s = self._expected
+        if scenario.game.epoch > epoch:
+            self._expected = None
+            if client.id in self._hub.clients:
+                self._desk.claim_for(client)
+        elif time.monotonic() > until_s:
+            self._expected = None
+
+    def joined(self, client: Client) -> None:
+        """Set the pace of a new page, and give who has come back their seat."""
+        self._feed.pace(client)
+        self._desk.joined(client)
+
+    def left(self, client: Client) -> None:
+        """Take the hands of a page that is gone off the controls, at once."""
+        self._desk.left(client)
+
+    async def command(self, client: Client, message: Mapping[str, Any]) -> str:
+        """
+        Do what a page asks.
+
+        :raises CrgameError: if it cannot be done.
+        """
+        kind = message['type']
+        if kind == 'input':
+            return self._desk.input(client, message)
+        if kind == 'task':
+            return self._report_task(client, message)
+        if kind == 'control':
+            return await self._control(client, message['action'], bool(message.get('all')))
+        if kind == 'rate':
+            await self._orders.set_parameter('real_time_factor', float(message['factor']))
+            self._announce(client, f'set the speed of time to × {message["factor"]:g}')
+            return f'real-time factor {message["factor"]:g}'
+        if kind == 'planner':
+            self._known_av(message['av'])
+            text = await self._orders.run_planner(message['av'], message['run'])
+            self._announce(client, f'let the planner of {message["av"]} go on' if message['run']
+                           else f'stopped the planner of {message["av"]}')
+            return text
+        if kind == 'trigger':
+            return self._trigger(client, message['event'])
+        return self._desk.order(client, message)
+
+    async def _control(self, client: Client, action: str, for_all: bool) -> str:
+        """Steer the run; the start of who sits among several in its seats is their readiness."""
+        seat = self._desk.gate_seat(client)
+        if action == 'start' and seat is not None and not (for_all and client.rights.directs) \
+                and (len(self._desk.cockpit_seats) > 1 or not client.rights.directs):
+            return self._desk.order(client, {'type': 'ready', 'seat': seat, 'ready': True})
+        if not client.rights.directs:
+            raise CrgameError('only a director can start this run; a driver in its seat says '
+                              'that they are ready')
+        return await self._steer(client, action)
+
+    async def _steer(self, client: Client, action: str) -> str:
+        text = await self._orders.control(action)
+        self._announce(client, _DEEDS[action])
+        return text
+
+    def _trigger(self, client: Client, event: str) -> str:
+        scenario = self._feed.scenario
+        game = None if scenario is None else scenario.game
+        if game is None or event not in {*(item.name for item in game.events),
+                                         *(task.name for task in game.tasks)}:
+            raise InputError('is no event or task of this game', event[:40])
+        self._orders.trigger(event)
+        self._announce(client, f'triggered {event}')
+        return f'{event}: triggered'
+
+    def _report_task(self, client: Client, message: Mapping[str, Any]) -> str:
+        """Pass on what the page of a seat has shown, or what its driver has answered."""
+        seat, what = message['seat'], message['what']
+        # A request to take over is seen before anybody has the seat.
+        if what != 'shown' or seat in self._desk.table.held or not client.rights.drives:
+            self._desk.table.holding(client.id, seat)
+        self._orders.report_task(TaskReport(
+            seat, message['task'], message['number'], what, PageTimes(**message['times'])))
+        return ''
+
+    def _known_av(self, av: str) -> None:
+        scenario = self._feed.scenario
+        if scenario is None or scenario.game.av(av) is None:
+            raise InputError('takes no part in this game', av)
+
+    def _announce(self, actor: Client | None, deed: str) -> None:
+        """Tell the others, and the recording, who has done what."""
+        name = 'somebody without a page' if actor is None else actor.name
+        self._endpoints.diagnostics.publish(
+            'cockpit_node: order', DiagnosticStatus.OK, f'{name} {deed}',
+            {'person': '' if actor is None else actor.person})
+        for client in tuple(self._hub.clients.values()):
+            if client is not actor:
+                self._hub.send_event('notice', {'level': 'info', 'text': f'{name} {deed}'},
+                                     only=client)
+
+    async def load_game(self, path: Path, client: Client | None = None, *,
+                        takes_seat: bool = False) -> str:
+        """
+        Begin a game: it is taken at a reset.
+
+        :raises CrgameError: if the simulation refuses it.
+        """
+        await self._orders.set_parameter('game', str(path))
+        if client is not None and takes_seat:
+            epoch = -1 if self._feed.scenario is None else self._feed.scenario.game.epoch
+            self._expected = (client, epoch, time.monotonic() + BEGINS_WITHIN_S)
+        text = await self._orders.control('reset')
+        self._announce(client, 'chose what is run')
+        return text

@@ -1,0 +1,278 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The services and parameters by which people steer sim_node."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.driver.source import is_replay
+from crgame_ros.errors import InputError
+from crgame_ros.game.file import load_game
+from crgame_ros.game.game import Game, HumanSpec
+from crgame_ros.game.seat_documents import SeatOccupant
+from crgame_ros.paths import default_game, scenarios_directory
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.number_parameters import declare_number
+from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
+from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+# Drivers that do the same wherever they are.
+SCRIPTS = ('keys:', 'joy:')
+# Time to put the hands on the controls after the last one has said that they are ready [s].
+COUNTDOWN_S = 3.0
+OVER = 'the run is over: reset begins it anew'
+
+
+class SimControl:
+    """
+    Orders to the simulation, as flags that its loop reads between cycles.
+
+    :param node: owner of services and parameters.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.paused = False
+        self.steps_wanted = 0
+        self._stepped = 0
+        self.reset_wanted = False
+        self.stop_wanted = False
+        # The run has ended, and the node stays for another one.
+        self.over = False
+        # Somebody has chosen a game or scenario since the start.
+        self.chosen_later = False
+        # Since the last reset: who chooses a game, be it the same one, says when it begins.
+        self.chosen_anew = False
+        # Somebody has said start since the last reset.
+        self.started = False
+        # Seats whose driver must come before the run begins.
+        self.awaited: tuple[str, ...] = ()
+        # How long until the run begins [s]; 0 unless everybody is ready and waits for it.
+        self.countdown_s = 0
+        self.seat_sources: dict[str, str] = {}
+        self.seat_tenants: dict[str, SeatOccupant] = {}
+        self._declare()
+        # Read at every cycle, so kept beside the parameter.
+        self.real_time_factor = float(self._value('real_time_factor'))
+        node.add_on_set_parameters_callback(self._on_parameters)
+        node.add_post_set_parameters_callback(self._after_parameters)
+        endpoints = Endpoints(node)
+        for name, callback in (('/sim/start', self._on_start), ('/sim/pause', self._on_pause),
+                               ('/sim/step', self._on_step), ('/sim/reset', self._on_reset),
+                               ('/sim/stop', self._on_stop)):
+            endpoints.service(name, callback)
+        self._chosen = 'game' if self._value('game') or not self._value('scenario') else 'scenario'
+        # What the command line names is trusted; later orders may come from any DDS peer.
+        self._directories = [Path(item).resolve() for item in self._value('scenario_directories')
+                             if item] + [scenarios_directory().resolve()]
+        self._first = self._value(self._chosen)
+        if self._first:
+            self._directories.append(Path(self._first).resolve().parent)
+
+    def _declare(self) -> None:
+        declare = self._node.declare_parameter
+        declare('game', '', ParameterDescriptor(
+            description='game file; taken at the start and at a reset'))
+        declare('scenario', '', ParameterDescriptor(
+            description='CommonRoad file instead of a game; taken at the start and at a reset'))
+        declare('scenario_directories', [''], ParameterDescriptor(
+            description='directories from which a later game or scenario may come',
+            read_only=True))
+        declare_number(self._node, 'real_time_factor', 1.0, 'simulated seconds per wall second',
+                       (MIN_REAL_TIME_FACTOR, MAX_REAL_TIME_FACTOR), read_only=False)
+        declare_number(self._node, 'duration', 0.0,
+                       "simulated seconds until the run ends; 0 takes the game's", (0.0, 1e7))
+        declare('start_paused', False, ParameterDescriptor(
+            description='wait for /sim/start, with each game anew', read_only=True))
+        declare_number(self._node, 'countdown', COUNTDOWN_S, 'seconds from when all drivers at '
+                       'pages are ready to the start of the run', (0.0, 60.0))
+        declare('realtime_priority', False, ParameterDescriptor(
+            description='run under SCHED_FIFO where the system allows it', read_only=True))
+        declare('wait_for', [''], ParameterDescriptor(
+            description='companion nodes that must be connected before the run starts',
+            read_only=True))
+        declare('roster', '', ParameterDescriptor(
+            description='file that tells the launcher which vehicles the game has; none if empty',
+            read_only=True))
+        declare('folder', '', ParameterDescriptor(
+            description="folder of the run's files, in which later runs get their own; each "
+            'later game is written there; none if empty', read_only=True))
+        declare('at_end', EXIT, ParameterDescriptor(
+            description='what follows the end of a run: exit, stay until a reset or a signal, or '
+            'stay-if-chosen: exit unless its game was chosen after the start', read_only=True))
+        declare_number(self._node, 'planner_timeout', 10.0,
+                       'seconds to wait for planners and companions at the start', (0.0, 1e4))
+
+    def _value(self, name: str) -> Any:
+        return self._node.get_parameter(name).value
+
+    @property
+    def duration_s(self) -> float:
+        """Duration from the command line [s]; 0 if none."""
+        return float(self._value('duration'))
+
+    @property
+    def countdown_from_s(self) -> float:
+        """How long after all drivers at pages are ready the run begins [s]."""
+        return float(self._value('countdown'))
+
+    @property
+    def starts_paused(self) -> bool:
+        """Whether the run waits for /sim/start."""
+        return bool(self._value('start_paused'))
+
+    @property
+    def wants_realtime_priority(self) -> bool:
+        """Whether the user asked for SCHED_FIFO."""
+        return bool(self._value('realtime_priority'))
+
+    @property
+    def companions(self) -> tuple[str, ...]:
+        """Nodes that must be connected before the run starts."""
+        return tuple(item for item in self._value('wait_for') if item)
+
+    @property
+    def roster(self) -> Path | None:
+        """File that tells the launcher which vehicles the game has."""
+        value = self._value('roster')
+        return Path(value) if value else None
+
+    @property
+    def folder(self) -> Path | None:
+        """Folder of the run's files."""
+        value = self._value('folder')
+        return Path(value) if value else None
+
+    @property
+    def stays(self) -> bool:
+        """Whether the node stays when a run has ended."""
+        at_end = self._value('at_end')
+        return at_end == STAY or (at_end == STAY_IF_CHOSEN and self.chosen_later)
+
+    @property
+    def planner_timeout_s(self) -> float:
+        """How long to wait for planners and companions [s]."""
+        return float(self._value('planner_timeout'))
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether the run is paused and no step of it is ordered."""
+        return self.paused and not self.steps_wanted
+
+    def count_step(self, steps_per_tick: int) -> None:
+        """Count down the scenario steps, of so many steps each, ordered during a pause."""
+        if not (self.paused and self.steps_wanted):
+            self.steps_wanted = self._stepped = 0
+            return
+        self._stepped += 1
+        if self._stepped == steps_per_tick:
+            self._stepped = 0
+            self.steps_wanted -= 1
+
+    def first_game(self) -> Game:
+        """
+        Load the game that the command line names.
+
+        :raises InputError: if it cannot be used.
+        """
+        name = self._value(self._chosen)
+        if not name or Path(name).is_file():
+            return self._game(name)
+        return self._game(str(self._allowed(name, self._chosen)))
+
+    def next_game(self, present: Game) -> Game:
+        """
+        Load the game that the parameters name now, for a reset.
+
+        :param present: a new scenario keeps its humans with their drivers, and its rules; a
+            recording belongs to its own scenario, so that the game's default drives instead.
+        :raises InputError: if it cannot be used or lies outside the configured directories.
+        """
+        name = self._value(self._chosen)
+        self.chosen_later |= name != self._first
+        if self._chosen != 'scenario' or not name:
+            return self._game(str(self._allowed(name, 'game')) if name else '')
+        path = self._allowed(name, 'scenario')
+        if path.samefile(present.scenario):
+            return present
+        for human in present.humans:
+            if human.driver.startswith(SCRIPTS):
+                self._node.get_logger().info(
+                    f'{human.id}: its script, {human.driver}, begins anew in {path.name}: it was '
+                    'written for another road')
+        humans = tuple(
+            replace(human, spawn=None,
+                    driver=HumanSpec.driver if is_replay(human.driver) else human.driver)
+            for human in present.humans)
+        return replace(present, scenario=path, title='', humans=humans, avs=None)
+
+    def _game(self, path: str) -> Game:
+        if not path:
+            return load_game(default_game())
+        return Game(Path(path)) if self._chosen == 'scenario' else load_game(Path(path))
+
+    def _allowed(self, name: str, kind: str) -> Path:
+        """Find a game or scenario by its name, or as a file in one of the known directories."""
+        for directory in self._directories:
+            for ending in ('', '.yaml' if kind == 'game' else '.xml'):
+                path = (directory / f'{name}{ending}').resolve()
+                if path.is_relative_to(directory) and path.is_file():
+                    return path
+        raise InputError(f'"{name[:200]}" is in none of the configured directories', 'sim_node',
+                         'name a file of the parameter scenario_directories')
+
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name in ('game', 'scenario') and parameter.value:
+                try:
+                    self._allowed(str(parameter.value), parameter.name)
+                except InputError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+                self._chosen = parameter.name
+        return SetParametersResult(successful=True)
+
+    def _after_parameters(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            self.chosen_anew |= parameter.name in ('game', 'scenario')
+            if parameter.name == 'real_time_factor':
+                self.real_time_factor = float(parameter.value)
+
+    def _on_start(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
+        self.paused, self.started = False, True
+        return _answer(response, True, f'waiting for the driver of {" and ".join(self.awaited)}'
+                       if self.awaited else 'running')
+
+    def _on_pause(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
+        self.paused = True
+        return _answer(response, True, 'paused')
+
+    def _on_step(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
+        if not self.paused:
+            return _answer(response, False, 'not paused: call /sim/pause first')
+        self.steps_wanted += 1
+        return _answer(response, True, 'advancing by one scenario step')
+
+    def _on_reset(self, _: Any, response: Any) -> Any:
+        self.reset_wanted, self.started = True, False
+        return _answer(response, True, 'resetting')
+
+    def _on_stop(self, _: Any, response: Any) -> Any:
+        if self.over:
+            return _answer(response, False, OVER)
+        self.stop_wanted = True
+        return _answer(response, True, 'stopping')
+
+
+def _answer(response: Any, success: bool, text: str) -> Any:
+    response.success, response.message = success, text
+    return response

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What sim_node takes in at each cycle: commands of the seats and plans of the AVs."""
+
+from collections.abc import Callable, MutableMapping
+from contextlib import suppress
+from functools import partial
+from typing import Any, TYPE_CHECKING
+
+from crgame_ros.errors import InputError
+from crgame_ros.game.seat_documents import SeatOccupant
+from crgame_ros.game.task_documents import parse_report, REPORT_TOPIC, TaskReport
+from crgame_ros.messages.joint_messages import from_joint_trajectory
+from crgame_ros.messages.joints import JointSeries
+from crgame_ros.messages.request_layout import request_head
+from crgame_ros.messages.status_values import read_status, status_truth
+from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
+from crgame_ros.ros.messages import from_time
+from crgame_ros.ros.seats import Seats
+from crgame_ros.simulation.setup import Setup
+from rclpy.node import Node
+
+if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to load.
+    from crgame_ros.recording.recorded_inputs import RecordedInputs
+
+# Triggers read at one tick: a flood must not cost the cycle.
+MAX_TRIGGERS = 10
+# Ticks of the agents' states that are read at one of the simulation's.
+MAX_AGENTS = 10
+MAX_REPORTS = 10
+
+
+class SimInputs:
+    """
+    The polled subscriptions of sim_node for one game.
+
+    :param node: owner of the subscriptions.
+    :param setup: the run.
+    :param clock_offset_ns: simulation time of step 0 [ns]
+    :param seat_sources: who was ordered to drive what, by seat.
+    :param recorded: what drives seats as in a recording; None for nothing.
+    :param tenants: who is in which seat.
+    """
+
+    def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
+                 seat_sources: MutableMapping[str, str],
+                 recorded: 'RecordedInputs | None' = None,
+                 tenants: MutableMapping[str, SeatOccupant] | None = None) -> None:
+        self._node = node
+        self._clock_offset_ns = clock_offset_ns
+        endpoints = Endpoints(node)
+        self.seats = Seats(
+            endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
+        # Orders to a planner to go or stop, until the loop takes them.
+        self.planner_orders: dict[str, bool] = {}
+        self._services = [
+            endpoints.service('/<av>/planner_run', partial(self._on_planner_run, av.id), av.id)
+            for av in setup.avs]
+        self._plans = {
+            av.id: endpoints.polled('/<av>/plan', av.id, strict=True, depth=SHARED_DEPTH)
+            for av in setup.avs}
+        # What planners are told instead of the truth; a plan is checked against it.
+        self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id, raw=True)
+                           for av in setup.avs if av.spec.perception is not None}
+        self._agents = None if setup.traffic is None else endpoints.polled(
+            '/traffic/agents', depth=SHARED_DEPTH)
+        self._frame_skip = endpoints.polled('/timing/frame_skip')
+        self._triggers = endpoints.polled('/trigger')
+        self._task_reports = endpoints.polled(REPORT_TOPIC) if setup.game.tasks else None
+        self._drivability = {}
+        if setup.game.drivability.stop:
+            self._drivability = {human.id: endpoints.polled('/<v>/drivability', human.id)
+                                 for human in setup.humans}
+
+    def restart_timeout(self, now_ns: int) -> None:
+        """Begin to count the silence of every driver now."""
+        for seat in self.seats.all:
+            seat.restart_timeout(now_ns)
+
+    def choose(self, answers: Callable[[str, int], bool],
+               awaits: Callable[[int], bool] | None) -> None:
+        """
+        Pass over what others say, before it displaces what is meant for this run.
+
+        :param answers: whether a plan with a stamp [ns] is one for an AV.
+        :param awaits: whether agents' states with a stamp [ns] may be of use; None without agents.
+        """
+        for av_id, plans in self._plans.items():
+            plans.wanted = lambda stamp_ns, _frame, av_id=av_id: answers(av_id, stamp_ns)
+        if self._agents is not None and awaits is not None:
+            self._agents.wanted = lambda stamp_ns, _frame: awaits(stamp_ns)
+
+    def _on_planner_run(self, av_id: str, request: Any, response: Any) -> Any:
+        self.planner_orders[av_id] = bool(request.data)
+        response.success = True
+        response.message = f'{av_id}: planner {"goes" if request.data else "stops"}'
+        return response
+
+    def take_plan(self, av_id: str) -> JointSeries | None:
+        """
+        Take an AV's plan, if one has come.
+
+        :raises InputError: if the message is malformed.
+        """
+        message = self._plans[av_id].take()
+        return None if message is None else from_joint_trajectory(message, f'/{av_id}/plan')
+
+    def take_perceived(self, av_id: str) -> JointSeries | None:
+        """
+        Take the head of the request that perception has sent to an AV's planner, if one has come.
+
+        :raises InputError: if the message is malformed.
+        """
+        slot = self._perceived.get(av_id)
+        message = None if slot is None else slot.take()
+        return None if message is None else request_head(message, f'/{av_id}/plan_request')
+
+    def take_agents(self) -> list[JointSeries]:
+        """Take the agents' states that have come; a flood waits its turn."""
+        taken: list[JointSeries] = []
+        while self._agents is not None and len(taken) < MAX_AGENTS \
+                and (message := self._agents.take()) is not None:
+            with suppress(InputError):
+                taken.append(from_joint_trajectory(message, '/traffic/agents'))
+        return taken
+
+    def frame_skip_order(self) -> bool | None:
+        """Return the supervisor's latest order to skip frames, None if there is no new one."""
+        message = self._frame_skip.latest()
+        return None if message is None else bool(message.data)
+
+    def triggers(self) -> list[str]:
+        """Take the names of the events that have been triggered; a flood waits its turn."""
+        names: list[str] = []
+        while len(names) < MAX_TRIGGERS and (message := self._triggers.take()) is not None:
+            names.append(str(message.data))
+        return names
+
+    def pass_task_reports(self, take: Callable[[TaskReport], str | None]) -> None:
+        """
+        Hand over what pages have shown of tasks and drivers answered; a flood waits its turn.
+
+        :param take: gives the reason for which it takes none, else None.
+        """
+        for _ in range(MAX_REPORTS):
+            message = None if self._task_reports is None else self._task_reports.take()
+            if message is None:
+                return
+            try:
+                reason = take(parse_report(message.data))
+            except InputError as error:
+                reason = str(error)
+            if reason is not None:
+                self._node.get_logger().warning(reason, throttle_duration_sec=1.0)
+
+    def stop_request(self) -> tuple[str, str] | None:
+        """Return (vehicle, n) of a violation that asks for a stop, None if there is none."""
+        for vehicle_id, slot in self._drivability.items():
+            while (message := slot.take()) is not None:
+                if from_time(message.header.stamp) < self._clock_offset_ns:
+                    # A verdict on the run before a reset.
+                    continue
+                for status in message.status:
+                    values = read_status(status).values
+                    if status_truth(values, 'stop'):
+                        return vehicle_id, values.get('n', '')
+        return None
+
+    def destroy(self) -> None:
+        """Release the subscriptions, for a game with other vehicles."""
+        slots = [*self.seats.slots, *self._plans.values(),
+                 *self._drivability.values(), *self._perceived.values(), self._frame_skip,
+                 self._triggers, *([] if self._agents is None else [self._agents]),
+                 *([] if self._task_reports is None else [self._task_reports])]
+        for slot in slots:
+            self._node.destroy_subscription(slot.subscription)
+        for service in self._services:
+            self._node.destroy_service(service)

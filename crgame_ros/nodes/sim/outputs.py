@@ -1,0 +1,340 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What sim_node publishes: built once for a game, refilled at every step."""
+
+from collections.abc import Sequence
+import json
+import math
+import time
+
+from crgame_ros.game.documents import events_document, objects_document
+from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.objects import ObjectStates
+from crgame_ros.game.task_documents import log_document, LOG_TOPIC, state_document, STATE_TOPIC
+from crgame_ros.messages.contract import load_contract
+from crgame_ros.messages.joint_messages import MAP
+from crgame_ros.messages.joints import (
+    JointSeries,
+    object_joint_names,
+    vehicle_joint_names,
+    vehicle_to_joints,
+)
+from crgame_ros.roads.signals import TrafficLights
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time, StateMessage
+from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.setup import Setup
+from crgame_ros.timing.cycle_rows import CycleRows
+from crgame_ros.timing.publishing import steps_between_messages
+from crgame_ros.vehicle.lights import signals_document
+from crgame_ros.vehicle.state import VehicleState
+from geometry_msgs.msg import AccelStamped
+from nav_msgs.msg import Odometry
+import numpy as np
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+
+# For all acknowledgements together: a process that is stopped never gives one.
+ACKNOWLEDGE_S = 2.0
+
+
+class VehicleOutputs:
+    """Convenience topics of one driven vehicle, filled only while somebody subscribes."""
+
+    def __init__(self, endpoints: Endpoints, vehicle_id: str) -> None:
+        self.publishers = [endpoints.publisher(name, vehicle_id)
+                           for name in ('/<v>/odom', '/<v>/joint_states', '/<v>/accel')]
+        self.wanted = False
+        self._listened_to = [False] * len(self.publishers)
+        self._odom = Odometry(child_frame_id=f'{vehicle_id}/base_link')
+        self._odom.header.frame_id = MAP
+        self._odom.pose.covariance = self._odom.twist.covariance = \
+            np.diag([EXACT_VARIANCE] * 6).ravel()
+        self._joints = JointState(name=[f'{vehicle_id}/steering'])
+        self._accel = AccelStamped()
+        self._accel.header.frame_id = f'{vehicle_id}/base_link'
+
+    def look_for_subscribers(self) -> None:
+        """Find out whether anybody listens."""
+        self._listened_to = [item.get_subscription_count() > 0 for item in self.publishers]
+        self.wanted = any(self._listened_to)
+
+    def publish(self, state: VehicleState, stamp_ns: int) -> None:
+        """Publish the vehicle's state in the types that ROS tools expect."""
+        for_odom, for_joints, for_accel = self._listened_to
+        if for_odom:
+            odom = self._odom
+            set_time(odom.header.stamp, stamp_ns)
+            odom.pose.pose.position.x, odom.pose.pose.position.y = state.x, state.y
+            odom.pose.pose.orientation.z = math.sin(0.5 * state.yaw)
+            odom.pose.pose.orientation.w = math.cos(0.5 * state.yaw)
+            odom.twist.twist.linear.x = state.speed
+            odom.twist.twist.angular.z = state.yaw_rate
+            self.publishers[0].publish(odom)
+        if for_joints:
+            set_time(self._joints.header.stamp, stamp_ns)
+            self._joints.position = [state.steering_angle]
+            self._joints.velocity = [state.steering_rate]
+            self.publishers[1].publish(self._joints)
+        if for_accel:
+            set_time(self._accel.header.stamp, stamp_ns)
+            self._accel.accel.linear.x = state.acceleration
+            self.publishers[2].publish(self._accel)
+
+
+class SimOutputs:
+    """
+    The publishers of sim_node for one game.
+
+    :param node: owner of the publishers.
+    :param setup: the run.
+    """
+
+    def __init__(self, node: Node, setup: Setup) -> None:
+        self._node = node
+        self._setup = setup
+        endpoints = Endpoints(node)
+        self.publish_every = steps_between_messages(setup.game.timing.rate)
+        self._clock = endpoints.publisher('/clock')
+        self._state = endpoints.publisher('/vehicles/state')
+        # For those who need no more: each reader of each step costs the loop.
+        self._tick_state = endpoints.publisher('/vehicles/tick_state')
+        self._objects = endpoints.publisher('/traffic/objects')
+        self._cycle = endpoints.publisher('/timing/cycle')
+        self._latched = {name: endpoints.publisher(name) for name in (
+            '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
+            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', STATE_TOPIC)}
+        self._task_log = endpoints.publisher(LOG_TOPIC)
+        self._diagnostics = endpoints.diagnostics
+        # Where perception stands between, it makes the plan request of the true one.
+        self._request_topics = {
+            av.id: '/<av>/true_request' if av.spec.perception else '/<av>/plan_request'
+            for av in setup.avs}
+        self._requests = {av: endpoints.publisher(topic, av)
+                          for av, topic in self._request_topics.items()}
+        self._request_messages: dict[str, SeriesMessage] = {}
+        self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
+        self.frames_skipped = False
+        self._epoch = 0
+        self._lights = TrafficLights(setup.loaded.scenario)
+        self._light_states: dict[int, str] | None = None
+        self._vehicle_lights: list[int] | None = None
+        self._build_messages()
+
+    def _build_messages(self) -> None:
+        setup = self._setup
+        self._clock_message = Clock()
+        self._state_message = StateMessage(
+            [name for vehicle in setup.vehicle_ids for name in vehicle_joint_names(vehicle)])
+        self._objects_message = StateMessage(
+            [name for item in setup.obstacles.descriptions
+             for name in object_joint_names(item.id)])
+        self._objects_message.accelerations[:] = math.nan
+        self.rows = CycleRows(setup.vehicle_ids, self.publish_every)
+        width = len(self.rows.columns)
+        self._cycle_message = Float64MultiArray()
+        self._cycle_message.layout.dim = [
+            MultiArrayDimension(label='cycles'),
+            MultiArrayDimension(label=','.join(self.rows.columns), size=width, stride=width)]
+
+    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float) -> None:
+        """Publish what describes the run: scenario, game and objects."""
+        setup = self._setup
+        self._epoch = epoch
+        self._vehicle_lights = None
+        texts = {'/scenario/xml': setup.loaded.xml_text,
+                 '/scenario/objects': objects_document(setup.descriptions),
+                 '/scenario/events': events_document(epoch, ()),
+                 STATE_TOPIC: state_document(epoch, (), ()),
+                 '/scenario/game': game_document(
+                     setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
+                     real_time_factor=factor)}
+        for name, text in texts.items():
+            self._latched[name].publish(String(data=text))
+
+    def publish_seats(self, seats: str, drivers: str) -> None:
+        """Publish who drives what now, and who has driven so far."""
+        self._latched['/seats'].publish(String(data=seats))
+        self._latched['/seats/drivers'].publish(String(data=drivers))
+
+    def publish_events(self, fired: Sequence[FiredEvent]) -> None:
+        """Publish the events that have taken effect so far."""
+        self._latched['/scenario/events'].publish(
+            String(data=events_document(self._epoch, fired)))
+
+    def publish_tasks(self, simulation: Simulation, result: StepResult) -> None:
+        """Publish what has happened in the game's tasks, and how they stand."""
+        self._latched[STATE_TOPIC].publish(String(data=state_document(
+            self._epoch, simulation.tasks_running, simulation.prompts)))
+        self._task_log.publish(String(data=log_document(self._epoch, result.tasks)))
+
+    def shows_vehicles(self, simulation: Simulation) -> bool:
+        """Return whether anybody is to see where the vehicles have moved to, each by itself."""
+        return not self.frames_skipped and any(item.wanted for item in self._vehicles) and (
+            simulation.n % self.publish_every == 0 or simulation.scheduler.is_tick(simulation.n))
+
+    def publish_vehicles(self, simulation: Simulation) -> None:
+        """Publish each vehicle by itself, before all else: drivers see in it what they did."""
+        stamp_ns = simulation.scheduler.stamp_ns(simulation.n)
+        for vehicle, state in zip(self._vehicles, simulation.states, strict=True):
+            if vehicle.wanted:
+                vehicle.publish(state, stamp_ns)
+
+    def publish_step(self, simulation: Simulation, result: StepResult) -> None:
+        """Publish a step: requests first, for planners have the least time to lose."""
+        if result.fired:
+            # It may change the planner that the request is for.
+            self.publish_events(simulation.fired)
+            for event in result.fired:
+                self._node.get_logger().info(
+                    f'event {event.name} by {event.by} at n = {event.n} (k = {event.k})')
+        for av_id, request in result.requests.items():
+            self._publish_request(av_id, request)
+        if result.tasks:
+            self.publish_tasks(simulation, result)
+        if result.n % self.publish_every and not result.tick:
+            return
+        stamp_ns = simulation.scheduler.stamp_ns(result.n)
+        self.publish_clock(stamp_ns)
+        self._publish_lights(simulation)
+        if result.objects is not None:
+            self._publish_objects(result.objects, stamp_ns)
+            self._publish_signals(result.k)
+            for vehicle in self._vehicles:
+                vehicle.look_for_subscribers()
+        self._publish_states(simulation.states, stamp_ns, result.objects is not None)
+
+    @property
+    def listeners(self) -> int:
+        """How many have subscribed to the states."""
+        return int(self._state.get_subscription_count())
+
+    def resend_world(self, simulation: Simulation) -> None:
+        """Publish the present world again to those who may not have been there."""
+        scheduler, n = simulation.scheduler, simulation.n
+        self._publish_objects(simulation.objects,
+                              scheduler.stamp_ns(n - n % scheduler.steps_per_tick))
+        self._publish_states(simulation.states, scheduler.stamp_ns(n), scheduler.is_tick(n))
+
+    def _publish_objects(self, objects: ObjectStates, stamp_ns: int) -> None:
+        message = self._objects_message
+        message.positions[:] = objects.poses.ravel()
+        message.velocities[:] = objects.velocities.ravel()
+        self._objects.publish(message.stamp(stamp_ns))
+
+    def publish_clock(self, stamp_ns: int) -> None:
+        """Publish the time of a step; again, if drivers may not have heard it."""
+        self._diagnostics.now_ns = stamp_ns
+        set_time(self._clock_message.clock, stamp_ns)
+        self._clock.publish(self._clock_message)
+
+    def resend(self, av_id: str, result: StepResult) -> None:
+        """Send a request again to a planner that may not have been there the first time."""
+        self._publish_request(av_id, result.requests[av_id])
+
+    def _publish_request(self, av_id: str, request: JointSeries) -> None:
+        message = self._request_messages[av_id] = SeriesMessage.for_series(
+            request, self._request_messages.get(av_id))
+        self._requests[av_id].publish(message.fill(request))
+
+    def _publish_states(self, states: list[VehicleState], stamp_ns: int, tick: bool) -> None:
+        message = self._state_message
+        for index, state in enumerate(states):
+            place = slice(4 * index, 4 * index + 4)
+            (message.positions[place], message.velocities[place],
+             message.accelerations[place]) = vehicle_to_joints(state)
+        self._state.publish(message.stamp(stamp_ns))
+        if tick:
+            self._tick_state.publish(message.message)
+
+    def _publish_signals(self, k: int) -> None:
+        states = self._lights.states_at(k)
+        if states is not self._light_states:
+            self._light_states = states
+            self._latched['/scenario/signals'].publish(
+                String(data=json.dumps({'k': k, 'states': states})))
+
+    def _publish_lights(self, simulation: Simulation) -> None:
+        lights = simulation.lights
+        if lights != self._vehicle_lights:
+            self._vehicle_lights = lights
+            self._latched['/vehicles/signals'].publish(String(data=signals_document(
+                simulation.n, dict(zip(self._setup.vehicle_ids, lights, strict=True)))))
+
+    def publish_rows(self) -> None:
+        """Publish the cycles collected so far."""
+        if self.rows.count:
+            self._cycle_message.layout.dim[0].size = self.rows.count
+            self._cycle_message.layout.dim[0].stride = self.rows.count * len(self.rows.columns)
+            self._cycle_message.data = self.rows.taken()
+            self._cycle.publish(self._cycle_message)
+
+    def publish_diagnostics(self, name: str, level: bytes, text: str,
+                            values: dict[str, object], stamp_ns: int) -> None:
+        """Publish one status."""
+        self._diagnostics.publish(f'sim_node: {name}', level, text, values, stamp_ns)
+
+    def missing(self, companions: Sequence[str]) -> set[str]:
+        """
+        Find the companions that are not connected to a topic of each step that they consume.
+
+        :param companions: names of nodes, `planner_node_av0`, or of their executables.
+        """
+        contract = load_contract()
+        found: set[str] = set()
+        for name, publishers in {
+                '/clock': {'': self._clock}, '/vehicles/state': {'': self._state},
+                '/vehicles/tick_state': {'': self._tick_state},
+                '/traffic/objects': {'': self._objects}, '/timing/cycle': {'': self._cycle},
+                '/<av>/plan_request': self._requests_as('/<av>/plan_request'),
+                '/<av>/true_request': self._requests_as('/<av>/true_request'),
+                }.items():
+            consumers = contract.topic(name).consumers
+            for vehicle_id, publisher in publishers.items():
+                expected = {item for item in companions if _consumes(item, consumers, vehicle_id)}
+                found |= expected - self._connected(publisher, expected)
+        return found
+
+    def _requests_as(self, name: str) -> dict[str, Publisher]:
+        """Return the publishers of requests that go out under a name."""
+        return {av: publisher for av, publisher in self._requests.items()
+                if self._request_topics[av] == name}
+
+    def _connected(self, publisher: Publisher, expected: set[str]) -> set[str]:
+        """Find who is connected to a topic; all or none, for the middleware tells no names."""
+        names = [info.node_name for info in
+                 self._node.get_subscriptions_info_by_topic(publisher.topic_name)]
+        if publisher.get_subscription_count() < len(names):
+            return set()
+        return {item for item in expected
+                if any(name == item or name.startswith(f'{item}_') for name in names)}
+
+    def wait_until_received(self) -> None:
+        """Wait for the subscribers to acknowledge what was published, with a limit."""
+        until_s = time.monotonic() + ACKNOWLEDGE_S
+        for publisher in (self._cycle, self._state, self._objects,
+                          self._diagnostics.publisher, self._latched['/scenario/events'],
+                          self._task_log):
+            left_s = max(0.0, until_s - time.monotonic())
+            publisher.wait_for_all_acked(Duration(seconds=left_s))
+
+    def destroy(self) -> None:
+        """Release the publishers, for a game with other vehicles."""
+        publishers = [self._clock, self._state, self._tick_state, self._objects, self._cycle,
+                      self._task_log, *self._latched.values(), *self._requests.values()]
+        publishers += [item for vehicle in self._vehicles for item in vehicle.publishers]
+        for publisher in publishers:
+            self._node.destroy_publisher(publisher)
+
+
+def _consumes(companion: str, consumers: Sequence[str], vehicle_id: str) -> bool:
+    """Return whether a node, named after its executable and vehicle, consumes a topic."""
+    stem, _, vehicle = companion.partition('_node_')
+    executable = f'{stem}_node' if vehicle else companion
+    return executable in consumers and (
+        not vehicle or not vehicle_id or vehicle == vehicle_id)

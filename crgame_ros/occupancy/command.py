@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command `crgame rasterize`."""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import shutil
+import sys
+import tempfile
+import time
+
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.occupancy.image import write_pgm
+from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, read_map_file
+from crgame_ros.occupancy.raster_spec import RasterSpec
+from crgame_ros.occupancy.rasterize import Raster
+from crgame_ros.occupancy.sources import tile_name
+import numpy as np
+from numpy.typing import NDArray
+
+OCCUPIED, FREE = 0, 255
+INDEX_IMAGE = 'tiles.pgm'
+COMMENT = """\
+Permanent obstacles of {name}: curbs {curbs}, obstacles {obstacles}.
+Each pixel of the image is a tile of {tile:g} m. A black one has a map of its own beside this
+file, tile_ROW_COLUMN.yaml, counted from 0 at the lower left: {cells} x {cells} cells of
+{resolution:g} m."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class WrittenMap:
+    """
+    What was written.
+
+    :param path: the map's YAML file.
+    :param tiles: number of tiles that are not empty.
+    :param cells: number of occupied cells.
+    :param size: width and height of the map [m]
+    """
+
+    path: Path
+    tiles: int
+    cells: int
+    size: tuple[float, float]
+
+
+def check_target(folder: Path, force: bool) -> None:
+    """
+    Refuse to write where something is that must not be lost.
+
+    :param folder: where the map shall be.
+    :param force: a map that is there may be replaced; anything else may not.
+    :raises InputError: with the remedy.
+    """
+    if not (folder.exists() or folder.is_symlink()):
+        return
+    if not folder.is_dir() or folder.is_symlink():
+        raise InputError('is no folder', str(folder), 'name another folder for the map')
+    if not any(folder.iterdir()):
+        return
+    try:
+        is_map = read_map_file(folder).tile_cells is not None
+    except InputError:
+        is_map = False
+    if not is_map:
+        raise InputError('is a folder with other things in it', str(folder),
+                         'name a new folder for the map')
+    if not force:
+        raise InputError('is there already', str(folder), 'add --force to replace the map')
+
+
+def write_map(raster: Raster, folder: Path, name: str, force: bool = False,
+              progress: Progress | None = None) -> WrittenMap:
+    """
+    Draw a map into a folder, which appears when all of it is written.
+
+    :param raster: what to draw.
+    :param folder: where to; made with the folders above it.
+    :param name: of the scenario, for the comment in the file.
+    :param force: replace a map that is there.
+    :param progress: told after each tile how many of how many are drawn.
+    :raises InputError: if the folder exists, see `check_target`.
+    :raises CrgameError: if the files cannot be written.
+    """
+    check_target(folder, force)
+    part: Path | None = None
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f'.{folder.name}.', suffix='.part',
+                                     dir=folder.parent))
+        part.chmod(0o755)
+        written = _fill(part, raster, name, progress)
+        _move(part, folder)
+    except OSError as error:
+        raise CrgameError(f'{folder}: cannot write the map ({error.strerror})') from error
+    finally:
+        if part is not None:
+            shutil.rmtree(part, ignore_errors=True)
+    return WrittenMap(folder / INDEX_NAME, *written)
+
+
+def _fill(part: Path, raster: Raster, name: str, progress: Progress | None
+          ) -> tuple[int, int, tuple[float, float]]:
+    spec = raster.spec
+    filled = np.zeros((raster.rows, raster.columns), dtype=bool)
+    cells = 0
+    for done, (row, column, occupied) in enumerate(raster.tiles(), 1):
+        if occupied is not None:
+            filled[row, column] = True
+            cells += int(occupied.sum())
+            text = tile_name(row, column)
+            image = text.replace('.yaml', '.pgm')
+            corner = (round(raster.origin[0] + column * spec.tile, 9),
+                      round(raster.origin[1] + row * spec.tile, 9))
+            write_pgm(part / image, _pixels(occupied))
+            (part / text).write_text(map_text(image, spec.resolution, corner), encoding='utf-8')
+        if progress is not None:
+            progress(done, raster.candidates)
+    write_pgm(part / INDEX_IMAGE, _pixels(filled))
+    comment = COMMENT.format(
+        name=name, tile=spec.tile, cells=spec.tile_cells, resolution=spec.resolution,
+        curbs=f'{spec.curb_width:g} m wide' if spec.curbs else 'left out',
+        obstacles='drawn' if spec.obstacles else 'left out')
+    (part / INDEX_NAME).write_text(
+        map_text(INDEX_IMAGE, spec.tile, raster.origin, comment, spec.tile_cells),
+        encoding='utf-8')
+    return (int(filled.sum()), cells,
+            (raster.columns * spec.tile, raster.rows * spec.tile))
+
+
+def _pixels(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return the image of cells: the top row is the largest y."""
+    return np.where(occupied[::-1], OCCUPIED, FREE).astype(np.uint8)
+
+
+def _move(part: Path, folder: Path) -> None:
+    """Put the finished folder in its place; an old one is there until then."""
+    if not folder.exists():
+        os.rename(part, folder)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f'.{folder.name}.', suffix='.old', dir=folder.parent))
+    os.rename(folder, old)
+    try:
+        os.rename(part, folder)
+    except OSError:
+        os.rename(old, folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+# Work that is done sooner needs no report [s].
+SILENT_S = 2.0
+REPORT_S = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    default = RasterSpec()
+    parser.description = (
+        'Draw the permanent obstacles of a CommonRoad scenario (curbs along the outside of the '
+        'road, static obstacles) as an occupancy map in tiles. Each tile is a map_server map '
+        '(PGM and YAML). A game takes the map with its key "occupancy".')
+    add = parser.add_argument
+    add('scenario', type=Path, help='CommonRoad XML file')
+    add('out', type=Path, help='folder for the map; it must be new')
+    add('--resolution', type=float, default=default.resolution, metavar='M',
+        help='edge of a cell [m] (default: %(default)g)')
+    add('--tile', type=float, default=default.tile, metavar='M',
+        help='edge of a tile [m], a whole number of cells (default: %(default)g)')
+    add('--curb-width', type=float, default=default.curb_width, metavar='M',
+        help='width of the curbs, outwards from the edge of the road [m] (default: %(default)g)')
+    add('--min-island', type=float, default=default.min_island, metavar='M2',
+        help='holes in the road smaller than this have no curb [m^2] (default: %(default)g)')
+    add('--no-curbs', dest='curbs', action='store_false', help='draw no curbs')
+    add('--no-obstacles', dest='obstacles', action='store_false', help='draw no static obstacles')
+    add('--close-ends', action='store_true',
+        help='draw curbs also across the ends of the roads, where the map ends')
+    add('--force', action='store_true', help='replace a map that is in the folder')
+    parser.set_defaults(command=run)
+
+
+def run(values: argparse.Namespace) -> int:
+    """
+    Draw the map and say what was drawn.
+
+    :return: exit code.
+    """
+    # Here, so that other commands don't wait for these libraries.
+    from crgame_ros.occupancy.rasterize import Raster
+    from crgame_ros.scenario.loading import load_scenario
+    spec = RasterSpec(values.resolution, values.tile, values.curb_width, values.min_island,
+                      values.curbs, values.obstacles, values.close_ends)
+    # Now, not after the work.
+    check_target(values.out, values.force)
+    report = _reporter(time.monotonic())
+    loaded = load_scenario(values.scenario)
+    for notice in loaded.notices:
+        print(f'note: {notice}', file=sys.stderr)
+    raster = Raster(loaded, spec)
+    written = write_map(raster, values.out, loaded.benchmark_id, values.force, report)
+    print(f'{written.path}: {written.cells} occupied cells of {spec.resolution:g} m, '
+          f'{written.tiles} of {raster.rows * raster.columns} tiles of {spec.tile:g} m have some, '
+          f'{written.size[0]:g} m x {written.size[1]:g} m')
+    return 0
+
+
+def _reporter(start_s: float) -> Callable[[int, int], None]:
+    """Make a report of progress that says something once a second, if the work takes long."""
+    due_s = start_s + SILENT_S
+
+    def report(done: int, total: int) -> None:
+        nonlocal due_s
+        now_s = time.monotonic()
+        if now_s >= due_s and done < total:
+            due_s = now_s + REPORT_S
+            print(f'rasterize: {100 * done // total} % ({done} of {total} tiles drawn)',
+                  file=sys.stderr, flush=True)
+
+    return report

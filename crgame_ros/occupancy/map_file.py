@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The YAML file of a map_server map: which image, where it lies, and what its greys mean."""
+
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from crgame_ros.errors import InputError, short
+from crgame_ros.occupancy.raster_spec import MAX_TILE_CELLS
+from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.marks import Meaning, Parts, Within, Wording
+from crgame_ros.schema.reading import read
+from crgame_ros.yaml_text import read_yaml
+import numpy as np
+from numpy.typing import NDArray
+
+INDEX_NAME = 'map.yaml'
+MAX_COORDINATE = 1e9
+MIN_RESOLUTION, MAX_RESOLUTION = 1e-3, 1e5
+OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.25
+
+
+@dataclass(frozen=True)
+class MapEntry:
+    """
+    A map as map_server has it; other keys are its own affair.
+
+    :param image: a PGM image in the folder of the file, or below it.
+    :param resolution: edge of a pixel [m]
+    :param origin: lower left corner of the lower left pixel [m, m, rad]; maps that are turned are
+        refused.
+    :param negate: 1 where white is occupied.
+    :param occupied_thresh: occupied is what has a larger probability of it.
+    :param free_thresh: free is what has a smaller one.
+    :param mode: scale differs from trinary only in cells that are not occupied.
+    :param tile_cells: cells along the edge of a tile, if the pixels stand for tiles.
+    """
+
+    FORM: ClassVar[Form] = Form('give the YAML file of a map_server map', rest='others')
+
+    image: Annotated[str, Wording(r'[\s\S]+', 'name a PGM image')]
+    resolution: Annotated[float, Within(MIN_RESOLUTION, MAX_RESOLUTION)]
+    origin: Annotated[tuple[float, float, float], Parts(('x', 'y', 'yaw'), 1),
+                      Within(-MAX_COORDINATE, MAX_COORDINATE)]
+    negate: Annotated[int, Within(0, 1), Meaning(False, 0), Meaning(True, 1)]
+    occupied_thresh: Annotated[float, Within(0.0, 1.0)]
+    free_thresh: Annotated[float, Within(0.0, 1.0)]
+    mode: Literal['trinary', 'scale'] = 'trinary'
+    tile_cells: Annotated[int, Within(1, MAX_TILE_CELLS)] | None = None
+    others: dict[str, Any] = field(default_factory=dict)
+
+    def check(self) -> None:
+        """Refuse thresholds that are crossed, and a map that is turned."""
+        if self.free_thresh > self.occupied_thresh:
+            raise InputError('"free_thresh" is larger than "occupied_thresh"', '', 'swap them')
+        if abs(math.remainder(self.origin[2], math.tau)) > 1e-9:
+            raise InputError(f'the map is turned: "origin" has the yaw {self.origin[2]:g} rad',
+                             '', 'turn the image and give the yaw 0')
+
+
+@dataclass(frozen=True)
+class MapFile:
+    """
+    What a map's YAML file says.
+
+    :param path: the YAML file.
+    :param image: the image file, inside the folder of the YAML file.
+    :param resolution: edge of a pixel [m]
+    :param origin: x, y of the lower left corner of the lower left pixel, frame map [m]
+    :param negate: True where white is occupied.
+    :param occupied_thresh: occupied is what has a larger probability of it, 0 to 1.
+    :param tile_cells: cells along the edge of a tile, if the pixels stand for tiles, else None.
+    """
+
+    path: Path
+    image: Path
+    resolution: float
+    origin: tuple[float, float]
+    negate: bool = False
+    occupied_thresh: float = OCCUPIED_THRESH
+    tile_cells: int | None = None
+
+    def occupied(self, pixels: NDArray[np.uint8], maximum: int) -> NDArray[np.bool_]:
+        """
+        Interpret grey values as map_server does; unknown is not occupied.
+
+        :param pixels: (rows, columns) as in the image, the top row first.
+        :param maximum: the value of white.
+        :return: (rows, columns) with the bottom row first, so that rows grow with y.
+        """
+        shade = np.minimum(np.arange(256) / maximum, 1.0)
+        probability = shade if self.negate else 1.0 - shade
+        # Occupied greys are the darkest, or the lightest: to compare is quicker than to look up.
+        count = int(np.count_nonzero(probability > self.occupied_thresh))
+        if count in (0, 256):
+            return np.full(pixels.shape, count > 0)
+        upright = pixels[::-1]
+        occupied: NDArray[np.bool_] = upright >= 256 - count if self.negate else upright < count
+        return occupied
+
+
+def read_map_file(path: Path) -> MapFile:
+    """
+    Read and check the YAML file of a map.
+
+    :param path: the file, or the folder that holds it as `map.yaml`.
+    :raises InputError: naming file, key and remedy.
+    """
+    file = path / INDEX_NAME if path.is_dir() else path
+    where = str(file)
+    entry = read(MapEntry, read_yaml(file, 'map file'), where)
+    return MapFile(file, _image(entry.image, file), entry.resolution, entry.origin[:2],
+                   bool(entry.negate), entry.occupied_thresh, entry.tile_cells)
+
+
+def map_text(image: str, resolution: float, origin: tuple[float, float], comment: str = '',
+             tile_cells: int | None = None) -> str:
+    """
+    Write the YAML file of a map, readable by map_server.
+
+    :param image: name of the image, in the same folder.
+    :param resolution: edge of a pixel [m]
+    :param origin: lower left corner [m]
+    :param comment: lines to put first.
+    :param tile_cells: if the pixels stand for tiles: cells along the edge of one.
+    """
+    lines = [f'# {line}' for line in comment.splitlines()]
+    lines += [f'image: {image}', f'resolution: {resolution!r}',
+              f'origin: [{origin[0]!r}, {origin[1]!r}, 0.0]', 'negate: 0',
+              f'occupied_thresh: {OCCUPIED_THRESH}', f'free_thresh: {FREE_THRESH}',
+              'mode: trinary']
+    if tile_cells is not None:
+        lines.append(f'tile_cells: {tile_cells}')
+    return '\n'.join(lines) + '\n'
+
+
+def _image(name: str, file: Path) -> Path:
+    where = str(file)
+    image = (file.parent / name).resolve()
+    if not image.is_relative_to(file.parent.resolve()):
+        raise InputError(f'the image {short(name)} lies outside the folder of the map', where,
+                         'put the image beside the YAML file')
+    return image

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planners of one AV in a run: the game's, and those that events bring in."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from crgame_ros.game.events import EventSpec, PlannerSwap, SpeedLimit
+from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.adapter import Clock, PlannerAdapter, PlannerStatistics
+from crgame_ros.planner.interface import PlannerContext
+from crgame_ros.planner.registry import create_planner
+from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
+
+
+def swapped_in(vehicle_id: str, events: Sequence[EventSpec]) -> tuple[str, ...]:
+    """Return the names of the planners that events bring in for an AV."""
+    return tuple(event.action.planner for event in events
+                 if isinstance(event.action, PlannerSwap) and event.action.av == vehicle_id)
+
+
+class PlannerManager:
+    """
+    Runs the planner in office, and changes it and its roads as events say.
+
+    Every planner is made and set up before the run, so that an event costs no time in it. After a
+    change of speed limits the planner in office is set up again at once, the others when their
+    turn comes.
+
+    :param context: what planners are given.
+    :param name: of the game's planner for the AV.
+    :param options: of that planner.
+    :param events: all events of the game.
+    :param clock: seconds from a steady clock, to time each plan; None measures nothing.
+    :raises InputError: if a planner cannot be made.
+    """
+
+    def __init__(self, context: PlannerContext, name: str, options: Mapping[str, Any],
+                 events: Sequence[EventSpec] = (), clock: Clock | None = None) -> None:
+        self._events = {event.name: event.action for event in events
+                        if isinstance(event.action, SpeedLimit)
+                        or (isinstance(event.action, PlannerSwap)
+                            and event.action.av == context.vehicle_id)}
+        if any(isinstance(action, SpeedLimit) for action in self._events.values()):
+            # The limits change in the planners' own copy, not in the scenario of other runs.
+            context = replace(context, scenario=with_own_roads(context.scenario))
+        self._context = context
+        self._done: set[str] = set()
+        self.name = name
+        self.statistics = PlannerStatistics()
+        self._adapters = {
+            event: self._made(action.planner, action.options, clock)
+            for event, action in self._events.items() if isinstance(action, PlannerSwap)}
+        self.adapter = self._made(name, options, clock)
+        self._outdated: set[str] = set()
+        self.failure = self.adapter.setup(context)
+        for adapter in self._adapters.values():
+            adapter.setup(context)
+
+    def _made(self, name: str, options: Mapping[str, Any],
+              clock: Clock | None) -> PlannerAdapter:
+        adapter = PlannerAdapter(create_planner(name, options), clock)
+        adapter.statistics = self.statistics
+        return adapter
+
+    @property
+    def last_reason(self) -> str | None:
+        """Why the last plan was a braking plan; None if it was none."""
+        return self.adapter.last_reason
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Answer a request by the planner in office."""
+        return self.adapter.plan(request)
+
+    def apply(self, fired: Sequence[str]) -> list[str]:
+        """
+        Take over what events have done.
+
+        :param fired: names of all events so far in their order; those known already are passed
+        :return: what was changed, for people, one line each
+        """
+        said = []
+        for name in fired:
+            action = self._events.get(name)
+            if action is None or name in self._done:
+                continue
+            self._done.add(name)
+            if isinstance(action, SpeedLimit):
+                said.append(self._limit(action))
+            else:
+                said.append(self._swap(name, action.planner))
+        return said
+
+    def _limit(self, action: SpeedLimit) -> str:
+        set_speed_limit(self._context.scenario, action.speed, action.lanelets)
+        self._outdated = set(self._adapters)
+        self.failure = self.adapter.setup(self._context)
+        return self._said(f'speed limit {action.speed:g} m/s')
+
+    def _swap(self, event: str, planner: str) -> str:
+        self.adapter, self.name = self._adapters[event], planner
+        # Its setup in advance may be of the time before a change, or have failed.
+        if event in self._outdated:
+            self._outdated.discard(event)
+            self.adapter.setup(self._context)
+        self.failure = self.adapter.setup_failure
+        return self._said(f'planner {planner}')
+
+    def _said(self, text: str) -> str:
+        return text if self.failure is None else f'{text}: {self.failure}'

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planners that a game may name."""
+
+from collections.abc import Iterator, Mapping
+import contextlib
+import inspect
+from typing import Any
+
+from crgame_ros.errors import InputError
+from crgame_ros.planner.interface import Planner
+from crgame_ros.registry import ModelRegistry, POLICY
+
+# As a planner's name: a process of the user's own answers (docs/external_planners.md).
+EXTERNAL = 'external'
+BUILT_IN = {
+    'idm': 'crgame_ros.planner.idm:IdmPlanner',
+    'idm-package': 'crgame_ros.planner.idm_package:IdmPackagePlanner',
+    'reactive': 'crgame_ros.planner.reactive:ReactivePlanner',
+    'reactive-package': 'crgame_ros.planner.reactive_package:ReactivePackagePlanner',
+    'constant-velocity': 'crgame_ros.planner.constant_velocity:ConstantVelocityPlanner',
+}
+
+
+class PlannerRegistry(ModelRegistry):
+    """The planners of the package, of entry points, and those that users write."""
+
+    def __init__(self) -> None:
+        super().__init__('planners', 'planner', {
+            **BUILT_IN, POLICY: 'crgame_ros.policy.planner:PolicyPlanner'},
+            Planner, 'docs/planners.md')
+        self._given: dict[str, type[Planner] | Planner] = {}
+
+    def names(self) -> tuple[str, ...]:
+        """List the registered names; a policy is nothing without its file."""
+        return tuple(name for name in super().names() if name != POLICY)
+
+    @contextlib.contextmanager
+    def giving(self, planners: Mapping[str, type[Planner] | Planner]) -> Iterator[None]:
+        """
+        Know classes and objects of the caller's own, for as long as the context lasts.
+
+        :param planners: by the name under which a game has them.
+        """
+        earlier = self._given
+        self._given = {**earlier, **planners}
+        try:
+            yield
+        finally:
+            self._given = earlier
+
+    def look_up(self, name: str, where: str, label: str) -> Any:
+        """Find what a name stands for; of an object the caller has given, its class."""
+        if name not in self._given:
+            return super().look_up(name, where, label)
+        given = self._given[name]
+        return given if inspect.isclass(given) else type(given)
+
+    def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
+               **given: Any) -> Any:
+        """
+        Make a planner, also of `policy:FILE.py:load`; take an object that the caller has given.
+
+        :raises InputError: as for any model; if an object, which is made, is given options.
+        """
+        if name.startswith(POLICY):
+            options = {**(options or {}), 'policy': name.removeprefix(POLICY)}
+        own = self._given.get(name)
+        if own is None or inspect.isclass(own):
+            return super().create(name, options, where, **given)
+        self.find(name, where)
+        if options:
+            raise InputError('is an object and takes no options', self.label(name, where),
+                             'give its class')
+        return own
+
+    def find(self, name: str, where: str = '') -> type[Planner]:
+        """
+        Find the class of a planner.
+
+        :param where: the file and key that named it, for messages
+        :raises InputError: if there is none of that name, or it is no `Planner`.
+        """
+        if name == EXTERNAL and name not in self.names():
+            raise InputError('an external planner answers live runs only', where or 'planner',
+                             'start the run with ./run.sh, or name a planner')
+        found = super().find(POLICY if name.startswith(POLICY) else name, where)
+        if not isinstance(getattr(found, 'name', None), str):
+            raise InputError('has no name', self.label(name, where),
+                             'give the class an attribute `name`')
+        return found
+
+    def wants_lights(self, name: str) -> bool:
+        """
+        Return whether a planner asks for others' lights.
+
+        One that cannot be found asks for nothing: who is to make it says why it cannot be.
+        """
+        if name not in self._given and (
+                name in BUILT_IN or name == EXTERNAL or name.startswith(POLICY)):
+            # None of ours does, and the packages behind some cost seconds to import.
+            return False
+        try:
+            return self.find(name).wants_lights
+        except InputError:
+            return False
+
+
+PLANNERS = PlannerRegistry()
+
+
+def planner_names() -> tuple[str, ...]:
+    """List the registered names: those of the package first, then those of entry points."""
+    return PLANNERS.names()
+
+
+def create_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner:
+    """
+    Make a planner.
+
+    :param name: a registered name, `module:Class` or `path/to/file.py:Class`.
+    :param options: keyword arguments of its constructor.
+    :raises InputError: if there is no such planner, or an option is unknown, missing or of the
+        wrong type.
+    """
+    made: Planner = PLANNERS.create(name, options)
+    return made
+
+
+def planner_class(name: str) -> type[Planner]:
+    """
+    Find the class of a planner.
+
+    :raises InputError: if there is none of that name, or it is no `Planner`.
+    """
+    return PLANNERS.find(name)

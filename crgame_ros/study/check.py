@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Looking at a study before anybody sits down: what is missing, unbalanced or cannot be driven."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.game.file import dump_game, parse_game
+from crgame_ros.simulation.offline import run_offline
+from crgame_ros.simulation.setup import build_setup
+from crgame_ros.study.file import Block, Break, Page, Questions, StudyFile
+from crgame_ros.study.pages import page_file, questionnaire_name
+from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.session_script import (
+    drives_of,
+    Fields,
+    PracticeDrives,
+    session_of,
+    SessionItem,
+)
+from crgame_ros.study.trial_game import trial_game
+from crgame_ros.study.trial_order import rows_of
+from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
+from crgame_ros.study.trial_settings import TrialSettings
+import yaml
+
+# Of a trial that is looked at, simulated [s].
+TRIED_S = 1.0
+# How long people take, roughly [s]: to read a page, to answer a question, to look at the controls.
+PAGE_S, QUESTION_S, DEVICE_S = 60.0, 7.0, 45.0
+
+
+@dataclass(frozen=True)
+class StudyFinding:
+    """
+    Something about a study.
+
+    :param kind: an `error` keeps it from being run.
+    :param text: one line for people.
+    """
+
+    kind: Literal['error', 'warning']
+    text: str
+
+
+@dataclass(frozen=True)
+class SessionLength:
+    """
+    How long a participant's session is.
+
+    :param driving_s: at most, practice as often as it may be.
+    :param else_s: about, for everything else.
+    """
+
+    driving_s: float
+    else_s: float
+
+
+def check_study(study: StudyFile,
+                progress: Callable[[float], object] = lambda _: None) -> list[StudyFinding]:
+    """
+    Look at everything that a study names, and drive a second of each of its conditions.
+
+    :param progress: is told how much is done, 0 to 1.
+    """
+    found = [*_steps(study), *_balance(study)]
+    drives = list(drives_of(study))
+    for number, (name, settings) in enumerate(drives):
+        try:
+            _try(settings)
+        except CrgameError as error:
+            found.append(StudyFinding('error', f'{name}: {error}'))
+        progress((number + 1) / len(drives))
+    return found
+
+
+def length_of(study: StudyFile) -> SessionLength:
+    """
+    Estimate the length of a session.
+
+    :raises InputError: if the study cannot be planned, or a drive has no end.
+    """
+    driving_s = else_s = 0.0
+    for item in session_of(study, 0):
+        what = item.what
+        if isinstance(what, PlannedTrial):
+            driving_s += _duration_s(what.condition.settings)
+        elif isinstance(what, PracticeDrives):
+            times = what.practice.at_most or 2 * what.practice.at_least
+            driving_s += times * _duration_s(what.settings)
+        else:
+            else_s += _reading_s(study, item)
+    return SessionLength(driving_s, else_s)
+
+
+def _reading_s(study: StudyFile, item: SessionItem) -> float:
+    what = item.what
+    if isinstance(what, Break):
+        return 60.0 * what.minutes
+    if isinstance(what, Page):
+        return PAGE_S
+    if isinstance(what, Fields):
+        return QUESTION_S * len(study.fields)
+    if isinstance(what, Questions):
+        return QUESTION_S * len(load_questionnaire(questionnaire_name(study, what)).questions)
+    return DEVICE_S
+
+
+def _duration_s(settings: TrialSettings) -> float:
+    duration_s = trial_game(settings, 'idle').duration
+    return duration_s if duration_s < float('inf') else 0.0
+
+
+def _try(settings: TrialSettings) -> None:
+    """Drive a little of a trial, with nobody at the wheel."""
+    game = trial_game(settings, 'idle')
+    # As the run will read it: what two files say together is checked here.
+    game = parse_game(yaml.safe_load(dump_game(game)), 'game of the trial', game.base)
+    run_offline(build_setup(game), duration_s=min(TRIED_S, game.duration))
+    if game.duration == float('inf'):
+        raise CrgameError('has no end: give "duration" to the game or to the study')
+
+
+def _steps(study: StudyFile) -> Iterator[StudyFinding]:
+    languages = dict.fromkeys((study.language, *study.languages))
+    steps = [entry.step for entries in (
+        study.before, study.after,
+        *(entries for block in study.blocks
+          for entries in (block.before, block.after_trial, block.after)))
+        for entry in entries]
+    for step in steps:
+        if isinstance(step, Page):
+            for language in languages:
+                if page_file(study, step, language) is None:
+                    yield StudyFinding('error', f'{study.base / step.file}: there is no such page')
+                    break
+        elif isinstance(step, Questions):
+            try:
+                scale = load_questionnaire(questionnaire_name(study, step))
+            except CrgameError as error:
+                yield StudyFinding('error', str(error))
+                continue
+            for language in languages:
+                if any(question.ask.lacks(language) for question in scale.questions):
+                    yield StudyFinding('warning', f'{step.name}: has no texts in "{language}"')
+
+
+def _balance(study: StudyFile) -> Iterator[StudyFinding]:
+    for block in study.blocks:
+        try:
+            orders = [[trial.condition.name for trial in plan_trials(study, place)
+                       if trial.block == block.name] for place in range(study.participants)]
+        except CrgameError as error:
+            yield StudyFinding('error', str(error))
+            continue
+        conditions = len(conditions_of(study, block))
+        if conditions > 1:
+            yield from _unbalanced(study, block, conditions, orders)
+
+
+def _unbalanced(study: StudyFile, block: Block, conditions: int,
+                orders: list[list[str]]) -> Iterator[StudyFinding]:
+    first = Counter(order[0] for order in orders)
+    if len(first) < conditions or len(set(first.values())) > 1:
+        rows = rows_of(block.order, conditions)
+        mend = f'take a multiple of {rows} participants' if block.order == 'williams' \
+            and not block.sequences else 'take "order: williams"'
+        yield StudyFinding('warning', f'{block.name}: with {study.participants} participants not '
+                                      f'every condition is first equally often; {mend}')
+    follows = Counter(pair for order in orders for pair in _within(order, conditions))
+    if len(follows) < conditions * (conditions - 1) or len(set(follows.values())) > 1:
+        yield StudyFinding('warning', f'{block.name}: not every condition follows every other '
+                                      'equally often')
+
+
+def _within(order: list[str], conditions: int) -> Iterable[tuple[str, str]]:
+    """Yield what follows what within each repetition."""
+    for start in range(0, len(order), conditions):
+        yield from pairwise(order[start:start + conditions])

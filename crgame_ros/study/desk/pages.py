@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The pages that are open at a desk: what each is sent, and which of them the participant uses."""
+
+from collections.abc import Mapping
+from functools import cache
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+from crgame_ros.cockpit.client import Client
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
+from crgame_ros.study.file import StudyFile
+from crgame_ros.yaml_text import read_yaml
+
+WORDS = Path(__file__).resolve().parent / 'words'
+STANDARD = 'en'
+
+
+def words_of(study: StudyFile, language: str) -> dict[str, str]:
+    """
+    Return the words in a language; English ones where it has none.
+
+    :param study: `words.fr.yaml` beside its file is that for French, or goes before ours.
+    :return: by their key.
+    :raises InputError: if a file of words cannot be read.
+    """
+    words = dict(_read(WORDS / f'{STANDARD}.yaml'))
+    for file in (WORDS / f'{language}.yaml', study.base / f'words.{language}.yaml'):
+        if language.isalnum() and file.is_file():
+            given = _read(file)
+            unknown = sorted(set(given) - set(words))
+            if unknown:
+                raise InputError(f'has "{unknown[0][:40]}", which is no word of the page',
+                                 str(file), f'take the keys of {STANDARD}.yaml')
+            words |= given
+    return words
+
+
+@cache
+def _read(file: Path) -> dict[str, str]:
+    given = read_yaml(file, 'words')
+    if not isinstance(given, dict) or not all(
+            isinstance(key, str) and isinstance(text, str) for key, text in given.items()):
+        raise InputError('is no list of words', str(file), 'give texts by their key')
+    return given
+
+
+# The run's clock changes with every cycle: nobody reads it faster.
+TOLD_EVERY_S = 0.2
+
+_log = logging.getLogger(__name__)
+
+
+class DeskPages:
+    """
+    Sends documents to pages, and gives what they say to the desk.
+
+    Of several pages of the participant the one that was opened last is used, the others say so.
+
+    :param desk: whose pages they are.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self._participants: dict[Client, str] = {}
+        # In which language each has the words of the page.
+        self._worded: dict[Client, str] = {}
+        self._experimenters: set[Client] = set()
+        self._used: Client | None = None
+        self._used_page = ''
+        self._told: dict[str, Any] = {}
+        self._is_due = False
+        desk.watch(self._changed)
+
+    def joined(self, client: Client, *, experimenter: bool) -> None:
+        """Take in a page; that of a participant is sent nothing before its hello."""
+        if experimenter:
+            self._experimenters.add(client)
+            client.put_document('desk', self._experimenter_text())
+        else:
+            self._participants[client] = ''
+
+    def left(self, client: Client) -> None:
+        """Forget a page."""
+        self._experimenters.discard(client)
+        self._participants.pop(client, None)
+        self._worded.pop(client, None)
+        if client is self._used:
+            self._used = None
+            self._told = {}
+        self._changed()
+
+    @property
+    def clients(self) -> list[Client]:
+        """Return all pages."""
+        return [*self._participants, *self._experimenters]
+
+    @property
+    def page(self) -> dict[str, Any]:
+        """Return what is known of the participant's page: connected, delays [ms], seat."""
+        return {'connected': self._used is not None, 'open': len(self._participants),
+                **self._told}
+
+    def tell_experimenters(self) -> None:
+        """Send the present document to the experimenter's pages."""
+        self._is_due = False
+        if self._experimenters:
+            text = self._experimenter_text()
+            for client in self._experimenters:
+                client.put_document('desk', text)
+
+    @property
+    def is_due(self) -> bool:
+        """Return whether something has changed since the experimenter's pages were told."""
+        return self._is_due
+
+    def participant_says(self, client: Client, message: Mapping[str, Any]) -> None:
+        """
+        Take a message of a participant's page.
+
+        :raises CrgameError: if the session cannot take it.
+        """
+        kind = message['type']
+        if kind in ('hello', 'here'):
+            self._participants[client] = message.get('page', self._participants[client])
+            page = self._participants[client]
+            if kind == 'here' or message['fresh'] or page == self._used_page or not self._used:
+                self._used, self._used_page, self._told = client, page, {}
+            self._changed()
+            return
+        if kind == 'ping':
+            if client is self._used:
+                self._hear({name: value for name, value in message.items()
+                            if name not in ('type', 't')})
+            client.put_event(_text({'type': 'pong', 't': message['t'],
+                                    'at': self.desk.clock_s()}))
+            return
+        if client is self._used:
+            try:
+                self._do(message)
+            except InputError as error:
+                client.put_event(_text({'type': 'refused', 'item': message.get('item', ''),
+                                        'text': str(error)}))
+        # Also after a stale one: the page learns where the session is.
+        self._send_participant(client)
+
+    def experimenter_says(self, client: Client, message: Mapping[str, Any]) -> None:
+        """Take a message of an experimenter's page, and answer it."""
+        if message['type'] == 'ping':
+            client.put_event(_text({'type': 'pong', 't': message['t'],
+                                    'at': self.desk.clock_s()}))
+            return
+        ok, text = True, ''
+        try:
+            self._order(message)
+        except CrgameError as error:
+            ok, text = False, str(error)
+        client.put_event(_text({'type': 'reply', 'to': message['id'], 'ok': ok, 'text': text}))
+        self.tell_experimenters()
+
+    def _do(self, message: Mapping[str, Any]) -> None:
+        match message['type']:
+            case 'language':
+                self.desk.choose_language(message['language'])
+            case 'ready':
+                self.desk.ready(message['item'])
+            case 'finish':
+                more = {name: message[name] for name in ('device', 'moved') if name in message}
+                self.desk.finish(message['item'], message['answers'], message.get('agreed'),
+                                 **message['times'], **more)
+
+    def _order(self, message: Mapping[str, Any]) -> None:
+        match message['type']:
+            case 'note':
+                self.desk.note(message['text'])
+            case 'mark':
+                self.desk.mark(message['name'])
+            case 'repeat':
+                self.desk.repeat(message['item'], message['reason'])
+            case 'skip':
+                self.desk.skip(message['item'], message['reason'])
+            case 'abort':
+                self.desk.abort(message['item'], message['reason'])
+            case 'end':
+                self.desk.end(message['reason'])
+            case 'hold':
+                self.desk.hold(message['held'])
+
+    def _hear(self, told: dict[str, Any]) -> None:
+        if told != self._told:
+            self._told = told
+            self._is_due = True
+
+    def _changed(self) -> None:
+        self._is_due = True
+        for client in self._participants:
+            self._send_participant(client)
+
+    def _send_words(self, client: Client) -> None:
+        """Send the words of the page before whatever is shown with them."""
+        language = self.desk.language
+        if self._worded.get(client) != language:
+            self._worded[client] = language
+            client.put_event(_text({'type': 'words',
+                                    'words': words_of(self.desk.session.study, language)}))
+
+    def _send_participant(self, client: Client) -> None:
+        if not self._participants.get(client):
+            return
+        try:
+            self._send_words(client)
+            document = participant_document(self.desk)
+        except CrgameError as error:
+            # A page of the study that is not there: the experimenter has to mend it.
+            _log.error('%s', error)
+            self._told = {**self._told, 'error': str(error)}
+            document = {'show': 'wait', 'why': 'failed', 'item': '',
+                        'language': self.desk.language}
+        if client is not self._used:
+            document = {'show': 'elsewhere', 'item': '', 'language': self.desk.language,
+                        'study': document.get('study', '')}
+        client.put_document('desk', _text({'type': 'desk', **document}))
+
+    def _experimenter_text(self) -> bytes:
+        return _text({'type': 'desk', 'at': self.desk.clock_s(),
+                      **experimenter_document(self.desk, self.page)})
+
+
+def _text(message: Mapping[str, Any]) -> bytes:
+    # Lone surrogates, which a page may send, are no UTF-8: they stay escaped.
+    return json.dumps(message, allow_nan=False).encode()

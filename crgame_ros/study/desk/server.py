@@ -1,0 +1,324 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The web server of a desk: its two pages, their files and sockets, who is let in."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Mapping
+import contextlib
+from itertools import count
+import json
+import logging
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from aiohttp import hdrs, web, WSCloseCode, WSMsgType
+from aiohttp.typedefs import Handler
+from crgame_ros.cockpit.access import Access, is_loopback
+from crgame_ros.cockpit.client import Client, TokenBucket
+from crgame_ros.cockpit.doorkeeper import Doorkeeper
+from crgame_ros.cockpit.invitations import Invitations
+from crgame_ros.cockpit.page_files import PageFile, read_files
+from crgame_ros.cockpit.request_guard import (
+    ACCESS,
+    COOKIE_S,
+    file_answer,
+    guard,
+    header_writer,
+    KEEPER,
+)
+from crgame_ros.cockpit.server import listen
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.messages import MAX_BYTES, parse_experimenter, parse_participant
+from crgame_ros.study.desk.page_markdown import picture
+from crgame_ros.study.desk.pages import DeskPages, TOLD_EVERY_S
+
+MESSAGES_PER_S, MESSAGE_BURST = 20.0, 60.0
+MAX_MALFORMED = 5
+HEARTBEAT_S = 5.0
+CLOSE_S = 0.4
+
+_log = logging.getLogger(__name__)
+
+
+class DeskSocket:
+    """
+    Reads a page's messages; a page that talks nonsense, or too much, is dropped.
+
+    :param pages: of the desk.
+    :param experimenter: whose page it is.
+    """
+
+    def __init__(self, pages: DeskPages, *, experimenter: bool) -> None:
+        self._pages = pages
+        self._is_experimenter = experimenter
+        self._bucket = TokenBucket(MESSAGES_PER_S, MESSAGE_BURST)
+        self._malformed = 0
+        self._transport: asyncio.WriteTransport | None = None
+        # Pings count as messages.
+        self.socket = web.WebSocketResponse(
+            timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
+            max_msg_size=MAX_BYTES + 1)
+
+    async def run(self, request: web.Request, name: str) -> web.WebSocketResponse:
+        """
+        Serve the connection until it ends.
+
+        :param request: the upgrade request.
+        :param name: of the page, in the log.
+        """
+        await self.socket.prepare(request)
+        transport = request.transport
+        if not isinstance(transport, asyncio.WriteTransport):
+            return self.socket
+        self._transport = transport
+        client = Client(name, name, transport.abort, transport.get_write_buffer_size)
+        writer = asyncio.create_task(client.write(self.socket))
+        writer.add_done_callback(lambda task: _end_with(task, client))
+        code: int = WSCloseCode.INTERNAL_ERROR
+        reason = ''
+        try:
+            self._pages.joined(client, experimenter=self._is_experimenter)
+            code, reason = await self._read(client)
+        finally:
+            self._pages.left(client)
+            writer.cancel()
+            if reason or client.dropped:
+                _log.info('%s was dropped: %s', client.id, reason or client.dropped)
+            await self.close(code, reason)
+        return self.socket
+
+    async def close(self, code: int, reason: str) -> None:
+        """Close the connection within a second, whatever its other end does."""
+        with contextlib.suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(2 * CLOSE_S):
+                await self.socket.close(code=code, message=reason.encode()[:123])
+        if self._transport is not None:
+            self._transport.abort()
+
+    async def _read(self, client: Client) -> tuple[int, str]:
+        loop = asyncio.get_running_loop()
+        while True:
+            message = await self.socket.receive()
+            if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
+                                WSMsgType.ERROR):
+                return WSCloseCode.OK, ''
+            if not self._bucket.take(loop.time()):
+                return (WSCloseCode.POLICY_VIOLATION,
+                        f'more than {MESSAGES_PER_S:g} messages a second')
+            if message.type is WSMsgType.PING:
+                await self.socket.pong(message.data)
+            elif message.type is WSMsgType.TEXT:
+                self._take(client, message.data)
+            elif message.type is WSMsgType.BINARY:
+                self._malformed += 1
+            if self._malformed >= MAX_MALFORMED:
+                return (WSCloseCode.POLICY_VIOLATION,
+                        f'{MAX_MALFORMED} messages that cannot be read')
+
+    def _take(self, client: Client, text: str) -> None:
+        try:
+            message: dict[str, Any] = (parse_experimenter if self._is_experimenter
+                                       else parse_participant)(text)
+        except InputError as error:
+            self._malformed += 1
+            _log.info('%s: %s', client.id, error)
+            return
+        if self._is_experimenter:
+            self._pages.experimenter_says(client, message)
+        else:
+            self._pages.participant_says(client, message)
+
+
+def _end_with(writer: asyncio.Task[None], client: Client) -> None:
+    """Drop a client that nothing can be sent to any more."""
+    if not writer.cancelled() and writer.exception() is not None:
+        client.drop('cannot be sent to')
+
+
+PACKAGE = Path(__file__).resolve().parents[2]
+# Modules name each other by their place in the package.
+SHARED = ('cockpit/page', 'study/desk/page')
+PAGES = {'/': 'study/desk/page/participant.html',
+         '/experimenter': 'study/desk/page/experimenter.html'}
+LINKS = 'desk_links.json'
+MAX_PAGES = 12
+_STALL_CHECK_S = 0.5
+_ONLY_EXPERIMENTER = "This page is the experimenter's: its address stands on the terminal."
+_LOOPBACK = ('127.0.0.1', 'localhost')
+
+
+def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> web.Application:
+    """
+    Make the server's application.
+
+    :param desk: whose pages are served.
+    :param access: who is let in as the participant.
+    :param experimenters: links by which alone experimenters are let in, one browser each.
+    :raises CrgameError: if the pages are not installed.
+    """
+    keeper, pages = Doorkeeper(), DeskPages(desk)
+    sockets: set[DeskSocket] = set()
+    numbers = count(1)
+    app = web.Application(middlewares=[
+        guard(access, keeper, lambda request: _is_experimenter(request, experimenters)
+              or (request.path == '/experimenter' and 'token' in request.query))])
+    app[KEEPER], app[ACCESS] = keeper, access
+    app.cleanup_ctx.append(_telling(pages))
+    app.on_response_prepare.append(header_writer(
+        lambda path: path.startswith('/static/'), lambda request: _frames(request, desk)))
+
+    def connector(*, experimenter: bool) -> Handler:
+        async def connect(request: web.Request) -> web.StreamResponse:
+            if experimenter and not _is_experimenter(request, experimenters):
+                return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
+            if len(sockets) >= MAX_PAGES:
+                return web.Response(status=503, text='Too many pages are open.\n')
+            socket = DeskSocket(pages, experimenter=experimenter)
+            sockets.add(socket)
+            try:
+                who = 'experimenter' if experimenter else 'participant'
+                return await socket.run(request, f'{who} {next(numbers)}')
+            finally:
+                sockets.discard(socket)
+        return connect
+
+    async def close_all(_: web.Application) -> None:
+        await asyncio.gather(*(socket.close(WSCloseCode.GOING_AWAY, 'the session ends')
+                               for socket in sockets))
+
+    app.on_shutdown.append(close_all)
+    app.router.add_get('/ws/participant', connector(experimenter=False))
+    app.router.add_get('/ws/experimenter', connector(experimenter=True))
+    _add_pages(app, desk, access, experimenters)
+    return app
+
+
+async def serve_desk(desk: Desk, access: Access, private: Path
+                     ) -> tuple[web.AppRunner, list[str]]:
+    """
+    Serve a desk until the runner that is given back is cleaned up.
+
+    :param access: with the address, and the first port to try.
+    :param private: folder where what lets experimenters in is kept: links of an earlier process
+        of the same session stay good.
+    :return: the runner, and the lines that tell where the pages are.
+    :raises InputError: if no port can be used.
+    """
+    experimenters = Invitations(private / LINKS)
+    runner, port = await listen(create_desk_app(desk, access, experimenters), access.host,
+                                access.port)
+    here = access.at_port(port)
+    first, *others = here.urls
+    own = here.link(experimenters.make('direct')).replace('/?', '/experimenter?')
+    return runner, [f'participant: {first}', *(f'  also: {other}' for other in others),
+                    f'experimenter, in one browser alone: {own}']
+
+
+def _add_pages(app: web.Application, desk: Desk, access: Access,
+               experimenters: Invitations) -> None:
+    table = _read_files()
+
+    async def participant(request: web.Request) -> web.Response:
+        return file_answer(request, table['/'])
+
+    async def experimenter(request: web.Request) -> web.Response:
+        if 'token' in request.query:
+            return _exchange(request, access, experimenters)
+        if not _is_experimenter(request, experimenters):
+            return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
+        return file_answer(request, table['/experimenter'])
+
+    async def journal(request: web.Request) -> web.Response:
+        if not _is_experimenter(request, experimenters):
+            return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
+        lines = ''.join(f'{json.dumps(entry)}\n' for entry in desk.session.journal.entries)
+        name = f'{desk.session.study.name}_{desk.session.participant}.jsonl'
+        return web.Response(text=lines, content_type='application/jsonl', headers={
+            hdrs.CONTENT_DISPOSITION: f'attachment; filename="{name}"'})
+
+    async def static(request: web.Request) -> web.Response:
+        return file_answer(request, table.get(request.path))
+
+    async def shown(request: web.Request) -> web.Response:
+        return file_answer(request, picture(desk.session.study, request.match_info['name']))
+
+    app.router.add_get('/', participant)
+    app.router.add_get('/experimenter', experimenter)
+    app.router.add_get('/experimenter/journal', journal)
+    app.router.add_get('/picture/{name:.*}', shown)
+    app.router.add_get('/static/{name:.*}', static)
+
+
+def _read_files() -> Mapping[str, PageFile]:
+    table: dict[str, PageFile] = {}
+    for folder in SHARED:
+        table |= read_files(PACKAGE / folder, f'/static/{folder}/')
+    for path, file in PAGES.items():
+        if f'/static/{file}' not in table:
+            raise CrgameError(f'{PACKAGE / file}: a page of the desk is missing; '
+                              'install crgame_ros again')
+        table[path] = table[f'/static/{file}']
+    return table
+
+
+def _exchange(request: web.Request, access: Access, experimenters: Invitations) -> web.Response:
+    name = _cookie_name(request)
+    try:
+        cookie = experimenters.exchange(request.query['token'], request.cookies.get(name))
+    except InputError:
+        return web.Response(status=403, text=(
+            'This link is not good any more: it lets one browser in, once. '
+            'The program prints another one when it is started again.\n'))
+    answer = web.Response(status=303, headers={'Location': '/experimenter'})
+    answer.set_cookie(name, cookie, httponly=True, samesite='Strict',
+                      secure=access.tls is not None, max_age=COOKIE_S)
+    return answer
+
+
+def _is_experimenter(request: web.Request, experimenters: Invitations) -> bool:
+    return experimenters.rights(request.cookies.get(_cookie_name(request))) is not None
+
+
+def _cookie_name(request: web.Request) -> str:
+    sockname = request.get_extra_info('sockname')
+    return f'crgame-desk-{sockname[1]}' if sockname else 'crgame-desk'
+
+
+def _frames(request: web.Request, desk: Desk) -> str:
+    """Name where the cockpit's page may come from: this machine, at a port not known yet."""
+    if request.path != '/':
+        return "'none'"
+    host = urlsplit(f'//{request.host}').hostname or ''
+    names = dict.fromkeys((host, *(_LOOPBACK if is_loopback(host) else ())))
+    # A literal of IPv6 has no wildcard of ports.
+    allowed = [f'{scheme}://{name}:*' for name in names if name and ':' not in name
+               for scheme in ('http', 'https')]
+    link = urlsplit(desk.drives.state.link)
+    if link.scheme in ('http', 'https') and ';' not in link.netloc and ' ' not in link.netloc:
+        allowed.append(f'{link.scheme}://{link.netloc}')
+    return ' '.join(allowed) or "'none'"
+
+
+def _telling(pages: DeskPages) -> Callable[[web.Application], AsyncIterator[None]]:
+    """Yield experimenters what has changed, some times a second, and drop who never reads."""
+    async def tell() -> None:
+        loop = asyncio.get_running_loop()
+        checked_s = loop.time()
+        while True:
+            await asyncio.sleep(TOLD_EVERY_S)
+            if pages.is_due:
+                pages.tell_experimenters()
+            if loop.time() - checked_s > _STALL_CHECK_S:
+                checked_s = loop.time()
+                for client in pages.clients:
+                    client.check_stall(checked_s)
+
+    async def telling(_: web.Application) -> AsyncIterator[None]:
+        task = asyncio.create_task(tell())
+        yield
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+    return telling

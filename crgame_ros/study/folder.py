@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a study's data lies: one folder for it, and one in it for each participant."""
+
+from collections.abc import Iterable, Mapping
+import json
+from pathlib import Path
+import re
+import tempfile
+from typing import Any
+
+from crgame_ros.driver.source import COCKPIT
+from crgame_ros.errors import InputError
+from crgame_ros.evaluation.cell_scene import values_of_game
+from crgame_ros.evaluation.content import ContentStore, digests_in
+from crgame_ros.study.file import Page, Questions, StudyFile
+from crgame_ros.study.pages import steps_of
+from crgame_ros.study.session_journal import read_journal
+from crgame_ros.study.session_script import drives_of
+from crgame_ros.study.trial_game import trial_game
+from crgame_ros.whole_file import write_whole
+
+DRIVES, FILES = 'drives.json', 'files'
+
+
+def keep_drives(study: StudyFile, folder: Path) -> None:
+    """
+    Keep what people drive in, or make sure that it still is what was kept.
+
+    `drives.json` has the game of each practice and condition; what they name (scenarios, scripts,
+    maps, code of planners with what stands beside it) lies in `files/`, by digest.
+
+    :param folder: of the study's files; is there.
+    :raises InputError: if a game cannot be used, or has changed since.
+    :raises OSError: if something cannot be written.
+    """
+    kept = folder / DRIVES
+    with tempfile.TemporaryDirectory(dir=folder, prefix='.part-') as part:
+        store = ContentStore(Path(part) / FILES)
+        games = {name: values_of_game(trial_game(settings, COCKPIT), store)
+                 for name, settings in drives_of(study)}
+        now = json.loads(json.dumps(games, default=str))
+        if not kept.exists():
+            # Only the name of the list makes the files count.
+            _replace(store.folder, folder / FILES)
+            write_whole((json.dumps(now, indent=1) + '\n').encode(), kept)
+            return
+    before = json.loads(kept.read_text('utf-8'))
+    for name, game in now.items():
+        if game != before.get(name):
+            raise InputError(f'{_difference(before.get(name, {}), game)} has changed since the '
+                             'first participant', name, f'put it back as {kept} has it, or begin '
+                             'a new study with another --out')
+
+
+def _replace(new: Path, old: Path) -> None:
+    """Put new files in the place of those that a start has left that did not come to its end."""
+    if old.is_dir():
+        for each in old.iterdir():
+            each.rename(new.parent / f'old-{each.name}')
+        old.rmdir()
+    new.rename(old)
+
+
+def _difference(before: Any, now: Any, where: str = '') -> str:
+    """Name the first thing in which two games differ: a file by its name, others by their key."""
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        for key in (*now, *before):
+            if before.get(key) != now.get(key):
+                return _difference(before.get(key), now.get(key), f'{where}: {key}'.strip(': '))
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        return next(_difference(old, new, where)
+                    for old, new in zip(before, now, strict=True) if old != new)
+    if isinstance(now, str) and digests_in(now):
+        return f'{where}: {now.rpartition("/")[2]}'
+    return where or 'the game'
+
+
+_ID = re.compile(r'[A-Za-z0-9][A-Za-z0-9_-]{0,31}')
+
+
+def check_participant(name: str) -> str:
+    """
+    Check an anonymous id.
+
+    :raises InputError: if it is none.
+    """
+    if _ID.fullmatch(name) is None:
+        raise InputError('is no id of a participant', name[:40] or '--participant',
+                         'give 1 to 32 letters, digits, - and _, such as P07')
+    return name
+
+
+class StudyFolder:
+    """
+    The folder of a study.
+
+    :param root: of it.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    @property
+    def participants(self) -> list[str]:
+        """Name those who have begun, in the order of their places."""
+        folder = self.root / 'participants'
+        found = [(places[0], path.name) for path in (folder.iterdir() if folder.is_dir() else ())
+                 if (places := _places(path))]
+        return [name for _, name in sorted(found)]
+
+    def participant(self, name: str) -> Path:
+        """Return the folder of a participant, which may not be there yet."""
+        return self.root / 'participants' / name
+
+    def place_of(self, name: str) -> int:
+        """Return a participant's place among all: that of their start, or the next free one."""
+        own = _places(self.participant(name))
+        if own:
+            return own[0]
+        taken = {place for other in self.participants
+                 for place in _places(self.participant(other))}
+        return next(place for place in range(len(taken) + 1) if place not in taken)
+
+    def keep_study(self, study: StudyFile, file: Path, pictures: Iterable[str] = ()) -> None:
+        """
+        Keep the study's files as they are, or make sure that they still are what was kept.
+
+        :param file: of the study.
+        :param pictures: of its pages, relative to its folder.
+        :raises InputError: if one has changed since, or cannot be written.
+        """
+        folder = self.root / 'study'
+        files = {'study.yaml': file,
+                 **{name: study.base / name for name in (*_beside(study), *pictures)}}
+        try:
+            for name, path in files.items():
+                kept = folder / name
+                content = path.read_bytes()
+                if not kept.exists():
+                    kept.parent.mkdir(parents=True, exist_ok=True)
+                    write_whole(content, kept)
+                elif kept.read_bytes() != content:
+                    raise InputError('has changed since the first participant', str(path),
+                                     f'put it back as {kept} has it, or begin a new study with '
+                                     'another --out')
+            keep_drives(study, folder)
+        except OSError as error:
+            raise InputError(f'cannot be kept ({error.strerror})', str(folder),
+                             'choose another folder with --out') from error
+
+
+def _beside(study: StudyFile) -> list[str]:
+    """Name pages, questionnaires and words beside a study file, in every language."""
+    names: dict[str, None] = dict.fromkeys(
+        path.name for path in sorted(study.base.glob('words.*.yaml')))
+    for step in steps_of(study):
+        if isinstance(step, Page):
+            page = Path(step.file)
+            for name in (step.file, *(str(page.with_suffix(f'.{language}.md'))
+                                      for language in (study.language, *study.languages))):
+                if (study.base / name).is_file():
+                    names[name] = None
+        elif isinstance(step, Questions) and step.name.endswith(('.yaml', '.yml')):
+            names[step.name] = None
+    return [name for name in names if '..' not in Path(name).parts]
+
+
+def _places(folder: Path) -> list[int]:
+    return [entry['place'] for entry in read_journal(folder) if entry['entry'] == 'begun']

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the pages and questionnaires of a study are."""
+
+from pathlib import Path
+
+from crgame_ros.study.file import Page, Questions, Step, StudyFile
+
+
+def steps_of(study: StudyFile) -> tuple[Step, ...]:
+    """List all that participants do between drives, each as often as the file has it."""
+    entries = [*study.before, *study.after]
+    for block in study.blocks:
+        entries += [*block.before, *block.after_trial, *block.after]
+    return tuple(entry.step for entry in entries)
+
+
+def page_file(study: StudyFile, page: Page, language: str) -> Path | None:
+    """
+    Find a page's file: `NAME.de.md` before `NAME.md`.
+
+    :return: None if there is none.
+    """
+    whole = study.base / page.file
+    for file in (whole.with_suffix(f'.{language}.md'), whole):
+        if file.is_file():
+            return file
+    return None
+
+
+def questionnaire_name(study: StudyFile, step: Questions) -> str:
+    """Name a questionnaire as it can be read from anywhere."""
+    is_file = step.name.endswith(('.yaml', '.yml'))
+    return str(study.base / step.name) if is_file else step.name

@@ -1,0 +1,232 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A road network of way-point lanes (FS II-A1)."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+from crgame_ros.errors import InputError
+from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.waypoints.file import LaneRows, read_lane_rows, write_lane_rows
+from crgame_ros.waypoints.lanelets import lanelet_lane
+from crgame_ros.waypoints.projection import CurveIndex, CurvePieces
+from crgame_ros.waypoints.waypoints import Interpolation, WaypointLane
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Published maps hold successors that begin elsewhere, even the lanelet itself [m].
+MAX_GAP = 1.0
+
+
+@dataclass(frozen=True)
+class LaneLinks:
+    """
+    The lanes around one lane, by their ids.
+
+    :param successors: lanes that begin at its end.
+    :param predecessors: lanes that end at its start.
+    :param left: neighbour with the same direction; None without one.
+    :param right: likewise.
+    :param oncoming_left: neighbour with the opposite direction; None without one.
+    :param oncoming_right: likewise.
+    """
+
+    successors: tuple[int, ...] = ()
+    predecessors: tuple[int, ...] = ()
+    left: int | None = None
+    right: int | None = None
+    oncoming_left: int | None = None
+    oncoming_right: int | None = None
+
+    @property
+    def named(self) -> tuple[int, ...]:
+        """Every lane that is named."""
+        beside = (self.left, self.right, self.oncoming_left, self.oncoming_right)
+        return (*self.successors, *self.predecessors, *(x for x in beside if x is not None))
+
+    def only(self, lane_ids: Collection[int]) -> 'LaneLinks':
+        """Leave out the other lanes."""
+        return LaneLinks(
+            tuple(x for x in self.successors if x in lane_ids),
+            tuple(x for x in self.predecessors if x in lane_ids),
+            *(x if x in lane_ids else None for x in (
+                self.left, self.right, self.oncoming_left, self.oncoming_right)))
+
+
+class NearestLanes(NamedTuple):
+    """
+    The nearest lanes of N points, each (N,).
+
+    :param lane: ids.
+    :param s: stations in [0, length] [m]
+    :param d: offsets to the left of the lane's centre [m]
+    :param distance: to the lane's centre [m]; |d| unless the nearest point is an end.
+    """
+
+    lane: NDArray[np.int64]
+    s: FloatArray
+    d: FloatArray
+    distance: FloatArray
+
+
+class WaypointRoads:
+    """
+    Way-point lanes and how they are connected.
+
+    :param lanes: by id; one at least.
+    :param links: by id; a lane without an entry has none.
+    :raises InputError: if there is no lane, or a link names one that does not exist.
+    """
+
+    def __init__(self, lanes: Mapping[int, WaypointLane],
+                 links: Mapping[int, LaneLinks]) -> None:
+        if not lanes:
+            raise InputError('there is no lane', 'way-point roads', 'give one at least')
+        self._lanes = dict(lanes)
+        self._links = {lane: links.get(lane, LaneLinks()) for lane in lanes}
+        for lane, near in links.items():
+            for other in (lane, *near.named):
+                if other not in self._lanes:
+                    raise InputError(f'lane {lane} is linked with lane {other}, which does not '
+                                     'exist', 'way-point roads', 'name lanes that are there')
+
+    @classmethod
+    def from_lanelets(cls, network: RoadNetwork,
+                      kinds: Mapping[str, Interpolation] | None = None) -> 'WaypointRoads':
+        """
+        Derive the lanes from lanelets; their ids are the lanelets'.
+
+        Position and width come from the bounds and limits from the traffic signs. Links are the
+        lanelets' own, without those to lanelets that are not there and without successors and
+        predecessors that begin more than 1 m elsewhere (`MAX_GAP`).
+        """
+        lanes = {lanelet: lanelet_lane(network, lanelet, kinds) for lanelet in network.lanelet_ids}
+        return cls(lanes, {lanelet: _lanelet_links(network, lanelet, lanes) for lanelet in lanes})
+
+    @classmethod
+    def from_csv(cls, path: Path,
+                 kinds: Mapping[str, Interpolation] | None = None) -> 'WaypointRoads':
+        """
+        Read lanes from a table of way-points; docs/roads.md has its columns.
+
+        :raises InputError: naming the file and the line.
+        """
+        rows = read_lane_rows(path)
+        lanes, links = {}, {}
+        for lane, entry in rows.items():
+            try:
+                lanes[lane] = WaypointLane.of_rows(entry.points, kinds)
+            except InputError as error:
+                raise InputError(error.what, f'{path}, line {entry.line}, lane {lane}',
+                                 error.remedy) from error
+            links[lane] = LaneLinks(**entry.links)
+            missing = [other for other in links[lane].named if other not in rows]
+            if missing:
+                raise InputError(f'lane {lane} is linked with lane {missing[0]}, which does not '
+                                 'exist', f'{path}, line {entry.line}', 'name lanes of the file')
+        if not any(near.predecessors for near in links.values()):
+            links = _with_predecessors(links)
+        return cls(lanes, links)
+
+    def to_csv(self, path: Path) -> None:
+        """Write the way-points so that `from_csv` gives the same roads to the last bit."""
+        write_lane_rows(path, {
+            lane: LaneRows(0, road.rows, vars(self._links[lane]))
+            for lane, road in self._lanes.items()})
+
+    def only(self, lane_ids: Collection[int]) -> 'WaypointRoads':
+        """
+        Return some of the lanes, with the links between these.
+
+        :raises InputError: if there is none.
+        """
+        kept = {lane: None for lane in self._lanes if lane in lane_ids}
+        return WaypointRoads({lane: self._lanes[lane] for lane in kept},
+                             {lane: self._links[lane].only(kept) for lane in kept})
+
+    @property
+    def lane_ids(self) -> tuple[int, ...]:
+        """Ids of all lanes."""
+        return tuple(self._lanes)
+
+    def lane(self, lane_id: int) -> WaypointLane:
+        """
+        Return a lane.
+
+        :raises InputError: if it does not exist.
+        """
+        if lane_id not in self._lanes:
+            raise InputError(f'there is no lane {lane_id}', 'way-point roads', 'name another')
+        return self._lanes[lane_id]
+
+    def links(self, lane_id: int) -> LaneLinks:
+        """Return the lanes around a lane."""
+        self.lane(lane_id)
+        return self._links[lane_id]
+
+    def successors(self, lane_id: int) -> tuple[int, ...]:
+        """List the lanes that begin at the end of a lane."""
+        return self.links(lane_id).successors
+
+    def predecessors(self, lane_id: int) -> tuple[int, ...]:
+        """List the lanes that end at the start of a lane."""
+        return self.links(lane_id).predecessors
+
+    def left(self, lane_id: int) -> int | None:
+        """Name the neighbour on the left that has the same direction."""
+        return self.links(lane_id).left
+
+    def right(self, lane_id: int) -> int | None:
+        """Name the neighbour on the right that has the same direction."""
+        return self.links(lane_id).right
+
+    def nearest(self, points: FloatArray) -> NearestLanes:
+        """
+        Find the lane whose centre is nearest to each of many points, whatever its direction.
+
+        :param points: (N, 2) [m]; O(log of all way-points) each.
+        """
+        ids, index = self._index
+        found = index.nearest(np.asarray(points, dtype=np.float64))
+        return NearestLanes(ids[found.curve], found.s, found.d, found.distance)
+
+    @cached_property
+    def _index(self) -> tuple[NDArray[np.int64], CurveIndex]:
+        pieces = [lane.pieces for lane in self._lanes.values()]
+        return np.array(self.lane_ids), CurveIndex(CurvePieces(
+            np.concatenate([part.coefficients for part in pieces], axis=1),
+            np.concatenate([part.start for part in pieces]),
+            np.concatenate([part.length for part in pieces]),
+            np.repeat(np.arange(len(pieces)), [len(part.start) for part in pieces])))
+
+
+def _lanelet_links(network: RoadNetwork, lanelet_id: int,
+                   known: Mapping[int, WaypointLane]) -> LaneLinks:
+    lanelet = network.lanelet_network.find_lanelet_by_id(lanelet_id)
+    own = network.line(lanelet_id).points
+
+    def touching(others: list[int], end: int) -> tuple[int, ...]:
+        return tuple(int(other) for other in others if other in known and other != lanelet_id
+                     and np.hypot(*(network.line(other).points[-1 - end] - own[end])) <= MAX_GAP)
+
+    def beside(other: int | None, same: bool | None, wanted: bool) -> int | None:
+        return other if other is not None and other in known and bool(same) is wanted else None
+
+    left = (lanelet.adj_left, lanelet.adj_left_same_direction)
+    right = (lanelet.adj_right, lanelet.adj_right_same_direction)
+    return LaneLinks(touching(lanelet.successor, -1), touching(lanelet.predecessor, 0),
+                     beside(*left, True), beside(*right, True),
+                     beside(*left, False), beside(*right, False))
+
+
+def _with_predecessors(links: Mapping[int, LaneLinks]) -> dict[int, LaneLinks]:
+    before: dict[int, list[int]] = {lane: [] for lane in links}
+    for lane, near in links.items():
+        for other in near.successors:
+            before[other].append(lane)
+    return {lane: replace(near, predecessors=tuple(before[lane])) for lane, near in links.items()}
