@@ -82,6 +82,7 @@ async def test_a_slow_client_sees_fewer_frames_never_older_ones() -> None:
     assert wire.sent == [b'0', b'999']
 
 
+@pytest.mark.clock
 @in_loop
 async def test_state_is_throttled_to_the_mean_rate_and_the_last_one_is_sent() -> None:
     wire = Wire()

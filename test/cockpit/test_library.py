@@ -311,6 +311,7 @@ async def test_what_is_no_choice_is_refused(tmp_path: Path) -> None:
             assert answer.status == 413
 
 
+@pytest.mark.clock
 @in_loop
 async def test_frames_go_on_while_a_scenario_is_read(tmp_path: Path) -> None:
     async with with_library(tmp_path) as running:

@@ -300,6 +300,7 @@ async def test_ports_that_cannot_be_used_are_an_error_and_stop_the_backend(
             assert backend.stopped
 
 
+@pytest.mark.clock
 @in_loop
 async def test_the_end_closes_every_socket_within_a_second() -> None:
     backend = PumpBackend()

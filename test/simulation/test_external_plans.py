@@ -81,6 +81,7 @@ def test_every_lanelet_of_published_maps_may_be_planned_along(shared_scenarios: 
     assert checked > 20
 
 
+@pytest.mark.clock
 def test_check_takes_less_than_a_millisecond(shared_scenarios: Path) -> None:
     """It is part of a cycle of 10 ms: 0.1 ms for a plan on the road, 0.4 ms for one off it."""
     path = shared_scenarios / 'more' / 'HRV_Pula-27_3_T-1.xml'
