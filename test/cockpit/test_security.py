@@ -353,7 +353,6 @@ async def test_whoever_never_reads_is_dropped_and_costs_nothing() -> None:
 
 
 @pytest.mark.clock
-@pytest.mark.clock
 @in_loop
 async def test_whoever_falls_silent_is_noticed() -> None:
     # It reads nothing and answers nothing, but nothing is unsent either: only a ping tells, sent
