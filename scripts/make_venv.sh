@@ -53,8 +53,9 @@ if [[ ! -e $venv/stamp ]]; then
     "$uv" venv --quiet --allow-existing --python "$python" "${site[@]}" "$venv"
 fi
 
+# Not in the project's folder, where uv would leave out what pyproject.toml excludes.
 install() {
-    "$uv" pip install --no-deps --python "$venv/bin/python" "$@"
+    (cd / && "$uv" pip install --no-deps --python "$venv/bin/python" "$@")
 }
 
 pins=$root/requirements.txt
