@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Add to pyproject.toml what ament and colcon need: version, data files and executables."""
+"""Add to pyproject.toml what ament and colcon need: version, packages, data and executables."""
 
 from pathlib import Path
 import sys
 from xml.etree import ElementTree
 
-from setuptools import setup
+from setuptools import find_packages, setup
 
 PACKAGE = 'crgame_ros'
 DATA_DIRECTORIES = ('launch', 'config', 'scenarios', 'msg_defs')
@@ -53,7 +53,12 @@ def wrappers() -> list[str]:
     return [(directory / name).as_posix() for name in (*NODES, 'crgame')]
 
 
+# `colcon build --symlink-install` runs this file without pyproject.toml: what it needs is here.
 setup(
+    name=PACKAGE,
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    # colcon reads the metadata as Python literals, which setuptools makes of this one only here.
+    python_requires='>=3.11,<3.13',
     version=ElementTree.parse(ROOT / 'package.xml').findtext('version'),
     data_files=data_files(),
     # Declared here: `colcon build --symlink-install` makes no executables of [project.scripts].

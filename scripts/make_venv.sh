@@ -48,9 +48,9 @@ if ! uv=$(command -v uv); then
 fi
 site=() without='^$'
 [[ $ros != jazzy ]] || site=(--system-site-packages) without='^ros-'
-# An environment of another interpreter, or half of one, is made anew.
+# With pip, so that `pip install` after sourcing scripts/env.sh means this environment.
 if [[ ! -e $venv/stamp ]]; then
-    "$uv" venv --quiet --allow-existing --python "$python" "${site[@]}" "$venv"
+    "$uv" venv --quiet --seed --allow-existing --python "$python" "${site[@]}" "$venv"
 fi
 
 # Not in the project's folder, where uv would leave out what pyproject.toml excludes.

@@ -58,19 +58,39 @@ def _pip(*arguments: str) -> None:
 
 
 @pytest.fixture(scope='module')
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build a wheel from a copy of the source tree."""
-    source = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Copy what a package is built from."""
+    copied = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
                    'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
                    'requirements.txt', 'requirements-planners.txt', 'LICENSE',
                    *(name for name in ('launch', 'scenarios') if (ROOT / name).is_dir()))
     # As it is where the page has been checked.
-    foreign = source / 'test' / 'page' / 'node_modules' / 'somebody'
+    foreign = copied / 'test' / 'page' / 'node_modules' / 'somebody'
     foreign.mkdir(parents=True)
     (foreign / 'index.js').touch()
+    return copied
+
+
+@pytest.fixture(scope='module')
+def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build a wheel from a copy of the source tree."""
     target = tmp_path_factory.mktemp('wheel')
     _pip('wheel', '--no-deps', '--no-build-isolation', '--wheel-dir', str(target), str(source))
     return next(target.glob('*.whl'))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('options', [[], ['--symlink-install']])
+def test_colcon_makes_executables(source: Path, options: list[str], tmp_path: Path) -> None:
+    """Also where it runs setup.py without pyproject.toml, as for links."""
+    done = subprocess.run(
+        [sys.executable, '-m', 'colcon', '--log-base', str(tmp_path / 'log'), 'build',
+         '--base-paths', str(source), '--build-base', str(tmp_path / 'build'),
+         '--install-base', str(tmp_path / 'install'), *options], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    executables = tmp_path / 'install' / 'crgame_ros' / 'lib' / 'crgame_ros'
+    for name in (*NODES, 'crgame'):
+        assert os.access(executables / name, os.X_OK)
 
 
 @pytest.fixture(scope='module')
