@@ -55,9 +55,11 @@ class TimesyncNode(Node):
                 self._add(CycleTable.from_message(message.layout.dim[1].label, message.data))
             except InputError as error:
                 self._refusals.note('/timing/cycle', str(error))
-        if self._metrics is not None and time.monotonic() - self._report_s > REPORT_S:
+        metrics = self._metrics
+        if (metrics is not None and metrics.cycles >= 2
+                and time.monotonic() - self._report_s > REPORT_S):
             self._report_s = time.monotonic()
-            self._report(self._metrics)
+            self._report(metrics)
 
     def _add(self, table: CycleTable) -> None:
         self._awaited.look(self._game is not None, True)
@@ -96,8 +98,6 @@ class TimesyncNode(Node):
             self._orders.publish(Bool(data=self._skipping.active))
 
     def _report(self, metrics: TimingMetrics) -> None:
-        if metrics.cycles < 2:
-            return
         summary = metrics.summary()
         late = summary.worst_lag_ms > 10.0 * metrics.dt_s * 1e3
         values = summary.as_dict()
