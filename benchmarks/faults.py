@@ -67,7 +67,7 @@ class Ear:
         until_s = time.time() + seconds
         while time.time() < until_s and not done():
             for key, slot in self._slots.items():
-                while (taken := slot.take_timed()) is not None:
+                while (taken := slot.pop_timed()) is not None:
                     self._note(key, taken[0], taken[2] * NS)
             time.sleep(0.005)
 

@@ -88,7 +88,7 @@ class ModelRegistry:
         :raises InputError: if there is none of that name, or it is not of this kind.
         """
         label = self.label(name, where)
-        found = self.look_up(name, where, label)
+        found = self.resolve(name, where, label)
         if not (inspect.isclass(found) and issubclass(found, self._base)):
             raise InputError(f'is no {self.kind}', label, 'derive the class from '
                              f'{self._base.__module__}.{self._base.__qualname__}')
@@ -97,7 +97,7 @@ class ModelRegistry:
             raise InputError(f'does not define {missing}', label, self._remedy)
         return found
 
-    def look_up(self, name: str, where: str, label: str) -> Any:
+    def resolve(self, name: str, where: str, label: str) -> Any:
         """
         Find what a name stands for, whatever it is.
 

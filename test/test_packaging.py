@@ -34,7 +34,7 @@ PINS = ('requirements.txt', 'requirements-planners.txt')
 # Modules of ROS packages whose name is no ROS package's.
 # Without uv, wherever this machine has it.
 WITHOUT_UV = os.pathsep.join(folder for folder in os.environ['PATH'].split(os.pathsep)
-                              if not (Path(folder) / 'uv').exists())
+                             if not (Path(folder) / 'uv').exists())
 MESSAGE_PACKAGE = re.compile(r'\w+_msgs|std_srvs|builtin_interfaces|rcl_interfaces|rclpy')
 
 

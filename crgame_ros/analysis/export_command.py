@@ -52,12 +52,12 @@ def export(values: argparse.Namespace) -> int:
     out = out or recording_in(values.runs[0]).parent / 'tables'
     progress = Progress(partial(print, file=sys.stderr, flush=True), '')
 
-    def tell(what: str, share: float) -> None:
+    def show_progress(what: str, share: float) -> None:
         progress.what = what
         progress(share)
 
-    runs = tabulated_runs(values.runs, values.epoch, tell, not values.no_scores)
-    rows = write_tables(runs, out, values.to, tell)
+    runs = tabulated_runs(values.runs, values.epoch, show_progress, not values.no_scores)
+    rows = write_tables(runs, out, values.to, show_progress)
     width = max(map(len, rows))
     for name, count in rows.items():
         print(f'{name:<{width}} {count:>9} rows')

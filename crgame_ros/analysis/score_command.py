@@ -76,7 +76,7 @@ def score(values: argparse.Namespace) -> int:
     return 0
 
 
-def _say(what: str) -> Any:
+def _progress(what: str) -> Any:
     from crgame_ros.recording.progress import Progress
     return Progress(partial(print, file=sys.stderr, flush=True), what)
 
@@ -91,35 +91,35 @@ def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':
     from crgame_ros.recording.run_record import read_run_record
     from crgame_ros.recording.timing_report import timing_report
     bag = recording_in(values.run)
-    record = read_run_record(bag, values.epoch, _say(f'reading {values.run}'))
+    record = read_run_record(bag, values.epoch, _progress(f'reading {values.run}'))
     expert = None if values.expert is None else expert_of_run(
-        read_run_log(recording_in(values.expert), None, _say(f'reading {values.expert}')),
+        read_run_log(recording_in(values.expert), None, _progress(f'reading {values.expert}')),
         record.log, str(values.expert))
     plans = {}
     if record.log.game.avs:
         try:
             plans = plans_of_report(timing_report(bag, values.epoch, record.log,
-                                                  _say(f'reading plans of {values.run}')))
+                                                  _progress(f'reading plans of {values.run}')))
         except CrgameError as error:
             print(f'note: no plans: {error}', file=sys.stderr)
     found = [score_run(record, expert=expert, plans=plans,
-                       progress=_say(f'scoring {values.run}'))]
+                       progress=_progress(f'scoring {values.run}'))]
     if values.solution:
-        found.append(_score_solutions(values, ScoredScenario.of_run(record.log)[0]))
+        found.append(_score_solutions(values, ScoredScenario.from_run(record.log)[0]))
     return found
 
 
 def _score_file(values: argparse.Namespace) -> 'list[PlannerScores]':
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
     from crgame_ros.scenario.loading import load_scenario
-    return [_score_solutions(values, ScoredScenario.of_file(load_scenario(values.scenario)))]
+    return [_score_solutions(values, ScoredScenario.from_file(load_scenario(values.scenario)))]
 
 
 def _score_solutions(values: argparse.Namespace, scored: 'ScoredScenario') -> 'PlannerScores':
     from crgame_ros.analysis.scores.scored_solution import score_solutions
     from crgame_ros.analysis.scores.solution_file import read_solution
     return score_solutions(scored, {str(path): read_solution(path) for path in values.solution},
-                           _say('scoring solutions'))
+                           _progress('scoring solutions'))
 
 
 def _write(found: 'list[PlannerScores]', out: Path) -> None:

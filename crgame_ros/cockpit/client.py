@@ -61,7 +61,7 @@ class TokenBucket:
         self._level = burst
         self._filled_s: float | None = None
 
-    def take(self, now_s: float) -> bool:
+    def try_spend(self, now_s: float) -> bool:
         """Take one token; tell whether there was one."""
         if self._filled_s is not None:
             gained = (now_s - self._filled_s) * self._rate

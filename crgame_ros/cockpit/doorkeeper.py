@@ -87,7 +87,7 @@ class _Watched(asyncio.Protocol):
             return
         self._transport = transport
         self.idle_since_s = asyncio.get_running_loop().time()
-        self._look()
+        self._poll()
         self._protocol.connection_made(transport)
 
     def connection_lost(self, error: Exception | None) -> None:
@@ -111,13 +111,13 @@ class _Watched(asyncio.Protocol):
     def resume_writing(self) -> None:
         self._protocol.resume_writing()
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         loop = asyncio.get_running_loop()
         if self._transport is not None and not self.requests \
                 and loop.time() - self.idle_since_s > self.patience_s:
             self._transport.abort()
             return
-        self._timer = loop.call_later(_LOOK_S, self._look)
+        self._timer = loop.call_later(_LOOK_S, self._poll)
 
 
 class WatchedSite(web.BaseSite):

@@ -44,7 +44,7 @@ class HeldSeat:
         self._heard_s = 0.0
         self.away = True
 
-    def take(self, message: Mapping[str, Any], now_s: float) -> bool:
+    def apply_input(self, message: Mapping[str, Any], now_s: float) -> bool:
         """
         Take an input message of the holder, already checked.
 
@@ -59,7 +59,7 @@ class HeldSeat:
         self.away = keys is None and axes is None
         self._lever.hold(i for i, held in enumerate(message.get('lights', ())) if held)
         if self.away:
-            self.let_go()
+            self.release()
         elif axes is not None:
             throttle, brake, steering = axes
             self._keys, self._axes = None, DriverCommand(throttle, brake, steering, reverse)
@@ -68,7 +68,7 @@ class HeldSeat:
             self._keys, self._axes = KeyState(throttle, brake, left, right, reverse), None
         return (self._keys, self._axes) != before
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Take the hands off everything at once."""
         self.away = True
         self._keys = self._axes = None

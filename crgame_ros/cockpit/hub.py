@@ -95,7 +95,7 @@ class Hub:
             if other is not None and other is not client:
                 other.key = ''
                 other.drop('came back')
-        self.tell_rights(client, accepted)
+        self.send_rights(client, accepted)
         return accepted
 
     def set_document(self, kind: str, content: Mapping[str, Any]) -> None:
@@ -126,7 +126,7 @@ class Hub:
         for client in tuple(self._clients.values()) if only is None else (only,):
             client.put_event(text)
 
-    def tell_rights(self, client: Client, accepted: bool = True) -> None:
+    def send_rights(self, client: Client, accepted: bool = True) -> None:
         """Tell a page what its person may do, and whether it was taken for whom it says."""
         self.send_event('you', {'rights': _rights(client), 'accepted': accepted}, only=client)
 

@@ -86,7 +86,7 @@ class Invitations:
     def rights(self, cookie: str | None) -> Rights | None:
         """Return what the browser with a cookie may do; None if it came by no link."""
         link = _find(self._links, 'cookie', cookie) if cookie else None
-        return None if link is None else Rights.of(link.role, link.seat)
+        return None if link is None else Rights.for_role(link.role, link.seat)
 
     def _write(self) -> None:
         part = self._path.with_suffix('.new')

@@ -56,11 +56,11 @@ def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_C
     :param subject: what they read, for people.
     :param most_cpu_s: after which a job is given up [s].
     """
-    def give_up(_number: int, _frame: FrameType | None) -> None:
+    def stop_job(_number: int, _frame: FrameType | None) -> None:
         raise _GivenUpError(f'the {subject} takes more than {most_cpu_s:g} s to read; choose a '
                             'smaller one')
 
-    signal.signal(signal.SIGPROF, give_up)
+    signal.signal(signal.SIGPROF, stop_job)
     # Ctrl-C is for the server, which closes the standard input when it ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)

@@ -115,7 +115,7 @@ class MessageFrames:
         """Make the frame of whom a request names at its first point; None without perception."""
         if av not in self.mounts.avs:
             return None
-        layout = RequestLayout.of(message.joint_names, av)
+        layout = RequestLayout.from_names(message.joint_names, av)
         first = np.asarray(_short(message, layout.where).points[0].positions)
         if len(first) != len(message.joint_names):
             raise InputError('its first point does not give every joint', layout.where)
@@ -129,7 +129,7 @@ class MessageFrames:
         """Make the frame of what a request says of others' future: of those who are there."""
         where = f'/{av}/plan_request'
         series = from_joint_trajectory(_short(message, where), where)
-        layout = RequestLayout.of(series.names, av).among(self.columns)
+        layout = RequestLayout.from_names(series.names, av).among(self.columns)
         futures = self._transforms[av].to_simulation(
             series.positions[:, layout.columns].swapaxes(0, 1))
         present = np.flatnonzero(np.isfinite(futures[:, 0, 0]))

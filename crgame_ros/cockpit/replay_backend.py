@@ -64,12 +64,12 @@ def measured_criticality(run: Epoch, path: Path) -> bytes:
     frames = MessageFrames(run.game, run.descriptions)
     found: list[bytes] = []
 
-    def take(criticality: Criticality) -> None:
+    def add_step(criticality: Criticality) -> None:
         rows = criticality_rows(criticality, run.game.epoch, criticality.n)
         if (frame := frames.criticality_of(rows)) is not None:
             found.append(frame.data)
 
-    measure_log(read_run_log(path, run.game.epoch), on_tick=take)
+    measure_log(read_run_log(path, run.game.epoch), on_tick=add_step)
     return pack(found)
 
 
@@ -348,10 +348,10 @@ def open_replay(path: Path, epoch: int | None, say: Callable[[str], None],
     """
     told_s = clock_s()
 
-    def tell(share: float) -> None:
+    def show_progress(share: float) -> None:
         nonlocal told_s
         if clock_s() - told_s > patience_s:
             told_s = clock_s()
             say(f'reading {path}: {share:.0%}')
 
-    return ReplayBackend(path, epoch, tell)
+    return ReplayBackend(path, epoch, show_progress)

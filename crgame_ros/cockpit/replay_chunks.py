@@ -69,7 +69,7 @@ class ChunkBuilder:
         self._makers: dict[str, Callable[[Place, Any], list[Frame | None]]] = {
             OBJECT_STATES_TOPIC: _single(self._frames.objects)}
         for av in avs:
-            self._makers[f'/{av}/plan_request'] = partial(self._told, av)
+            self._makers[f'/{av}/plan_request'] = partial(self._planner_view, av)
         for av in avs:
             self._makers[f'/{av}/plan'] = _single(self._frames.plan, av)
         for topic in perception_topics(run.game):
@@ -146,7 +146,7 @@ class ChunkBuilder:
         for message in self._reader.decoded(self._index.places, from_ns, to_ns + 1):
             topic, _, log_ns, content = message
             if topic == CYCLE_TOPIC:
-                self._take_commands(content, commands)
+                self._read_commands(content, commands)
                 continue
             if topic == OCCUPANCY_TOPIC:
                 if low <= newest < high:
@@ -181,7 +181,7 @@ class ChunkBuilder:
         place = int(np.searchsorted(steps, low))
         return int(steps[place - 1]) if place else -1
 
-    def _take_commands(self, content: Any, commands: dict[int, FloatArray]) -> None:
+    def _read_commands(self, content: Any, commands: dict[int, FloatArray]) -> None:
         """Read what each vehicle consumed, by step: (V, 4)."""
         if len(content.layout.dim) != 2:
             return
@@ -207,7 +207,7 @@ class ChunkBuilder:
             return []
         return [frame.data for frame in made if frame is not None]
 
-    def _told(self, av: str, place: Place, content: Any) -> list[Frame | None]:
+    def _planner_view(self, av: str, place: Place, content: Any) -> list[Frame | None]:
         """Make the frames of what an AV's planner is told."""
         return [self._frames.prediction(place, av, content),
                 self._frames.seen(place, av, content)]

@@ -124,7 +124,7 @@ def index_run(reader: BagReader, run: Epoch,
     span_ns = max(reader.end_ns - reader.start_ns, 1)
     for count, message in enumerate(reader.messages(indexer.topics)):
         try:
-            indexer.take(message)
+            indexer.add(message)
         except InputError:
             # Whatever somebody else sent costs that message, not the replay.
             reader.foreign[message.topic] += 1
@@ -152,14 +152,14 @@ class _Indexer:
         self._inside = self._after = False
         self.topics = (*self._places, *self._collector.topics)
 
-    def take(self, message: BagMessage) -> None:
+    def add(self, message: BagMessage) -> None:
         topic, type_name, log_ns, data = message
         if topic == CYCLE_TOPIC:
-            self._take_cycles(message)
+            self._add_cycles(message)
         elif topic not in self._places:
             if not self._after:
-                self._collector.take(self._reader.decode(message),
-                                     self._states.newest if self._inside else None)
+                self._collector.add(self._reader.decode(message),
+                                    self._states.newest if self._inside else None)
         elif type_name != self._types.get(topic, TRAJECTORY):
             self._reader.foreign[topic] += 1
         elif topic == OCCUPANCY_TOPIC:
@@ -168,9 +168,9 @@ class _Indexer:
             if not self._after and (from_ns is None or log_ns >= from_ns):
                 self._places[topic].add(log_ns, self._states.newest)
         else:
-            self._take_stamped(message, header_stamp_ns(data))
+            self._add_stamped(message, header_stamp_ns(data))
 
-    def _take_stamped(self, message: BagMessage, stamp_ns: int) -> None:
+    def _add_stamped(self, message: BagMessage, stamp_ns: int) -> None:
         topic, log_ns = message.topic, message.log_time_ns
         if not self._run.holds(stamp_ns, log_ns):
             # States of another run: what has no stamp belongs to that one from here on.
@@ -190,7 +190,7 @@ class _Indexer:
         else:
             places.add(log_ns, n)
 
-    def _take_cycles(self, message: BagMessage) -> None:
+    def _add_cycles(self, message: BagMessage) -> None:
         content = self._reader.decode(message).message
         if self._after or len(content.layout.dim) != 2:
             return
@@ -202,7 +202,7 @@ class _Indexer:
         if self._run.from_log_ns is not None and message.log_time_ns < self._run.from_log_ns:
             return
         places.add(message.log_time_ns, int(steps[0]), int(steps[-1]))
-        self._collector.take_resets(steps, table.column('resets'))
+        self._collector.add_resets(steps, table.column('resets'))
         self._outline.add_commands(table)
 
     def finish(self) -> RunIndex:

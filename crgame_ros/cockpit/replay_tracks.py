@@ -115,7 +115,7 @@ class TrackCollector:
         self._resets: int | None = None
         self._fired: set[tuple[str, int]] = set()
 
-    def take(self, recorded: DecodedMessage, newest: int | None) -> None:
+    def add(self, recorded: DecodedMessage, newest: int | None) -> None:
         """
         Take one message of `topics`.
 
@@ -123,7 +123,7 @@ class TrackCollector:
         """
         topic, _, _, message = recorded
         if topic in _LATCHED:
-            self._take_latched(_LATCHED[topic], message.data, newest)
+            self._add_latched(_LATCHED[topic], message.data, newest)
         elif topic == _FRAME_SKIP:
             self._put('frames_skipped', newest or 0, bool(message.data))
         elif newest is not None:
@@ -134,9 +134,9 @@ class TrackCollector:
                     return
                 n = min(self._scheduler.step_of_stamp(stamp_ns), newest)
             for status in message.status:
-                self._take_status(status, n)
+                self._add_status(status, n)
 
-    def take_resets(self, steps: NDArray[np.float64], resets: NDArray[np.float64]) -> None:
+    def add_resets(self, steps: NDArray[np.float64], resets: NDArray[np.float64]) -> None:
         """Note where the count of drift resets rose."""
         for n, count in zip(steps.tolist(), resets.tolist(), strict=True):
             if self._resets is not None and count > self._resets:
@@ -170,9 +170,9 @@ class TrackCollector:
             track.pop()
         track.append((n, deepcopy(content)))
 
-    def _take_status(self, status: Any, n: int) -> None:
+    def _add_status(self, status: Any, n: int) -> None:
         taken = read_status(status)
-        self._status.take(taken, n * self._scheduler.dt_s)
+        self._status.add(taken, n * self._scheduler.dt_s)
         content = self._status.document()
         for av, entry in content['planners'].items():
             entry['planner'] = entry['planner'] or self._planners.get(av, '')
@@ -201,7 +201,7 @@ class TrackCollector:
         elif node == 'planner_node' and level and vehicle in self._planners:
             self._marks.add(n, 'fallback', vehicle, text)
 
-    def _take_latched(self, kind: str, text: str, newest: int | None) -> None:
+    def _add_latched(self, kind: str, text: str, newest: int | None) -> None:
         try:
             if kind == 'signals':
                 k, states = parse_signals_document(text)
@@ -212,18 +212,18 @@ class TrackCollector:
             else:
                 epoch, fired = parse_events_document(text)
                 if epoch == self._game.epoch:
-                    self._take_fired(fired, newest or 0)
+                    self._add_fired(fired, newest or 0)
         except InputError:
             # Anybody may publish on a topic; what is no such document is passed over.
             return
 
-    def _take_fired(self, fired: Sequence[FiredEvent], newest: int) -> None:
+    def _add_fired(self, fired: Sequence[FiredEvent], newest: int) -> None:
         for event in fired:
             key = (event.name, event.n)
             if key not in self._fired:
                 self._fired.add(key)
                 self._marks.add(event.n, 'trigger', event.name, f'by {event.by}')
-        self._status.take_events(fired, self._scheduler.dt_s)
+        self._status.add_events(fired, self._scheduler.dt_s)
         self._put('events', max((event.n for event in fired), default=newest),
                   {'fired': [asdict(event) for event in fired]})
 

@@ -32,7 +32,7 @@ class Rights:
     seat: str = ''
 
     @classmethod
-    def of(cls, role: str, seat: str = '') -> 'Rights':
+    def for_role(cls, role: str, seat: str = '') -> 'Rights':
         """Return the rights of a role: direct, drive, watch or all."""
         return cls(role in ('direct', 'all'), role in ('drive', 'all'), seat)
 
@@ -45,7 +45,7 @@ class Rights:
 
     def narrowed(self, role: str) -> 'Rights':
         """Return as much of a role as these rights hold."""
-        wanted = Rights.of(role)
+        wanted = Rights.for_role(role)
         return replace(self, directs=self.directs and wanted.directs,
                        drives=self.drives and wanted.drives)
 

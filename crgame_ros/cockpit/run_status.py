@@ -58,9 +58,9 @@ class RunStatus:
         self._traffic_late_t = -math.inf
         self._alarms: dict[str, Alarm] = {}
         self._rules: list[tuple[str, Callable[..., None]]] = [
-            ('sim_node: run', self._take_run), ('sim_node: traffic', self._take_traffic),
-            ('timesync_node: table I', self._take_timing),
-            ('recorder_node: recording', self._take_recording)]
+            ('sim_node: run', self._add_run), ('sim_node: traffic', self._add_traffic),
+            ('timesync_node: table I', self._add_timing),
+            ('recorder_node: recording', self._add_recording)]
         self.begin(())
 
     def begin(self, vehicles: Sequence[str]) -> None:
@@ -93,7 +93,7 @@ class RunStatus:
         """Return what is wrong now, the oldest first."""
         return tuple(self._alarms.values())
 
-    def take(self, status: Status, t: float) -> None:
+    def add(self, status: Status, t: float) -> None:
         """
         Take a status.
 
@@ -111,11 +111,11 @@ class RunStatus:
         node, _, subject = name.partition(': ')
         vehicle, _, rest = subject.partition(' ')
         if owner in self._vehicles and about == 'drivability':
-            self._take_drivability(owner, values, t)
+            self._add_drivability(owner, values, t)
         elif vehicle not in self._vehicles:
             return
         elif node == 'sim_node' and rest == 'plans':
-            self._take_plans(vehicle, level, text, values, t)
+            self._add_plans(vehicle, level, text, values, t)
         elif node == 'planner_node':
             # An event may have changed the planner that the game names.
             self._planner(vehicle).update(
@@ -134,7 +134,7 @@ class RunStatus:
         elif node == 'driver_node':
             self._alarm('lost_device', vehicle, level == ERROR, text, t)
 
-    def take_events(self, fired: Sequence[FiredEvent], dt_s: float) -> None:
+    def add_events(self, fired: Sequence[FiredEvent], dt_s: float) -> None:
         """
         Take the contacts that stopped who drove: they overlap nobody, so no verdict tells of them.
 
@@ -189,7 +189,7 @@ class RunStatus:
             'refused': 0, 'plan_time_ms': None, 'fallbacks': 0, 'planner': '',
             'last_refusal': '', 'tracking': None})
 
-    def _take_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
+    def _add_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
         self.run, self.reason = text, values.get('reason', '')
         self.stays = status_truth(values, 'stays')
         if text == 'ended':
@@ -198,12 +198,12 @@ class RunStatus:
         self.countdown_s = int(_number(values.get('countdown_s')) or 0)
         self.real_time_factor = _number(values.get('real_time_factor')) or 1.0
 
-    def _take_traffic(self, level: int, text: str, _: Mapping[str, str], t: float) -> None:
+    def _add_traffic(self, level: int, text: str, _: Mapping[str, str], t: float) -> None:
         if level != OK:
             self._traffic_late_t = t
             self._alarm('late_traffic', 'traffic', True, text, t)
 
-    def _take_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
+    def _add_timing(self, _: int, __: str, values: Mapping[str, str], t: float) -> None:
         self.timing = {key: _number(value) for key, value in values.items()
                        if key not in ('frame_skipping', 'worst_late_step')}
         if 'worst_late_step' in values:
@@ -212,8 +212,8 @@ class RunStatus:
         self.timing['frame_skipping'] = skipping
         self._alarm('late', 'simulation', skipping, 'late: frames are skipped', t)
 
-    def _take_recording(self, level: int, text: str, values: Mapping[str, str],
-                        t: float) -> None:
+    def _add_recording(self, level: int, text: str, values: Mapping[str, str],
+                       t: float) -> None:
         failed = level == ERROR
         megabytes = (_number(values.get('bytes')) or 0.0) / 1e6
         self.recording = {
@@ -222,7 +222,7 @@ class RunStatus:
             'messages': int(_number(values.get('messages')) or 0), 'megabytes': megabytes}
         self._alarm('recording', 'recorder', failed, text, t)
 
-    def _take_drivability(self, vehicle: str, values: Mapping[str, str], t: float) -> None:
+    def _add_drivability(self, vehicle: str, values: Mapping[str, str], t: float) -> None:
         collision = status_truth(values, 'collision')
         off_road = values.get('road_compliance') == 'false'
         hit = [item for item in values.get('hit', '').split(',') if item]
@@ -254,8 +254,8 @@ class RunStatus:
         return any({*(event.touching or ())} == {vehicle, other}
                    and abs(t - at_t) < SAME_CONTACT_S for event, at_t in self._stops.items())
 
-    def _take_plans(self, vehicle: str, level: int, text: str, values: Mapping[str, str],
-                    t: float) -> None:
+    def _add_plans(self, vehicle: str, level: int, text: str, values: Mapping[str, str],
+                   t: float) -> None:
         self._planner(vehicle).update(
             running=status_truth(values, 'running', True), stale=level == ERROR,
             latency_ms=_number(values.get('latency_ms')), age_ms=_number(values.get('age_ms')),

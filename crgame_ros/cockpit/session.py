@@ -131,20 +131,20 @@ class Session:
                                 WSMsgType.ERROR):
                 return WSCloseCode.OK, ''
             client.heard_s = loop.time()
-            if not self._bucket.take(client.heard_s):
+            if not self._bucket.try_spend(client.heard_s):
                 return (WSCloseCode.POLICY_VIOLATION,
                         f'more than {MESSAGES_PER_S:g} messages a second')
             if message.type is WSMsgType.PING:
                 await self.socket.pong(message.data)
             elif message.type is WSMsgType.TEXT:
-                await self._take(client, message.data)
+                await self._handle(client, message.data)
             elif message.type is WSMsgType.BINARY:
                 self._blame(client, InputError('is binary', 'message'))
             if self._malformed >= MAX_MALFORMED:
                 return (WSCloseCode.POLICY_VIOLATION,
                         f'{MAX_MALFORMED} messages that cannot be read')
 
-    async def _take(self, client: Client, text: str) -> None:
+    async def _handle(self, client: Client, text: str) -> None:
         try:
             message = page_messages.parse_message(text)
         except InputError as error:
@@ -179,7 +179,7 @@ class Session:
                 self._backend.joined(client)
             case 'role':
                 client.rights = client.granted.narrowed(message['role'])
-                self._hub.tell_rights(client)
+                self._hub.send_rights(client)
                 self._backend.joined(client)
                 self._reply(client, message, True, f'you are a {client.rights.role}')
             case 'device':

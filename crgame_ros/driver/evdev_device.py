@@ -211,7 +211,7 @@ class EvdevDevice:
         self._next_scan_s = now_s + RESCAN_PERIOD_S
         return self._connect()
 
-    def take_input_s(self) -> float | None:
+    def pop_input_s(self) -> float | None:
         """
         Return when the first input since the last call changed something, by the kernel's stamp.
 

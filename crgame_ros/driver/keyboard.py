@@ -84,7 +84,7 @@ class KeyboardFilter:
     The rate-limited integration of CRG 18-19, in simulation time.
 
     The state is a `DriverCommand` before the deadbands; `advance` commits a cycle,
-    `look_ahead` answers what a cycle would give without committing it, and `advanced` is the
+    `preview` returns what a cycle would give without committing it, and `advanced` is the
     pure step behind both.
     """
 
@@ -137,7 +137,7 @@ class KeyboardFilter:
         self.state = self.advanced(self.state, keys, dt_s)
         return self.command(self.state)
 
-    def look_ahead(self, keys: KeyState, dt_s: float) -> DriverCommand:
+    def preview(self, keys: KeyState, dt_s: float) -> DriverCommand:
         """Return the command of the coming cycle from the last committed state, uncommitted."""
         return self.command(self.advanced(self.state, keys, dt_s))
 
@@ -174,4 +174,4 @@ class KeyboardCycles:
             self._filter.advance(self._keys, gap * self._dt_s)
             self.cycle = n
         self._keys, self._dt_s = keys, dt_s
-        return self._filter.look_ahead(keys, dt_s)
+        return self._filter.preview(keys, dt_s)

@@ -314,7 +314,7 @@ class EvdevDriver(DriverSource):
     def poll(self, now_s: float) -> bool:
         """Read what is pending, or look for the lost device; keep its problem."""
         changed = self.device.poll(now_s)
-        self.name, input_s = self.device.name, self.device.take_input_s()
+        self.name, input_s = self.device.name, self.device.pop_input_s()
         self.input_s = input_s if self.input_s is None else self.input_s
         self.problem = self.device.problem
         return changed

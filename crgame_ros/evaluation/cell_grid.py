@@ -131,11 +131,12 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
         scenes.append(scene)
         progress((number + 1) / len(places))
     paths = [path for _, path in places]
-    return CellGrid(_told_apart(scenes, paths), planners, perception, traffic, plan.seed_numbers(),
-                    plan.duration, plan.latency, plan.commonroad_scores, engine_digest())
+    return CellGrid(_unique_names(scenes, paths), planners, perception, traffic,
+                    plan.seed_numbers(), plan.duration, plan.latency, plan.commonroad_scores,
+                    engine_digest())
 
 
-def _told_apart(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
+def _unique_names(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
     """
     Name alike ones by more: scenarios by their files, runs by the folders that they lie in.
 

@@ -117,7 +117,7 @@ def run_command(values: argparse.Namespace) -> int:
     from crgame_ros.recording.progress import Progress
     say = partial(print, file=sys.stderr, flush=True)
     if values.cell or values.summary:
-        return _look(values)
+        return _inspect(values)
     require_dask()
     plan, folder = _plan(values)
     try:
@@ -135,7 +135,7 @@ def run_command(values: argparse.Namespace) -> int:
     return 0
 
 
-def _look(values: argparse.Namespace) -> int:
+def _inspect(values: argparse.Namespace) -> int:
     from crgame_ros.evaluation.summary.command import summarise_command
     if values.plan is None or not values.plan.is_dir():
         raise InputError('needs the folder of an evaluation',

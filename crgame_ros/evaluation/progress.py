@@ -39,12 +39,12 @@ class EvaluationProgress:
         now_s = self._clock()
         if self._begin_s is None:
             self._begin_s = self._told_s = now_s
-            self._say(f'{tally.total} cells' + (f', {tally.before} of them finished before'
-                                                if tally.before else ''))
+            self._print(f'{tally.total} cells' + (f', {tally.before} of them finished before'
+                                                  if tally.before else ''))
             if not tally.threads:
-                self._say('no worker is connected: waiting for one')
+                self._print('no worker is connected: waiting for one')
             if tally.dashboard:
-                self._say(f'Dask shows its work at {tally.dashboard}')
+                self._print(f'Dask shows its work at {tally.dashboard}')
         if cell is not None and row is not None and row['status'] != 'ok':
             self._fail(cell, row)
         last = tally.before + tally.done == tally.total
@@ -55,11 +55,11 @@ class EvaluationProgress:
     def _fail(self, cell: Cell, row: dict[str, Any]) -> None:
         self._failures += 1
         if self._failures <= TOLD_FAILURES:
-            self._say(f'{row["status"]}: {cell.label} ({cell.key[:8]}): {row["reason"]}')
+            self._print(f'{row["status"]}: {cell.label} ({cell.key[:8]}): {row["reason"]}')
         elif self._failures == TOLD_FAILURES + 1:
-            self._say('further failures are in the tables only')
+            self._print('further failures are in the tables only')
 
-    def _say(self, text: str) -> None:
+    def _print(self, text: str) -> None:
         clear = '\r\033[K' if self._bar else ''
         print(f'{clear}{text}', file=self._stream, flush=True)
 

@@ -109,7 +109,7 @@ def parse_tenants(text: str) -> dict[str, SeatOccupant]:
     """
     try:
         return {str(name): SeatOccupant(_person(entry['person']), entry['here'] is True,
-                                      entry['ready'] is True)
+                                        entry['ready'] is True)
                 for name, entry in json.loads(text).items() if entry.get('person') is not None}
     except (*MALFORMED, InputError) as error:
         raise InputError('is not what the contract says', SEATS_TOPIC) from error

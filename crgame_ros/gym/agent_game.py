@@ -153,7 +153,7 @@ class AgentGame:
         goal = self._goals[seat.id].is_met(
             seat.state, scheduler.k(game.simulation.n))
         collision = bool(seat.hit)
-        reward, terms = experiment.reward.of(Decision(
+        reward, terms = experiment.reward.compute(Decision(
             experiment.ticks * scheduler.time_step_s, seat.before[0], seat.state, seat.place,
             collision, off_road, goal, measures))
         happened = {'collision': collision, 'off_road': off_road, 'goal': goal}
@@ -169,5 +169,5 @@ def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Ob
     """Return what the agents of several games see, (B, …) by part."""
     poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
     velocities = np.stack([seat.around.velocities for seat in seats])
-    return observation.of([seat.state for seat in seats], [seat.place for seat in seats],
-                          [seat.guide for seat in seats], poses, velocities)
+    return observation.observe([seat.state for seat in seats], [seat.place for seat in seats],
+                               [seat.guide for seat in seats], poses, velocities)

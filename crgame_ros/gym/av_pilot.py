@@ -48,7 +48,7 @@ class AvPilot:
             VehicleState(*initial.tolist()), setup.game.seed, simulation.scheduler.dt_s,
             setup.open_occupancy())
 
-    def look(self, result: StepResult, states: NDArray[np.float64]) -> Surrounded:
+    def observe(self, result: StepResult, states: NDArray[np.float64]) -> Surrounded:
         """
         Return what the agent is told of at a tick.
 
@@ -57,19 +57,19 @@ class AvPilot:
         simulation = self._simulation
         if self.perception is None:
             self._stamp_ns = simulation.scheduler.stamp_ns(simulation.n)
-            self.around = self._view.of(states, simulation.objects)
+            self.around = self._view.observe(states, simulation.objects)
         elif self.id in result.requests:
             request = self.perception.perceive(result.requests[self.id])
             simulation.request_perceived(self.id, request)
             self._stamp_ns = request.stamp_ns
-            self.around = self._request_view.of(self._reader.read(request))
+            self.around = self._request_view.observe(self._reader.read(request))
         return self.around
 
     def offer(self, states: NDArray[np.float64]) -> str | None:
         """
         Let the AV follow a plan.
 
-        :param states: (S, 8) from what `look` has told on.
+        :param states: (S, 8) that `observe` returned, and later.
         :return: why the engine refuses it, or None.
         """
         simulation = self._simulation

@@ -330,7 +330,7 @@ class DrivingGame:
             planner.proceed(result)
         show(self.simulation, result, list(self._hands.values()))
         for seat in self.seats:
-            seat.around = seat.pilot.look(result, states) if seat.pilot else seat.view.of(
+            seat.around = seat.pilot.observe(result, states) if seat.pilot else seat.view.observe(
                 states, self.simulation.objects)
         for observer in self._observers:
             observer.observe(result.n, 0.0, states, result.objects)

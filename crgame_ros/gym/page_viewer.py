@@ -113,13 +113,13 @@ class PageViewer:
             setup, epoch=self._epoch, clock_offset_ns=0, real_time_factor=1.0))
         scene = scene_document(setup.loaded, setup.descriptions, document)
         self._status.begin(setup.vehicle_ids)
-        self._status.take(Status('sim_node: run', 0, 'running', {}), 0.0)
+        self._status.add(Status('sim_node: run', 0, 'running', {}), 0.0)
         for seat in game.seats:
             # Not who the game says.
             scene['drivers' if seat.pilot is None else 'planners'][seat.id] = 'agent'
-        self._tell(lambda hub: hub.set_document('scene', scene))
-        self._tell(lambda hub: hub.set_document('events', {'fired': []}))
-        self._tell(lambda hub: hub.set_document('seats', {'seats': {}}))
+        self._run_on_page(lambda hub: hub.set_document('scene', scene))
+        self._run_on_page(lambda hub: hub.set_document('events', {'fired': []}))
+        self._run_on_page(lambda hub: hub.set_document('seats', {'seats': {}}))
 
     def show(self, game: DrivingGame) -> None:
         """Show the present state, when its time has come."""
@@ -140,7 +140,7 @@ class PageViewer:
                 (objects.poses, objects.velocities), axis=1)),
             **_plans(game, place)}
         for seat in game.seats:
-            self._status.take(Status(f'{seat.id}/drivability', 0, '', {
+            self._status.add(Status(f'{seat.id}/drivability', 0, '', {
                 'collision': str(bool(seat.hit)).lower(), 'hit': ','.join(seat.hit)}), place[3])
         status = {**self._status.document(), 't': place[3], 'n': n, 'k': place[2],
                   'epoch': self._epoch, 'measured_factor': None, 'frames_skipped': False,
@@ -153,14 +153,14 @@ class PageViewer:
             hub.set_document('status', {**status, 'clients': len(hub.clients)})
             hub.set_document('alarms', alarms)
 
-        self._tell(send)
+        self._run_on_page(send)
 
     def close(self) -> None:
         """End the server and its thread."""
         asyncio.run_coroutine_threadsafe(self._runner.cleanup(), self._loop).result()
         self._end_thread()
 
-    def _tell(self, what: Callable[[Hub], object]) -> None:
+    def _run_on_page(self, what: Callable[[Hub], object]) -> None:
         hub = self._backend.hub
         assert hub is not None
         self._loop.call_soon_threadsafe(what, hub)

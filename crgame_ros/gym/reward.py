@@ -190,7 +190,7 @@ class Reward:
                        for name, weight in weights.items()]
         self.is_measured = any(TERMS[name].is_measured for name in weights)
 
-    def of(self, decision: Decision) -> tuple[float, dict[str, float]]:
+    def compute(self, decision: Decision) -> tuple[float, dict[str, float]]:
         """Return the reward, and the value of each term before its weight."""
         values = {name: value(decision) for name, value, _ in self._terms}
         return sum(weight * values[name] for name, _, weight in self._terms), values

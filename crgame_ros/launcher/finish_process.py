@@ -23,14 +23,14 @@ def main() -> int:
     os.nice(_NICE)
     finished: list[FinishedRecording] = []
     # What it says is read when it has ended.
-    code = finish_run(Path(sys.argv[1]), _say, progress=False, finished=finished.append)
+    code = finish_run(Path(sys.argv[1]), _print, progress=False, finished=finished.append)
     if NO_REPORT not in sys.argv[2:]:
         for each in finished:
-            write_run_report(each, _say, progress=False)
+            write_run_report(each, _print, progress=False)
     return code
 
 
-def _say(line: str) -> None:
+def _print(line: str) -> None:
     print(line, flush=True)
 
 

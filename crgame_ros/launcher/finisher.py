@@ -41,7 +41,7 @@ class Finisher:
         self._folder = session
         self._looked_s = 0.0
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Report what has been finished, and begin with the next where no run goes on."""
         now_s = time.monotonic()
         if now_s - self._looked_s < LOOK_S:

@@ -72,7 +72,7 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
         return pid, reading
     code = 1
     try:
-        _let_go(writing)
+        _detach(writing)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         os.environ |= {PARENT_VARIABLE: str(parent), NICE_VARIABLE: str(nice)}
         die_with_parent()
@@ -87,7 +87,7 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
         _end(code)
 
 
-def _let_go(output: int) -> None:
+def _detach(output: int) -> None:
     """Give up what is the launcher's: its group, signals, files and terminal."""
     os.setpgid(0, 0)
     # What the terminal sent to all of the group until now was meant for the launcher.

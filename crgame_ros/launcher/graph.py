@@ -65,10 +65,10 @@ class Graph:
                 self._start(spec)
             while self._signal is None and self._nodes[first].exit_code() is None:
                 self._relay(0.1)
-                self._look_after(first)
+                self._restart_dead(first)
                 self._welcome()
                 if self._finisher is not None:
-                    self._finisher.look()
+                    self._finisher.poll()
             return self._end(first)
         finally:
             for node in self._nodes.values():
@@ -105,7 +105,7 @@ class Graph:
         for line in node.read_lines():
             self._say(f'[{node.spec.name:{self._width}}] {line}')
 
-    def _look_after(self, first: str) -> None:
+    def _restart_dead(self, first: str) -> None:
         """Name a node that died, and start it again where that is safe."""
         for name, node in list(self._nodes.items()):
             code = node.exit_code()
@@ -169,7 +169,7 @@ class Graph:
             self._relay(0.02)
         for node in nodes:
             if node.exit_code() is None:
-                node.tell_where()
+                node.print_stacks()
                 self._relay(WORD_S)
                 self._say(f'{node.spec.name} does not end: killed')
                 node.kill()

@@ -13,7 +13,7 @@ from types import FrameType
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def say(text: str) -> None:
+def print_now(text: str) -> None:
     """
     Print one line at once.
 

@@ -12,7 +12,7 @@ from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.forked_node import load
 from crgame_ros.launcher.graph import Graph
-from crgame_ros.launcher.interruption import say, writing
+from crgame_ros.launcher.interruption import print_now, writing
 from crgame_ros.launcher.main import ENDED_EARLY
 from crgame_ros.launcher.node_specs import node_specs, Roster, shared_modules
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
@@ -40,7 +40,7 @@ def launch(arguments: Sequence[str] | None = None) -> int:
             from crgame_ros.cockpit.access import new_token
             from crgame_ros.cockpit.replay_server import serve_replay
             return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
-                                new_token() if request.token else None, say=say)
+                                new_token() if request.token else None, say=print_now)
         require_ros()
         plan = plan_run(request)
         if plan.setup.game.traffic is not None:
@@ -48,22 +48,22 @@ def launch(arguments: Sequence[str] | None = None) -> int:
         announce(plan)
         # Killed processes leave 4 MB each.
         remove_stale()
-        finisher = Finisher(plan.folder, say, not request.no_report)
+        finisher = Finisher(plan.folder, print_now, not request.no_report)
         try:
             with compiling_when_idle(), held(os.environ['ROS_DOMAIN_ID'], request.namespace):
                 specs = node_specs(plan)
                 load(shared_modules(specs, plan))
-                graph = Graph(specs, say, Roster(plan.roster), finisher, request.namespace)
+                graph = Graph(specs, print_now, Roster(plan.roster), finisher, request.namespace)
                 began = True
                 code = graph.run()
         finally:
             shutil.rmtree(plan.private, ignore_errors=True)
             plan.roster.unlink(missing_ok=True)
             plan.claim.unlink(missing_ok=True)
-        with writing(say):
+        with writing(print_now):
             code = max(code, finisher.finish_all(graph.was_asked_to_end))
         finisher.write_reports()
-        say(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
+        print_now(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
         return code
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
@@ -71,7 +71,7 @@ def launch(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         if began:
             return 130
-        say(ENDED_EARLY)
+        print_now(ENDED_EARLY)
         return 0
 
 
@@ -83,10 +83,10 @@ def announce(plan: RunPlan) -> None:
     drivers = ', '.join(f'{human.id} driven by {setup.game.humans[index].driver}'
                         for index, human in enumerate(setup.humans))
     planners = ', '.join(f'{av.id} planned by {av.spec.planner}' for av in setup.avs)
-    say(f'{setup.game.title or setup.loaded.benchmark_id}: '
-        + ('; '.join(text for text in (drivers, planners) if text)
-           or 'nobody drives, traffic is alone'))
+    print_now(f'{setup.game.title or setup.loaded.benchmark_id}: '
+              + ('; '.join(text for text in (drivers, planners) if text)
+                 or 'nobody drives, traffic is alone'))
     for notice in setup.notices:
-        say(f'note: {notice}')
+        print_now(f'note: {notice}')
     reach = 'open network' if network_is_open() else 'this machine only'
-    say(f'ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]} ({reach}); files go to {plan.folder}')
+    print_now(f'ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]} ({reach}); files go to {plan.folder}')

@@ -93,7 +93,7 @@ class NodeProcess:
             # To a process that is still loading, SIGINT would mean a traceback.
             os.kill(self.pid, signal.SIGTERM)
 
-    def tell_where(self) -> None:
+    def print_stacks(self) -> None:
         """Have the node print what each of its threads is at."""
         if self.exit_code() is None:
             os.kill(self.pid, TELL_WHERE)

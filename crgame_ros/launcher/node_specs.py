@@ -23,7 +23,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     """List the nodes of a run: sim_node first, which waits for its companions, viewers last."""
     setup, request = plan.setup, plan.request
     companions = [
-        *participant_specs(Participants.of(setup), plan.roster),
+        *participant_specs(Participants.from_setup(setup), plan.roster),
         NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),

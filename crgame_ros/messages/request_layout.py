@@ -40,7 +40,7 @@ class RequestLayout:
     where: str
 
     @classmethod
-    def of(cls, names: Sequence[str], av: str, where: str = '') -> 'RequestLayout':
+    def from_names(cls, names: Sequence[str], av: str, where: str = '') -> 'RequestLayout':
         """
         Read joint names.
 

@@ -55,7 +55,7 @@ class CriticalityNode(ObserverNode[Criticality]):
         self._told, self._n, self._heartbeat_s = {}, -1, 0.0
         return Criticality(run, self._thresholds)
 
-    def tell(self, observer: Criticality, stamp_ns: int) -> None:
+    def publish(self, observer: Criticality, stamp_ns: int) -> None:
         """Publish what a tick has brought."""
         if observer.n == self._n:
             return
@@ -71,10 +71,10 @@ class CriticalityNode(ObserverNode[Criticality]):
         if beats:
             self._heartbeat_s = time.monotonic()
         for tick in observer.latest:
-            self._tell_vehicle(observer, tick, stamp_ns, beats)
+            self._publish_vehicle(observer, tick, stamp_ns, beats)
 
-    def _tell_vehicle(self, observer: Criticality, tick: TickMeasures, stamp_ns: int,
-                      beats: bool) -> None:
+    def _publish_vehicle(self, observer: Criticality, tick: TickMeasures, stamp_ns: int,
+                         beats: bool) -> None:
         """Tell of one vehicle, if it is time."""
         values, others = (each.tolist() for each in tick.worst())
         now = {name: (value, other) for name, value, other in zip(

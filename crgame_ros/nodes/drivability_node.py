@@ -39,7 +39,7 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
         self._spec = run.drivability
         return monitor
 
-    def tell(self, observer: DrivabilityMonitor, stamp_ns: int) -> None:
+    def publish(self, observer: DrivabilityMonitor, stamp_ns: int) -> None:
         """Report what has changed, or everything now and then."""
         due = observer.changed
         listeners = sum(each.get_subscription_count() for each in self._reports.values())

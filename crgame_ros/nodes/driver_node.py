@@ -170,7 +170,7 @@ class DriverNode(Node):
     def _publish(self) -> None:
         """Publish the command of the present cycle; the lock is held."""
         assert self._driver is not None and self._game is not None
-        self._tell_of_problem()
+        self._log_problem()
         if not self._driver.connected or self._cycle < 0 or self._silent:
             return
         scheduler = self._game.scheduler
@@ -200,7 +200,7 @@ class DriverNode(Node):
                 descriptor = None if self._driver is None else self._driver.fileno()
             if descriptor is None:
                 time.sleep(DEVICE_POLL_S)
-                self._look()
+                self._observe()
                 continue
             try:
                 select.select([descriptor], [], [], DEVICE_POLL_S)
@@ -211,14 +211,14 @@ class DriverNode(Node):
                 # The device went away between two looks; the driver finds it again.
                 time.sleep(DEVICE_POLL_S)
 
-    def _look(self) -> None:
+    def _observe(self) -> None:
         """Let a policy see what has come since the last cycle, as before the first one."""
         with self._lock:
             if self._driver is not None and self._driver.is_looking \
                     and self._driver.poll(time.monotonic()):
                 self._publish()
 
-    def _tell_of_problem(self) -> None:
+    def _log_problem(self) -> None:
         """Tell once of each new trouble with the device, and of its end."""
         assert self._driver is not None
         problem: InputError | None = self._driver.problem

@@ -72,12 +72,12 @@ class MarkerNode(Node):
             return
         if self._states is None:
             self._states = self._endpoints.polled('/vehicles/state', depth=1)
-        self._take_documents()
+        self._update_scene()
         if self._scene is None or self._set is None:
-            self._awaited.look(False, self._states.take() is not None)
+            self._awaited.check(False, self._states.pop() is not None)
             return
         now_s = time.monotonic()
-        self._look_for_newcomers(now_s)
+        self._resend_to_newcomers(now_s)
         if any(due_s <= now_s for due_s in self._map_due):
             self._map_due = [due_s for due_s in self._map_due if due_s > now_s]
             self._markers.publish(self._scene.map_message(self._clear))
@@ -85,8 +85,8 @@ class MarkerNode(Node):
             self._sent_s = -np.inf
         if self._clear:
             return
-        if self._take_states(self._scene, self._set) or now_s - self._sent_s > KEEP_ALIVE_S:
-            self._take_paths(self._scene)
+        if self._receive_states(self._scene, self._set) or now_s - self._sent_s > KEEP_ALIVE_S:
+            self._receive_paths(self._scene)
             self._markers.publish(self._scene.message())
             self._sent_s = now_s
 
@@ -106,7 +106,7 @@ class MarkerNode(Node):
         self._known.clear()
         self._looked_s = -np.inf
 
-    def _take_documents(self) -> None:
+    def _update_scene(self) -> None:
         """Build the scene anew when there is a new set of documents."""
         try:
             documents = self._documents.poll()
@@ -130,7 +130,7 @@ class MarkerNode(Node):
         self._transforms.place_sensors(documents.game.avs,
                                        documents.game.scheduler.clock_offset_ns)
 
-    def _look_for_newcomers(self, now_s: float) -> None:
+    def _resend_to_newcomers(self, now_s: float) -> None:
         """Have the map sent to whoever was not there before."""
         if now_s - self._looked_s < LOOK_S:
             return
@@ -141,7 +141,7 @@ class MarkerNode(Node):
             self._map_due = [now_s + after_s for after_s in MAP_AFTER_S]
         self._known = present
 
-    def _take_states(self, scene: SceneMarkers, documents: ScenarioSet) -> bool:
+    def _receive_states(self, scene: SceneMarkers, documents: ScenarioSet) -> bool:
         """Take the newest of everything that moves; tell whether there are new states."""
         offset_ns = documents.game.scheduler.clock_offset_ns
         if (signals := self._signals.latest()) is not None:
@@ -171,7 +171,7 @@ class MarkerNode(Node):
                                         states[:, :3].tolist(), stamp_ns)
         return True
 
-    def _take_paths(self, scene: SceneMarkers) -> None:
+    def _receive_paths(self, scene: SceneMarkers) -> None:
         for av_id, (plans, requests) in self._paths.items():
             try:
                 if (plan := plans.latest()) is not None:

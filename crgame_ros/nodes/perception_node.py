@@ -100,7 +100,7 @@ class PerceptionNode(Node):
         self._n = step.n
         stamp_ns = scheduler.stamp_ns(step.n)
         if self._report.worked(time.perf_counter() - begin_s):
-            self._tell(self._perception, stamp_ns)
+            self._publish_diagnostics(self._perception, stamp_ns)
         self._localization.publish(stamp_ns, self._perception)
         self._scans.publish(scheduler, self._perception)
         self._steps += 1
@@ -108,7 +108,7 @@ class PerceptionNode(Node):
             gc.collect()
         self._answer()
 
-    def _tell(self, perception: Perception, stamp_ns: int) -> None:
+    def _publish_diagnostics(self, perception: Perception, stamp_ns: int) -> None:
         """Report what the AV knows."""
         seen = int(perception.seen.sum())
         sigma = math.sqrt(max(perception.covariance[0, 0] + perception.covariance[1, 1], 0.0))

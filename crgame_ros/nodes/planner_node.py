@@ -77,13 +77,13 @@ class PlannerNode(Node):
         spin(self, stop)
 
     def _on_xml(self, message: String) -> None:
-        self._take_document('xml', message.data)
+        self._receive_document('xml', message.data)
 
     def _on_objects(self, message: String) -> None:
-        self._take_document('objects', message.data)
+        self._receive_document('objects', message.data)
 
     def _on_game(self, message: String) -> None:
-        self._take_document('game', message.data)
+        self._receive_document('game', message.data)
 
     def _on_events(self, message: String) -> None:
         try:
@@ -104,9 +104,9 @@ class PlannerNode(Node):
     def _on_frame_skip(self, message: Bool) -> None:
         self._frames_skipped = message.data
 
-    def _take_document(self, kind: str, text: str) -> None:
+    def _receive_document(self, kind: str, text: str) -> None:
         try:
-            self._documents.take(kind, text)
+            self._documents.add(kind, text)
         except InputError as error:
             # The game before goes on.
             self._refusals.note(f'/scenario/{kind}', str(error))

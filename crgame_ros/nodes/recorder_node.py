@@ -111,27 +111,27 @@ class RecorderNode(Node):
         if self._writer is not None:
             for recorded in list(self._topics.values()):
                 if not recorded.latched:
-                    self._take(recorded)
+                    self._write_waiting(recorded)
         else:
-            self._take(self._topics[CLOCK_TOPIC])
+            self._write_waiting(self._topics[CLOCK_TOPIC])
         # The game comes last of them: a new bag then begins with the documents that belong to it.
         latched = [recorded for recorded in self._topics.values() if recorded.latched]
         for recorded in sorted(latched, key=lambda item: item.name == GAME_TOPIC):
-            self._take(recorded)
+            self._write_waiting(recorded)
         if self._writer is not None:
             try:
                 self._writer.flush_if_due()
             except RecordingError as error:
-                self._tell(error)
+                self._report_failure(error)
             if self._ended_s is not None and time.monotonic() - self._ended_s > DRAIN_S:
                 self._close()
         if not self._recorded_told:
-            self._tell_recorded()
+            self._publish_recorded()
         if time.monotonic() - self._report_s > REPORT_S:
             self._report_s = time.monotonic()
             self._report(self._writer)
 
-    def _tell_recorded(self) -> None:
+    def _publish_recorded(self) -> None:
         """Tell whose messages arrive here: a run begins when everybody's do."""
         self._recorded_told = True
         self._publish_status(DiagnosticStatus.OK, RECORDED, {
@@ -153,8 +153,8 @@ class RecorderNode(Node):
                         subject: str = 'recording') -> None:
         self._endpoints.diagnostics.publish(f'recorder_node: {subject}', level, text, values)
 
-    def _take(self, recorded: RecordedTopic) -> None:
-        while (taken := recorded.slot.take_timed()) is not None:
+    def _write_waiting(self, recorded: RecordedTopic) -> None:
+        while (taken := recorded.slot.pop_timed()) is not None:
             data, published_ns, received_ns = taken
             if recorded.latched:
                 recorded.latest = (data, published_ns, received_ns)
@@ -168,12 +168,12 @@ class RecorderNode(Node):
                 self._follow(stamp_ns)
             elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
                     and b'ended' in data:
-                self._take_end(data)
+                self._note_end(data)
             self._write(recorded, data, published_ns, received_ns)
 
     def _follow(self, clock_ns: int) -> None:
         """Open another bag where time has run back: a recording is played once more."""
-        self._awaited.look(bool(self._game_text), True)
+        self._awaited.check(bool(self._game_text), True)
         course = self._time.follow(clock_ns)
         if course is TimeCourse.BEHIND:
             # Until it is certain to which run it belongs.
@@ -187,7 +187,7 @@ class RecorderNode(Node):
         for item in held:
             self._write(*item)
 
-    def _take_end(self, data: bytes) -> None:
+    def _note_end(self, data: bytes) -> None:
         """Note that the run has ended; an end that is told late may be that of the run before."""
         message: DiagnosticArray = deserialize_message(data, DiagnosticArray)
         if self._ended_s is None and from_time(message.header.stamp) >= self._offset_ns \
@@ -229,7 +229,7 @@ class RecorderNode(Node):
             while self._early:
                 self._write(*self._early.popleft())
         except CrgameError as error:
-            self._tell(error)
+            self._report_failure(error)
 
     @property
     def _goes_on(self) -> bool:
@@ -258,9 +258,9 @@ class RecorderNode(Node):
                 self._recorded.add(recorded.name)
                 self._recorded_told = False
         except RecordingError as error:
-            self._tell(error)
+            self._report_failure(error)
 
-    def _tell(self, error: CrgameError) -> None:
+    def _report_failure(self, error: CrgameError) -> None:
         """Say that recording has failed; driving goes on."""
         self.get_logger().error(str(error))
         self._publish_status(DiagnosticStatus.ERROR, str(error), {})
@@ -272,7 +272,7 @@ class RecorderNode(Node):
         try:
             writer.close()
         except RecordingError as error:
-            self._tell(error)
+            self._report_failure(error)
             return
         if writer.failed is None:
             self._closed = {'messages': writer.message_count, 'bytes': writer.bytes_written,

@@ -57,7 +57,7 @@ class SimNode(Node):
             self._run(stop)
 
     def _run(self, stop: StopFlag) -> None:
-        setup = self._told(build_setup(self._control.first_game()))
+        setup = self._announce(build_setup(self._control.first_game()))
         # Of others that it started a launcher knows.
         refuse_another(self, self._created_s + (DISCOVERY_S if self._control.roster is None
                                                 else 0.0))
@@ -108,12 +108,12 @@ class SimNode(Node):
     def _next_setup(self, present: Setup) -> Setup:
         """Load what the parameters name now; keep the present game if that is unusable."""
         try:
-            return self._told(build_setup(self._control.next_game(present.game)))
+            return self._announce(build_setup(self._control.next_game(present.game)))
         except CrgameError as error:
             self.get_logger().error(f'{error}; the present game starts again')
             return present
 
-    def _told(self, setup: Setup) -> Setup:
+    def _announce(self, setup: Setup) -> Setup:
         self._recorded = self._read_recordings(setup)
         self._write_roster(setup)
         for notice in setup.notices:
@@ -136,7 +136,7 @@ class SimNode(Node):
         path = self._control.roster
         if path is None:
             return
-        content = asdict(Participants.of(setup))
+        content = asdict(Participants.from_setup(setup))
         fresh = path.with_suffix('.new')
         try:
             fresh.write_text(json.dumps(content), encoding='utf-8')

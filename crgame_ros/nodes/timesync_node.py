@@ -50,7 +50,7 @@ class TimesyncNode(Node):
         message = self._games.latest()
         if message is not None:
             self._begin(message.data)
-        while (message := self._cycles.take()) is not None:
+        while (message := self._cycles.pop()) is not None:
             try:
                 self._add(CycleTable.from_message(message.layout.dim[1].label, message.data))
             except InputError as error:
@@ -62,7 +62,7 @@ class TimesyncNode(Node):
             self._report(metrics)
 
     def _add(self, table: CycleTable) -> None:
-        self._awaited.look(self._game is not None, True)
+        self._awaited.check(self._game is not None, True)
         if self._game is None or self._metrics is None or table.epoch != self._game.epoch:
             return
         stamp_ns = self._game.scheduler.stamp_ns(int(table.column('n')[-1]))

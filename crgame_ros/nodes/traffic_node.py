@@ -71,7 +71,7 @@ class TrafficNode(Node):
                 self._begin(scenario)
             message = self._events.latest()
             if message is not None:
-                self._take_events(message.data)
+                self._receive_events(message.data)
             ticks = list(self._world.steps()) if self._knows_the_events else []
             # A little late, the agents catch up; after a standstill they go on from where they
             # are by now.
@@ -93,7 +93,7 @@ class TrafficNode(Node):
         if self._scenario is not None:
             self._begin(self._scenario)
 
-    def _take_events(self, text: str) -> None:
+    def _receive_events(self, text: str) -> None:
         try:
             self._fired = parse_events_document(text)
         except InputError as error:

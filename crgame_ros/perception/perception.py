@@ -308,7 +308,8 @@ class Perception:
               accelerations: Array) -> None:
         """Put what is known of others into a request, and nothing else."""
         if self._layout is None or self._layout[0] != request.names:
-            found = RequestLayout.of(request.names, self.av_id, f'/{self.av_id}/true_request')
+            found = RequestLayout.from_names(request.names, self.av_id,
+                                             f'/{self.av_id}/true_request')
             number = {name: index for index, name in enumerate(self._ids)}
             self._layout = request.names, found.indices(number), found.columns
         _, told, where = self._layout

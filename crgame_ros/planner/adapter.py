@@ -74,7 +74,7 @@ class PlannerAdapter:
         self._setup_failure = None
         self.last_reason = None
         try:
-            self._limit = RoadLimit.of(context)
+            self._limit = RoadLimit.from_context(context)
             self.planner.setup(context)
         except Exception as error:
             self._keep_failure(error)

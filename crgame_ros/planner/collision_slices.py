@@ -62,7 +62,7 @@ class CollisionSlices:
         self._objects = context.objects
         self._vehicle = context.vehicle
         self._margin = margin
-        self._limit = RoadLimit.of(context)
+        self._limit = RoadLimit.from_context(context)
         self._slices: list[_Slice] = []
         self._k = 0
         # By how much samples may leave the road beyond the ego's present place [m].

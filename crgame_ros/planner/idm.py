@@ -128,7 +128,7 @@ class IdmPlanner(PathPlanner):
         verdict = change.judge(request)
         keeping = self._driving is change.kept
         if verdict is Verdict.BLOCKED and not keeping:
-            self._take_path(change.kept, request.ego)
+            self._set_path(change.kept, request.ego)
         elif verdict is Verdict.DONE and not keeping and self._driving.changes < 2:
             self._change = None
         elif verdict is Verdict.DONE or (keeping and verdict is Verdict.FREE):
@@ -272,7 +272,7 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
             if passed or gone:
                 coming = np.zeros_like(coming)
             if not passed and obstacles.speed[first, column] >= speed:
-                let_in[:first] = _let_in(
+                let_in[:first] = _courtesy_acceleration(
                     entry_s, ego_front + speed * entry_s - float(rear[first]), speed)
         result.append(Leader(rear.tolist(), obstacles.center[:, column].tolist(),
                              obstacles.speed[:, column].tolist(), blocking.tolist(),
@@ -280,7 +280,7 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
     return result
 
 
-def _let_in(entry_s: float, overlap: float, speed: float) -> float:
+def _courtesy_acceleration(entry_s: float, overlap: float, speed: float) -> float:
     """
     Return the acceleration with which somebody faster gets in ahead; infinity if none does.
 

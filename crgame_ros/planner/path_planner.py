@@ -87,11 +87,11 @@ class PathPlanner(Planner):
 
     def _plan_path(self, start: VehicleState) -> None:
         context = self._context
-        self._take_path(plan_driving_path(
+        self._set_path(plan_driving_path(
             context.scenario, context.planning_problem, start, context.vehicle,
             self.follow_lane), start)
 
-    def _take_path(self, driving: DrivingPath, start: VehicleState) -> None:
+    def _set_path(self, driving: DrivingPath, start: VehicleState) -> None:
         """Follow a path that was planned from where the vehicle is."""
         self._driving = driving
         self._planned_at = (start.x, start.y)

@@ -137,7 +137,7 @@ class ReactivePlanner(Planner):
 
     def _aims(self, request: PlanRequest, position: PathPosition) -> Iterator[_Aim]:
         """Go through the lanes that may be driven in, the best first."""
-        sides = side_lanes(self._driving, self._look(request, position), self._context.vehicle)
+        sides = side_lanes(self._driving, self._search_s(request, position), self._context.vehicle)
         nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
         free = float(self._idm.speeds(request, alone=True)[-1])
         own = self._aim(request, position, OWN_LANE, nearest, free)
@@ -148,7 +148,7 @@ class ReactivePlanner(Planner):
         aims = [own, *(self._aim(request, position, lane, nearest, free) for lane in sides)]
         yield from sorted(aim for aim in aims if aim is not None)
 
-    def _look(self, request: PlanRequest, position: PathPosition) -> float:
+    def _search_s(self, request: PlanRequest, position: PathPosition) -> float:
         """Return the arc length at which lanes are looked for [m]."""
         return position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
 
@@ -230,7 +230,7 @@ class ReactivePlanner(Planner):
         Those are the lane that the ego is in, and the ones where nobody is beside it and whoever
         comes from behind has the room that a lane change leaves him.
         """
-        sides = side_lanes(self._driving, self._look(request, position), self._context.vehicle)
+        sides = side_lanes(self._driving, self._search_s(request, position), self._context.vehicle)
         nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
         free = {lane for lane in (OWN_LANE, *sides)
                 if lane is nearest or self._idm.has_gap(request, lane, ahead_too=False)}

@@ -49,10 +49,10 @@ class PlannerRegistry(ModelRegistry):
         finally:
             self._given = earlier
 
-    def look_up(self, name: str, where: str, label: str) -> Any:
+    def resolve(self, name: str, where: str, label: str) -> Any:
         """Find what a name stands for; of an object the caller has given, its class."""
         if name not in self._given:
-            return super().look_up(name, where, label)
+            return super().resolve(name, where, label)
         given = self._given[name]
         return given if inspect.isclass(given) else type(given)
 

@@ -67,7 +67,7 @@ class RequestReader:
 
     def _learn(self, names: tuple[str, ...]) -> None:
         """Find out which columns hold which object; the joints stay the same over a run."""
-        layout = RequestLayout.of(names, self._vehicle_id)
+        layout = RequestLayout.from_names(names, self._vehicle_id)
         layout.indices({name: number for number, name in enumerate(self._objects)})
         self._ids, self._columns = layout.ids, layout.columns
         self._to_center = np.array([self._objects[object_id].rear_to_center

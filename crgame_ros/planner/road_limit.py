@@ -38,7 +38,7 @@ class RoadLimit:
         self._now = 0.0
 
     @classmethod
-    def of(cls, context: PlannerContext) -> 'RoadLimit':
+    def from_context(cls, context: PlannerContext) -> 'RoadLimit':
         """Make the limit of a planner; its road boundary is made ready around the start."""
         # Without a lanelet there is no road that could be left.
         if not context.keep_road or not context.scenario.lanelet_network.lanelets:

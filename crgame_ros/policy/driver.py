@@ -87,9 +87,9 @@ class PolicyDriver(DriverSource):
         place = self._guide.follow(state)
         if self._action is not None and (n // self._seat.steps_per_tick) % self._policy.ticks:
             return
-        around = self._view.of(vehicle_states, objects)
-        seen = self._observation.of([state], [place], [self._guide], around.poses[None],
-                                    around.velocities[None])
+        around = self._view.observe(vehicle_states, objects)
+        seen = self._observation.observe([state], [place], [self._guide], around.poses[None],
+                                         around.velocities[None])
         self._action = checked_action(self._policy.action, self._policy.act(
             {part: values[0] for part, values in seen.items()}))
         self._decided_speed = state.speed

@@ -54,8 +54,8 @@ class Observation:
                 'lidar', field_of_view=2.0 * np.pi, horizon=spec.horizon, rays=spec.rays))
             self._bodies = SensedBodies(things)
 
-    def of(self, states: Sequence[VehicleState], places: Sequence[RoutePlace],
-           guides: Sequence[RouteGuide], poses: Array, velocities: Array) -> Observed:
+    def observe(self, states: Sequence[VehicleState], places: Sequence[RoutePlace],
+                guides: Sequence[RouteGuide], poses: Array, velocities: Array) -> Observed:
         """
         Observe B vehicles.
 

@@ -49,9 +49,9 @@ class PolicyPlanner(Planner):
         decided, place = self._decided_k, self._guide.follow(request.ego)
         if decided is None or not 0 < request.k - decided < self._policy.ticks:
             self._decided_k = request.k
-            around = self._view.of(request)
-            seen = self._observation.of([request.ego], [place], [self._guide],
-                                        around.poses[None], around.velocities[None])
+            around = self._view.observe(request)
+            seen = self._observation.observe([request.ego], [place], [self._guide],
+                                             around.poses[None], around.velocities[None])
             self._action = checked_action(self._policy.action, self._policy.act(
                 {part: values[0] for part, values in seen.items()}))
         states = planned_states(

@@ -43,7 +43,7 @@ class RequestView:
         self.things = tuple(item for key, item in objects.items() if key != vehicle_id)
         self._rows = {item.id: row for row, item in enumerate(self.things)}
 
-    def of(self, request: PlanRequest) -> Surrounded:
+    def observe(self, request: PlanRequest) -> Surrounded:
         """Return what is around the AV at the time of the request; the predictions stay unread."""
         poses, velocities = np.full((2, len(self.things), 3), np.nan)
         rows = [self._rows[name] for name in request.obstacle_ids]
@@ -77,7 +77,7 @@ class SeatView:
         x, y, yaw = self._transform.to_scenario(states[self._row, :3]).tolist()
         return state._replace(x=x, y=y, yaw=yaw)
 
-    def of(self, states: Array, objects: ObjectStates) -> Surrounded:
+    def observe(self, states: Array, objects: ObjectStates) -> Surrounded:
         """
         Return what is around it.
 

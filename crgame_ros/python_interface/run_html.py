@@ -40,7 +40,7 @@ def replays_html(recorded: Criticality, alternatives: Sequence[Alternative]) -> 
 def _picture(run: 'Run') -> str:
     if not run.vehicles:
         return ''
-    touches = [Touch.of(item) for item in run.contacts or () if item['n'] is not None]
+    touches = [Touch.from_entry(item) for item in run.contacts or () if item['n'] is not None]
     moments = critical_moments(run.record, run.usual_criticality, touches)
     if not moments:
         return ''

@@ -66,7 +66,7 @@ def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioSchedul
         return Stretch(np.empty(0, dtype=np.int64), ())
     last_seen = max(int(ns[-1]) for ns in recorded.values()) // per_tick
     return Stretch(per_tick * np.arange(first, end), tuple(
-        _told(gaps, k0 + first, k0 + end - 1, k0 + last_seen, k0)))
+        _describe_gaps(gaps, k0 + first, k0 + end - 1, k0 + last_seen, k0)))
 
 
 def farthest(scheduler: ScenarioScheduler) -> int:
@@ -85,8 +85,8 @@ def piece_around(ns: IntArray, n: int, scheduler: ScenarioScheduler) -> IntArray
     return next(piece for piece in pieces if n <= piece[-1])
 
 
-def _told(gaps: Sequence[tuple[int, str]], first: int, last: int, last_seen: int,
-          k0: int) -> list[str]:
+def _describe_gaps(gaps: Sequence[tuple[int, str]], first: int, last: int, last_seen: int,
+                   k0: int) -> list[str]:
     """Return which scenario steps a stretch has, where that are not all."""
     if gaps:
         texts = [text for _, text in sorted(gaps)]

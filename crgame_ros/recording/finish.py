@@ -51,7 +51,7 @@ def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True
     :return: OK, FAILED if something could not be written, EMPTY if nothing was recorded.
     """
     code = OK
-    tell = say if progress else _tell_nobody
+    tell = say if progress else _discard
     bags = bags_of(folder)
     # A recorder that was started again went on in another folder.
     runs = [bag for bag in bags if not any(bag in parts_of(other)[1:] for other in bags)]
@@ -78,7 +78,7 @@ def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True
     return code
 
 
-def _tell_nobody(_line: str) -> None:
+def _discard(_line: str) -> None:
     """Take word of progress that nobody reads in time."""
 
 

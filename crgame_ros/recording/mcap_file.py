@@ -57,7 +57,7 @@ class McapIndex:
         self._chunks: dict[int, Extent] = {}
         self._sound = True
 
-    def take(self, opcode: int, data: bytes, chunk: int | None) -> None:
+    def add(self, opcode: int, data: bytes, chunk: int | None) -> None:
         """
         Take up a record.
 
@@ -222,7 +222,7 @@ class McapFile:
             else:
                 self._close_run(run)
                 try:
-                    self._take(stream, opcode, position, end)
+                    self._read_record(stream, opcode, position, end)
                 except _DAMAGES:
                     self.useless_bytes += end - position
             stream.seek(end)
@@ -251,7 +251,7 @@ class McapFile:
         self.segments = [replace(segment, channels=self._index.channels(segment.offset))
                          for segment in self.segments]
 
-    def _take(self, stream: BinaryIO, opcode: int, position: int, end: int) -> None:
+    def _read_record(self, stream: BinaryIO, opcode: int, position: int, end: int) -> None:
         length = end - position - _RECORD.size
         if opcode == Opcode.CHUNK:
             start_ns, end_ns, _, _, _ = _CHUNK.unpack(stream.read(_CHUNK.size))
@@ -265,7 +265,7 @@ class McapFile:
             chunk = last.offset if last is not None and last.chunked else None
             # Of its entries, one a message, their number is enough.
             size = MESSAGE_INDEX_HEAD.size if opcode == Opcode.MESSAGE_INDEX else length
-            self._index.take(opcode, stream.read(min(size, length)), chunk)
+            self._index.add(opcode, stream.read(min(size, length)), chunk)
         elif opcode == Opcode.HEADER:
             self.header = Header.read(ReadDataStream(BytesIO(stream.read(length))))
         elif opcode == Opcode.DATA_END:

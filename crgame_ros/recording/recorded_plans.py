@@ -101,7 +101,7 @@ def read_plans(path: Path, epoch: int | None = None,
             yield RecordedPlan(
                 av, stamp_ns, None if n is None else run.game.scheduler.k(n),
                 math.nan if lapse_ns is None else lapse_ns * 1e-9, plan, fault,
-                None if asked is None else _told(asked, av))
+                None if asked is None else _requested_state(asked, av))
 
 
 def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[Plan | None, str]:
@@ -112,7 +112,7 @@ def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[
         return None, error.what
 
 
-def _told(message: BagMessage, av: str) -> VehicleState | None:
+def _requested_state(message: BagMessage, av: str) -> VehicleState | None:
     """Return the state of the AV itself in a request; None if it does not say."""
     try:
         head = request_head(message.data, message.topic)

@@ -95,7 +95,7 @@ def _readable_tables(reader: BagReader) -> Iterator[CycleTable]:
                     raise InputError(f'{CYCLE_TOPIC} is not labelled', str(reader.path),
                                      'record with this version')
                 table = CycleTable.from_message(decoded.layout.dim[1].label, decoded.data)
-                shape = _Shape.of(message.data, decoded, table.columns)
+                shape = _Shape.find(message.data, decoded, table.columns)
             # The epoch of nothing is none.
             epoch = table.epoch
         except (InputError, IndexError, ValueError) as error:
@@ -131,7 +131,7 @@ class _Shape(NamedTuple):
     columns: tuple[str, ...]
 
     @classmethod
-    def of(cls, data: bytes, decoded: Any, columns: tuple[str, ...]) -> '_Shape | None':
+    def find(cls, data: bytes, decoded: Any, columns: tuple[str, ...]) -> '_Shape | None':
         """Find it in a message that has been decoded; None where it is laid out otherwise."""
         place = 8
         for dim in decoded.layout.dim:

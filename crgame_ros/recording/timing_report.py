@@ -139,7 +139,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
         numbers = cycles.column('n')
         collected = _Collector(run)
         for message in reader.messages(collected.topics):
-            collected.take(message, reader)
+            collected.add(message, reader)
         contacts, unknown = _contacts(reader, run, collected.verdicts, collected.fired)
         return {
             **metrics.summary().as_dict(),
@@ -214,11 +214,11 @@ class _Collector:
         self.sound = SeatSound()
         self.view = ViewPeriods()
 
-    def take(self, recorded: BagMessage, reader: BagReader) -> None:
+    def add(self, recorded: BagMessage, reader: BagReader) -> None:
         """Take one message; those of other runs, and those that are none, are passed over."""
         topic, _, log_time_ns, data = recorded
         if topic == EVENTS_TOPIC:
-            self._take_events(recorded, reader)
+            self._add_events(recorded, reader)
             return
         stamp_ns = header_stamp_ns(data)
         if not self._run.holds(stamp_ns, log_time_ns):
@@ -227,7 +227,7 @@ class _Collector:
         if topic in self._requests:
             self._open.sent(self._requests[topic], stamp_ns, log_time_ns)
         elif topic in self._plans:
-            self._take_plan(self._plans[topic], stamp_ns, log_time_ns)
+            self._add_plan(self._plans[topic], stamp_ns, log_time_ns)
         else:
             try:
                 message = reader.decode(recorded).message
@@ -236,11 +236,11 @@ class _Collector:
                 return
             for status in message.status:
                 if topic in self._verdicts:
-                    self._take_verdict(self._verdicts[topic], status)
+                    self._add_verdict(self._verdicts[topic], status)
                 else:
-                    self._take_status(status, stamp_ns)
+                    self._add_status(status, stamp_ns)
 
-    def _take_events(self, recorded: BagMessage, reader: BagReader) -> None:
+    def _add_events(self, recorded: BagMessage, reader: BagReader) -> None:
         """Take what has taken effect since the start of the run; each message tells all of it."""
         try:
             epoch, fired = parse_events_document(reader.decode(recorded).message.data)
@@ -250,7 +250,7 @@ class _Collector:
         if epoch == self._run.game.epoch:
             self.fired = fired
 
-    def _take_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
+    def _add_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1
         lapse_ns = self._open.answered(av, stamp_ns, log_time_ns)
         if lapse_ns is None:
@@ -262,12 +262,12 @@ class _Collector:
         else:
             self._latencies_ms[av].append(latency_ms)
 
-    def _take_status(self, status: Any, stamp_ns: int) -> None:
+    def _add_status(self, status: Any, stamp_ns: int) -> None:
         told = read_status(status)
         values = told.values
         self._statuses[status.name] = values
-        self.sound.take(told)
-        self.view.take(told, (stamp_ns - self._run.game.scheduler.clock_offset_ns) * 1e-9)
+        self.sound.add(told)
+        self.view.add(told, (stamp_ns - self._run.game.scheduler.clock_offset_ns) * 1e-9)
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
             if status.message.startswith(_BRAKING):
@@ -276,7 +276,7 @@ class _Collector:
         elif status.name.startswith('sim_node: ') and values.get('age_ms'):
             self._ages_ms[status.name].append(float(values['age_ms']))
 
-    def _take_verdict(self, vehicle: str, status: Any) -> None:
+    def _add_verdict(self, vehicle: str, status: Any) -> None:
         """Note what has begun to be violated; heartbeats repeat what lasts."""
         violated = set(status.message.split('; ')) if status.level else set()
         values = read_status(status).values

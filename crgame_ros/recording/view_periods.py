@@ -19,7 +19,7 @@ class SeatSound:
     def __init__(self) -> None:
         self._told: dict[str, list[tuple[bool, float, float]]] = {}
 
-    def take(self, status: Status) -> None:
+    def add(self, status: Status) -> None:
         """Take a status; one of something else, or of somebody who tells no shares, is no news."""
         found = _SOUND_NAME.fullmatch(status.name)
         if found is None:
@@ -74,7 +74,7 @@ class ViewPeriods:
     def __init__(self) -> None:
         self._told: dict[str, list[_Told]] = {}
 
-    def take(self, status: Status, time_s: float) -> None:
+    def add(self, status: Status, time_s: float) -> None:
         """
         Take a status; one of something else, or of a page that has told nothing yet, is no news.
 

@@ -75,13 +75,13 @@ class PolledSubscription:
         self._read = read
         self._refuse = refuse
 
-    def take(self) -> Any | None:
+    def pop(self) -> Any | None:
         """Take the oldest waiting message (or its bytes, if raw); None if there is none."""
-        taken = self.take_timed()
+        taken = self.pop_timed()
         return None if taken is None else taken[0]
 
-    def take_timed(self) -> tuple[Any, int, int] | None:
-        """Take like `take`, with the times of publication and reception [ns since 1970]."""
+    def pop_timed(self) -> tuple[Any, int, int] | None:
+        """Return what `pop` does, with the times of publication and reception [ns since 1970]."""
         subscription = self.subscription
         # A flood of what cannot be used waits its turn.
         for _ in range(MAX_PASSED_OVER):
@@ -104,7 +104,7 @@ class PolledSubscription:
     def latest(self) -> Any | None:
         """Take all waiting messages and give the newest; None if there is none."""
         newest = None
-        while (message := self.take()) is not None:
+        while (message := self.pop()) is not None:
             newest = message
         return newest
 

@@ -29,7 +29,7 @@ class HeardTopics:
 
     def missing(self, wanted: set[str]) -> set[str]:
         """Return the topics of which the recorder has no message yet."""
-        while (message := self._slot.take()) is not None:
+        while (message := self._slot.pop()) is not None:
             for status in message.status:
                 values = read_status(status).values
                 if status.name == f'recorder_node: {RECORDED}' \

@@ -68,7 +68,7 @@ class LiveForce:
         try:
             while not self._ended.wait(pause_s):
                 start_s = time.monotonic()
-                self._look(force, start_s)
+                self._check_force(force, start_s)
                 felt = force.step(start_s, self._driving())
                 if force.problem != self._told:
                     self._told = force.problem
@@ -82,7 +82,7 @@ class LiveForce:
         finally:
             force.close()
 
-    def _look(self, force: ForceFeedback, now_s: float) -> None:
+    def _check_force(self, force: ForceFeedback, now_s: float) -> None:
         assert self._motion is not None and self._drivability is not None
         odom = self._motion.latest()
         if odom is not None:

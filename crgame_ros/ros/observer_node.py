@@ -44,7 +44,7 @@ class ObserverNode(Node, ABC, Generic[Observer]):
         """
 
     @abstractmethod
-    def tell(self, observer: Observer, stamp_ns: int) -> None:
+    def publish(self, observer: Observer, stamp_ns: int) -> None:
         """
         Publish what there is to say of a state, which has just been observed.
 
@@ -94,4 +94,4 @@ class ObserverNode(Node, ABC, Generic[Observer]):
         stamp_ns = self.endpoints.diagnostics.now_ns = scheduler.stamp_ns(step.n)
         self._observer.observe(step.n, scheduler.since_tick_s(step.n), step.states,
                                step.objects if step.tick else None)
-        self.tell(self._observer, stamp_ns)
+        self.publish(self._observer, stamp_ns)

@@ -31,7 +31,7 @@ def refuse_another(node: Node, until_s: float) -> None:
     heard = endpoints.polled('/diagnostics')
     until_s = time.monotonic() + ALIVE_S
     while time.monotonic() < until_s:
-        message = heard.take()
+        message = heard.pop()
         statuses = [] if message is None else message.status
         if any(item.name == 'sim_node: run' for item in statuses):
             raise InputError(

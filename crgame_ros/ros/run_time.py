@@ -72,7 +72,7 @@ class GameAwaited:
         self._since_s: float | None = None
         self._told = False
 
-    def look(self, known: bool, heard: bool) -> None:
+    def check(self, known: bool, heard: bool) -> None:
         """
         Take in how it stands.
 

@@ -54,7 +54,7 @@ class DocumentCollector:
         self._given: dict[str, str] = {}
         self._loaded: LoadedScenario | None = None
 
-    def take(self, kind: str, text: str) -> None:
+    def add(self, kind: str, text: str) -> None:
         """
         Take a document.
 
@@ -112,7 +112,7 @@ class ScenarioDocuments:
         for kind, slot in self._slots.items():
             if (document := slot.latest()) is not None:
                 try:
-                    self._collector.take(kind, document.data)
+                    self._collector.add(kind, document.data)
                     fresh = True
                 except InputError as error:
                     # The one before goes on.

@@ -79,7 +79,7 @@ class Seat:
         return self.tenant is not None and self.tenant.here and self.tenant.ready
 
     @property
-    def told_source(self) -> str:
+    def published_source(self) -> str:
         """Whose commands the vehicle obeys, as /seats says it."""
         return REPLAY if self.taken_over_again and self.source == PLANNER else self.source
 
@@ -115,7 +115,7 @@ class Seat:
         """Take the latest command that has come; tell whether there was any so far."""
         for _ in range(COMMAND_DEPTH):
             try:
-                message = self.commands.take()
+                message = self.commands.pop()
             except InputError:
                 self.malformed += 1
                 continue

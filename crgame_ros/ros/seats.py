@@ -149,22 +149,22 @@ class Seats:
         return tuple(seat.id for seat in self.humans if seat.awaits_driver(now_ns))
 
     @property
-    def of_cockpits(self) -> list[Seat]:
+    def cockpit_seats(self) -> list[Seat]:
         """Return the seats that the game leaves to people at pages, and that nobody else has."""
         return [seat for seat in self.humans if seat.home == seat.source == COCKPIT]
 
     def document(self) -> str:
         """Write /seats."""
-        return json.dumps({seat.id: seat_entry(seat.told_source, seat.driver, seat.tenant)
+        return json.dumps({seat.id: seat_entry(seat.published_source, seat.driver, seat.tenant)
                            for seat in self.all})
 
     def driven(self) -> Iterator[Driven]:
         """Yield what each seat is driven by, but for AVs that follow their plans."""
         for seat in self.all:
-            if seat.told_source != PLANNER:
+            if seat.published_source != PLANNER:
                 person = None if seat.tenant is None or not seat.tenant.here \
                     else seat.tenant.person
-                yield seat.id, seat.told_source, seat.driver, person
+                yield seat.id, seat.published_source, seat.driver, person
 
     def repetition_changed(self) -> bool:
         """Return whether a recorded take-over of an AV has begun or ended since the last call."""
@@ -172,7 +172,7 @@ class Seats:
         self._taken_over_again = [seat.taken_over_again for seat in self.avs]
         return self._taken_over_again != before and any((*before, *self._taken_over_again))
 
-    def take_orders(self, now_ns: int) -> tuple[bool, list[str]]:
+    def apply_orders(self, now_ns: int) -> tuple[bool, list[str]]:
         """
         Obey the orders that have come; a flood waits its turn.
 
@@ -181,7 +181,7 @@ class Seats:
         """
         changed, refusals = False, []
         for _ in range(MAX_ORDERS):
-            message = self._orders.take()
+            message = self._orders.pop()
             if message is None:
                 break
             try:
@@ -200,12 +200,12 @@ class Seats:
         if demand.source is None:
             self._seat_person(seat, demand)
         elif demand.source == COCKPIT:
-            self._take_by_cockpit(seat, demand, now_ns)
+            self._assign_to_cockpit(seat, demand, now_ns)
         else:
-            self._take(seat, demand.source, now_ns)
+            self._assign(seat, demand.source, now_ns)
         return (seat.source, seat.tenant) != before
 
-    def _take(self, seat: Seat, source: str, now_ns: int) -> None:
+    def _assign(self, seat: Seat, source: str, now_ns: int) -> None:
         """Let another source have a seat."""
         if source == PLANNER != seat.home:
             raise InputError(f'{seat.id} has no planner', ORDER_TOPIC, 'give game')
@@ -220,7 +220,7 @@ class Seats:
         if source != seat.source:
             seat.obey(source, now_ns)
 
-    def _take_by_cockpit(self, seat: Seat, demand: SeatDemand, now_ns: int) -> None:
+    def _assign_to_cockpit(self, seat: Seat, demand: SeatDemand, now_ns: int) -> None:
         """Put a person at a page into a seat, unless another one was quicker."""
         sits = None if seat.tenant is None else seat.tenant.person
         taker = demand.person
@@ -228,7 +228,7 @@ class Seats:
             raise InputError(f'{sits.name or "somebody"} has {seat.id}', ORDER_TOPIC,
                              'ask for it')
         if seat.source != COCKPIT:
-            self._take(seat, COCKPIT, now_ns)
+            self._assign(seat, COCKPIT, now_ns)
         if taker is not None:
             same = seat.tenant is not None and seat.tenant.person.id == taker.id
             self._settle(seat, replace(seat.tenant, person=taker, here=True)

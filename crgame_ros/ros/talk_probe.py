@@ -40,11 +40,11 @@ def listen() -> None:
     node = rclpy.create_node('crgame_doctor_listener')
     sent_ns, received_ns = [], []
 
-    def take(message: Int64) -> None:
+    def receive(message: Int64) -> None:
         received_ns.append(time.monotonic_ns())
         sent_ns.append(message.data)
 
-    node.create_subscription(Int64, PROBE_TOPIC, take, 1)
+    node.create_subscription(Int64, PROBE_TOPIC, receive, 1)
     while (len(sent_ns) < PROBE_MESSAGES
            and time.monotonic_ns() - started_ns < DISCOVERY_TIMEOUT_S * 1e9):
         rclpy.spin_once(node, timeout_sec=0.1)

@@ -80,15 +80,15 @@ class WorldFollower:
 
     def drop(self) -> None:
         """Let go what has come: of a run that is not known it may be the end."""
-        self._take_states()
+        self._receive_states()
         self._waiting.clear()
 
     def steps(self) -> Iterator[WorldStep]:
         """Yield every step that is complete, once."""
-        self._take_states()
+        self._receive_states()
         if self._scenario is None:
             return
-        self._take_objects(self._scenario)
+        self._receive_objects(self._scenario)
         while self._waiting:
             step = self._complete(self._scenario, self._waiting[0])
             if step is None:
@@ -97,8 +97,8 @@ class WorldFollower:
             if step.n >= 0:
                 yield step
 
-    def _take_states(self) -> None:
-        while (message := self._states.take()) is not None:
+    def _receive_states(self) -> None:
+        while (message := self._states.pop()) is not None:
             course = self._time.follow(from_time(message.header.stamp))
             if course is TimeCourse.BACK:
                 self._waiting.clear()
@@ -108,9 +108,9 @@ class WorldFollower:
             if course is not TimeCourse.BEHIND:
                 self._waiting.append(message)
 
-    def _take_objects(self, scenario: ScenarioSet) -> None:
+    def _receive_objects(self, scenario: ScenarioSet) -> None:
         scheduler = scenario.game.scheduler
-        while (message := self._objects.take()) is not None:
+        while (message := self._objects.pop()) is not None:
             n = scheduler.tick_of_stamp(from_time(message.header.stamp))
             if n is None:
                 continue

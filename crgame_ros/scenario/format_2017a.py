@@ -38,7 +38,7 @@ def upgrade(root: etree._Element) -> list[str]:
     for neighbour in root.iterfind('lanelet/*[@drivingDirection]'):
         neighbour.set('drivingDir', neighbour.attrib.pop('drivingDirection'))
     for obstacle in root.iterchildren('obstacle'):
-        _give_start(obstacle)
+        _add_initial_state(obstacle)
     notices = []
     for problem in root.iterchildren('planningProblem'):
         first = problem.find('state')
@@ -55,7 +55,7 @@ def upgrade(root: etree._Element) -> list[str]:
             + (', its times as seconds' if seconds else ''), *notices]
 
 
-def _give_start(obstacle: etree._Element) -> None:
+def _add_initial_state(obstacle: etree._Element) -> None:
     """Give an obstacle the initial state that 2018b wants of it."""
     if obstacle.find('initialState') is not None:
         return

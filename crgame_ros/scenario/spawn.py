@@ -108,7 +108,7 @@ def place_human(network: RoadNetwork, spec: HumanSpec, parameters: VehicleParame
         return _on_lanelet(network, spec.spawn, spec.id)
     states = [*avs, *others]
     known = [parameters] * len(states) if vehicles is None else list(vehicles)
-    scene = _Scene.of(states, known, obstacles, obstacle_states)
+    scene = _Scene.from_states(states, known, obstacles, obstacle_states)
     places = _near_av(network, parameters, avs[0]) if avs else _road_starts(network, parameters)
     wanted = avs[0].speed if avs else 0.0
     second_best: VehicleState | None = None
@@ -138,8 +138,8 @@ class _Scene:
     widths: NDArray[np.float64]
 
     @classmethod
-    def of(cls, states: Sequence[VehicleState], vehicles: Sequence[VehicleParameters],
-           obstacles: Sequence[ObjectDescription], at_k0: ObjectStates) -> '_Scene':
+    def from_states(cls, states: Sequence[VehicleState], vehicles: Sequence[VehicleParameters],
+                    obstacles: Sequence[ObjectDescription], at_k0: ObjectStates) -> '_Scene':
         shapes: list[Shape] = []
         rows: list[tuple[float, ...]] = []
         for state, vehicle in zip(states, vehicles, strict=True):

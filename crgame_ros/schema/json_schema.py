@@ -47,7 +47,7 @@ def json_schema(kind: type[Any], title: str) -> Schema:
     :param title: what the file is, for people.
     """
     describer = _Describer()
-    top = describer.of(kind)
+    top = describer.describe(kind)
     return {'$schema': DIALECT, 'title': title, **top, '$defs': describer.definitions}
 
 
@@ -57,7 +57,7 @@ class _Describer:
     def __init__(self) -> None:
         self.definitions: dict[str, Schema] = {}
 
-    def of(self, hint: Any, marks: tuple[Any, ...] = ()) -> Schema:
+    def describe(self, hint: Any, marks: tuple[Any, ...] = ()) -> Schema:
         hint, own = split(hint)
         marks = (*marks, *own)
         special = mark_of(marks, Special)
@@ -95,11 +95,11 @@ class _Describer:
         bounds = tuple(mark for mark in marks if isinstance(mark, Within))
         if items[-1] is Ellipsis:
             listed = mark_of(marks, Listed) or Listed()
-            return {'type': 'array', 'items': self.of(items[0], bounds)} \
+            return {'type': 'array', 'items': self.describe(items[0], bounds)} \
                 | ({'minItems': listed.least} if listed.least else {}) \
                 | ({'maxItems': listed.most} if listed.most else {})
         parts = mark_of(marks, Parts)
-        return {'type': 'array', 'prefixItems': [self.of(item, bounds) for item in items],
+        return {'type': 'array', 'prefixItems': [self.describe(item, bounds) for item in items],
                 'items': False, 'minItems': len(items) - (parts.optional if parts else 0)}
 
     def _mapping(self, kind: Any) -> Schema:
@@ -113,7 +113,7 @@ class _Describer:
             keyed = key.mark(Keyed)
             if keyed is not None:
                 schema['required'].remove(key.name)
-                properties |= {name: self.of(one) for name, one in keyed.kinds.items()}
+                properties |= {name: self.describe(one) for name, one in keyed.kinds.items()}
                 schema['oneOf'] = [{'required': [name]} for name in keyed.kinds]
             elif form.rest == key.field:
                 schema['additionalProperties'] = True
@@ -141,7 +141,7 @@ class _Describer:
         default = key.default
         if default is not MISSING and default is not None and default != math.inf:
             said['default'] = write(default)
-        return {**self.of(key.hint, key.marks), **said}
+        return {**self.describe(key.hint, key.marks), **said}
 
 
 def _is_required(key: Key) -> bool:

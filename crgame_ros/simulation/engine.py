@@ -254,7 +254,7 @@ class Simulation:
     def conclude(self) -> StepResult:
         """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
-        self._indicators.look(self.n, self.avs)
+        self._indicators.update(self.n, self.avs)
         result = self._result()
         self._add_to_hash()
         own = () if self._stopped is None else self._stopped.events_at(self.n)
@@ -268,7 +268,7 @@ class Simulation:
             if av.route_lane is not None and not av.driven:
                 av.route_lane.measure(av.state)
         objects = self._world.advance(k)
-        fired = () if self._events is None else self._take_effect(self._events, k, objects)
+        fired = () if self._events is None else self._apply_events(self._events, k, objects)
         if self._tasks is not None:
             self._tasks.at_tick(self.n, k, self.states, objects, fired)
         objects = self._world.settle(self.states)
@@ -286,8 +286,8 @@ class Simulation:
         return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k,
                           self._task_entries())
 
-    def _take_effect(self, events: RunEvents, k: int,
-                     objects: ObjectStates) -> tuple[FiredEvent, ...]:
+    def _apply_events(self, events: RunEvents, k: int,
+                      objects: ObjectStates) -> tuple[FiredEvent, ...]:
         """Let events change what is there and who plans, at a tick."""
         for name in () if self._tasks is None else self._tasks.due_events(self.n):
             # It may have taken effect before.

@@ -62,7 +62,7 @@ class PlanIndicator:
         self._before: int | None = None
         self.shown = 0
 
-    def take(self, poses: NDArray[np.float64]) -> None:
+    def update(self, poses: NDArray[np.float64]) -> None:
         """
         Look at what is left of a plan.
 
@@ -194,7 +194,7 @@ class PlanIndicators:
         """Count the steps of a tick in which plans are looked at: where requests are not made."""
         return max(1, self._scheduler.steps_per_tick - 1)
 
-    def look(self, n: int, avs: Sequence[AutonomousVehicle]) -> None:
+    def update(self, n: int, avs: Sequence[AutonomousVehicle]) -> None:
         """Look, at step n, at the plan of the AV whose turn it is, and forget unused ones."""
         turn = self._turn(n)
         for place, (indicator, av) in enumerate(zip(self._each, avs, strict=False)):
@@ -206,7 +206,7 @@ class PlanIndicators:
             if av.driven or av.uses_no_plan or age is None or n - age < self._driven_n[place]:
                 indicator.forget()
             elif place == turn:
-                indicator.take(self._coming(n, av))
+                indicator.update(self._coming(n, av))
             self.shown[place] = indicator.shown
 
     def _turn(self, n: int) -> int | None:

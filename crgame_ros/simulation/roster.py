@@ -30,7 +30,7 @@ class Participants:
     code: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, setup: Setup) -> 'Participants':
+    def from_setup(cls, setup: Setup) -> 'Participants':
         """Read them from a run."""
         return cls({human.id: human.driver for human in setup.humans},
                    {av.id: av.spec.planner for av in setup.avs},

@@ -211,7 +211,7 @@ class RunTasks:
         """
         self._n = n
         for report in self._reports:
-            self._take(self._courses[report.task], report)
+            self._add_report(self._courses[report.task], report)
         self._reports.clear()
         for course in self._courses.values():
             task = course.spec.task
@@ -266,7 +266,7 @@ class RunTasks:
         elif course.prompt and self._n - course.prompt.n >= self._steps(task.lead + task.shown):
             self._close(course, 'over', 'time')
 
-    def _take(self, course: _Course, report: TaskReport) -> None:
+    def _add_report(self, course: _Course, report: TaskReport) -> None:
         task, prompt, times = course.spec.task, course.prompt, report.times
         concerns = prompt is not None and prompt.number == report.number
         if report.what == 'shown':

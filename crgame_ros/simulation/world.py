@@ -77,11 +77,11 @@ class Surroundings:
         self._joints = joints_of(states)
         self._objects = objects
 
-    def of_agents(self, k: int) -> 'WorldView':
+    def agents_view(self, k: int) -> 'WorldView':
         """Return what agents react to at tick k."""
         return self._reader.view(k, *self._joints, self._objects)
 
-    def of_scripted(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def scripted_view(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return poses and velocities (O, 3), lengths and widths (O) that objects react to."""
         poses, rates = driven_centers(*self._joints, self._ahead)
         return (np.concatenate((poses, self._objects.poses[self._columns])),
@@ -99,7 +99,7 @@ class TrafficFeed(Protocol):
     def states_for(self, k: int) -> tuple[ObjectStates, int]:
         """Return the agents at tick k, and the tick whose states could be used for that."""
 
-    def tell(self, view: 'WorldView') -> None:
+    def publish(self, view: 'WorldView') -> None:
         """Tell what the agents react to."""
 
     def obey(self, order: TrafficOrder) -> None:
@@ -128,7 +128,7 @@ class LocalTraffic:
             self._k += 1
         return self._traffic.states, self._k
 
-    def tell(self, view: 'WorldView') -> None:
+    def publish(self, view: 'WorldView') -> None:
         """Keep what the agents will react to."""
         self._view = view
 
@@ -180,7 +180,7 @@ class World:
         """
         if k > self._k:
             if self._scripted is not None:
-                self._scripted.advance(self._k, *self._surroundings.of_scripted())
+                self._scripted.advance(self._k, *self._surroundings.scripted_view())
             if self._feed is not None:
                 self._agents, self.agents_k = self._feed.states_for(k)
             self._k = k
@@ -203,7 +203,7 @@ class World:
         if self._feed is not None or self._scripted is not None:
             self._surroundings.see(states, self.objects)
         if self._feed is not None:
-            self._feed.tell(self._surroundings.of_agents(self._k))
+            self._feed.publish(self._surroundings.agents_view(self._k))
         return self.objects
 
     def _at(self, k: int) -> ObjectStates:

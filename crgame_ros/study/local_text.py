@@ -24,7 +24,7 @@ class LocalText:
     by_language: tuple[tuple[str, str], ...] = ()
 
     @classmethod
-    def of(cls, given: Any, where: str = '') -> 'LocalText':
+    def from_value(cls, given: Any, where: str = '') -> 'LocalText':
         """
         Take what a file says: a text, or texts by language.
 
@@ -62,7 +62,7 @@ class _LocalTextMark(Special):
         if isinstance(given, LocalText):
             return given
         place = f'{where}: {key}' if where and key else where or key
-        return LocalText.of(given, place)
+        return LocalText.from_value(given, place)
 
     def json_schema(self) -> dict[str, Any]:
         """Describe it as JSON Schema."""

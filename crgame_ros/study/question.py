@@ -99,12 +99,12 @@ class ChoiceQuestion:
         if len(self.choices) < 2:
             raise InputError(f'has {len(self.choices)} choices', '', 'give two or more')
         for name, text in self.choices.items():
-            LocalText.of(text, f'choices: {name}')
+            LocalText.from_value(text, f'choices: {name}')
 
     @property
     def texts(self) -> dict[str, LocalText]:
         """Return what people read, by the answer's name."""
-        return {str(name): LocalText.of(text) for name, text in self.choices.items()}
+        return {str(name): LocalText.from_value(text) for name, text in self.choices.items()}
 
     def refusal(self, answer: Any) -> str:
         """Return why an answer is none of this question, empty if it is one."""

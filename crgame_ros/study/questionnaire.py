@@ -47,7 +47,7 @@ class Score:
     offset: float = 0.0
     pairs: Annotated[tuple[str, ...], Listed(noun='question')] = ()
 
-    def of(self, answers: Mapping[str, Answer]) -> float:
+    def compute(self, answers: Mapping[str, Answer]) -> float:
         """Compute it; NaN where an answer is missing."""
         values = [answers.get(item) for item in self.items]
         if not all(isinstance(value, int | float) for value in values):
@@ -109,7 +109,7 @@ class Questionnaire:
 
     def score(self, answers: Mapping[str, Answer]) -> dict[str, float]:
         """Compute all scores of some answers; NaN where an answer is missing."""
-        return {score.name: score.of(answers) for score in self.scores}
+        return {score.name: score.compute(answers) for score in self.scores}
 
 
 def standard_questionnaires() -> tuple[str, ...]:

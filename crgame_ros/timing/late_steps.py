@@ -100,7 +100,7 @@ class LateSteps:
         self._worst: list[tuple[float, int, LateStep]] = []
 
     @property
-    def told(self) -> bool:
+    def explains_every_cycle(self) -> bool:
         """Whether every cycle told why it was late; earlier versions did not."""
         return self._told
 

@@ -15,7 +15,7 @@ from crgame_ros.traffic.lane_change import (
     CHANGE_THRESHOLD,
     GapAcceptance,
     incentive,
-    look_ahead,
+    lane_change_length,
     quintic,
     SHORTEST_CHANGE,
 )
@@ -72,7 +72,7 @@ class Beside(NamedTuple):
 
 
 @compiled
-def look_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+def find_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                 lane: IntArray, entries: Entries) -> Beside:
     """
     Look into the lanes beside agents.
@@ -86,15 +86,15 @@ def look_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots
         lane, np.empty(count), np.empty(count), np.empty(count), np.full(count, math.inf),
         np.zeros(count), np.full(count, -1, np.int64), np.full(count, math.inf),
         np.zeros(count), np.full(count, -1, np.int64))
-    _look(lanes, following, agents, slots, entries, result, np.empty(MAX_LANES_BEHIND, np.int64),
-          np.empty(MAX_LANES_BEHIND))
+    _find_all_beside(lanes, following, agents, slots, entries, result,
+                     np.empty(MAX_LANES_BEHIND, np.int64), np.empty(MAX_LANES_BEHIND))
     return result
 
 
 @bare
-def _look(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
-          entries: Entries, result: Beside, pending_lane: IntArray,
-          pending_offset: FloatArray) -> None:
+def _find_all_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
+                     entries: Entries, result: Beside, pending_lane: IntArray,
+                     pending_offset: FloatArray) -> None:
     """Write what is beside all agents; `pending_…` is room to note lanes in."""
     lane = result.lane
     for i, slot in enumerate(slots):
@@ -104,12 +104,12 @@ def _look(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntA
         guess = agents.s[slot] * lanes.length[lane[i]] / lanes.length[agents.lane[slot]]
         s, d, heading = project_on(lanes, lane[i], x, y, guess, 3)
         result.s[i], result.d[i], result.turn[i] = s, d, yaw - heading
-        _look_ahead(lanes, following, agents, slot, entries, result, i)
-        _look_behind(lanes, agents, slot, entries, result, i, pending_lane, pending_offset)
+        _find_ahead(lanes, following, agents, slot, entries, result, i)
+        _find_behind(lanes, agents, slot, entries, result, i, pending_lane, pending_offset)
 
 
 @bare
-def _look_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+def _find_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                 entries: Entries, result: Beside, i: int) -> None:
     """Find who is next ahead in the lane beside and those that follow on the route."""
     speed, half = agents.speed[slot], 0.5 * agents.width[slot] + SIDE_MARGIN
@@ -132,7 +132,7 @@ def _look_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
 
 
 @bare
-def _look_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entries,
+def _find_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entries,
                  result: Beside, i: int, pending_lane: IntArray,
                  pending_offset: FloatArray) -> None:
     """Find who is next behind, in the lane or those that lead to it."""
@@ -199,7 +199,7 @@ class Wish:
     room: FloatArray
     beside: Beside
 
-    def take(self, rows: NDArray[np.bool_]) -> 'Wish':
+    def select(self, rows: NDArray[np.bool_]) -> 'Wish':
         """Pick some of them."""
         if rows.all():
             return self
@@ -269,12 +269,12 @@ class LaneChanges:
         """
         graph = self._graph
         found = lane_change_intents(k, graph.table, self._to, agents.table, slots, at,
-                       self._drivers.change_lanes, self._thoughts)
+                                    self._drivers.change_lanes, self._thoughts)
         if not len(found.slots):
             return
-        wish = Wish(found.slots, found.side, found.urgency, found.room, look_beside(
+        wish = Wish(found.slots, found.side, found.urgency, found.room, find_beside(
             graph.table, self._routes.next, agents.table, found.slots, found.lane, entries))
-        wish = wish.take(~_blocked(wish, standing))
+        wish = wish.select(~_blocked(wish, standing))
         want, now, most = (np.zeros(agents.count) for _ in range(3))
         want[slots], now[slots], most[slots] = desired, acceleration, limit
         ok, gain = self._judge(agents, wish, want, now, most)
@@ -284,9 +284,9 @@ class LaneChanges:
         begun = self._begin(k, agents, wish, chosen, gain)
         if self._cooperative and must.any():
             yielding = np.full(agents.count, np.inf)
-            waiting = wish.take(must & ~np.isin(wish.slots, begun))
+            waiting = wish.select(must & ~np.isin(wish.slots, begun))
             self._make_room(agents, waiting, yielding)
-            self._let_in(agents, slots, waiting, way, yielding)
+            self._yield_to_merging(agents, slots, waiting, way, yielding)
             np.minimum(acceleration, yielding[slots], out=acceleration)
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
@@ -294,12 +294,12 @@ class LaneChanges:
         """Return whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
         followers, beside = self._followers, wish.beside
         speed = agents.speed[wish.slots]
-        there = followers.of(wish.slots).acceleration(
+        there = followers.for_agents(wish.slots).acceleration(
             speed, desired[wish.slots], beside.lead_gap, beside.lead_speed)
         known = beside.follower >= 0
         follower = np.maximum(beside.follower, 0)
         wanted = np.where(known, desired[follower], beside.follow_speed)
-        follow = followers.of(beside.follower).acceleration(
+        follow = followers.for_agents(beside.follower).acceleration(
             np.maximum(beside.follow_speed, 0.0), wanted, beside.follow_gap, speed)
         hurry = np.maximum(wish.urgency, 0.0)
         ok = self._gaps.accepts(speed, beside.lead_gap, beside.lead_speed, beside.follow_gap,
@@ -331,7 +331,7 @@ class LaneChanges:
         """Put an agent into the lane beside it, on a polynomial to its middle (FS 4)."""
         slot, beside = int(wish.slots[i]), wish.beside
         speed, shift = float(agents.speed[slot]), beside.d[i:i + 1]
-        span = look_ahead(speed, float(beside.d[i]), shortest=max(
+        span = lane_change_length(speed, float(beside.d[i]), shortest=max(
             SHORTEST_CHANGE, LENGTHS * float(agents.length[slot])))
         if self._routes.drops[agents.lane[slot]]:
             rest = float(self._graph.length[agents.lane[slot]] - agents.s[slot])
@@ -357,7 +357,7 @@ class LaneChanges:
     def _relieve(self, agents: Agents, slot: int, gap: float, speed: float) -> None:
         """Let a driver open a gap that a change has shortened without haste (Hidas 2005)."""
         if self._cooperative and np.isfinite(gap):
-            wanted = self._followers.of(np.array([slot])).desired_gap(np.array([speed]))
+            wanted = self._followers.for_agents(np.array([slot])).desired_gap(np.array([speed]))
             agents.relief[slot] = max(agents.relief[slot], relief_at_change(
                 float(gap), float(wanted[0])))
 
@@ -380,8 +380,8 @@ class LaneChanges:
         falls = np.isfinite(beside.lead_gap) & willing & (speed > 2.0)
         np.minimum.at(yielding, slots[falls], -back[falls])
 
-    def _let_in(self, agents: Agents, slots: IntArray, wish: Wish, way: Ways,
-                yielding: FloatArray) -> None:
+    def _yield_to_merging(self, agents: Agents, slots: IntArray, wish: Wish, way: Ways,
+                          yielding: FloatArray) -> None:
         """
         Have somebody stop for each who has stood long enough where the own lane ends.
 

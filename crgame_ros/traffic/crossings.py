@@ -71,7 +71,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
            at: Situation) -> tuple[FloatArray, BoolArray]:
     slots, count = at.slots, len(at.slots)
     _release(agents, slots, way, dt_s)
-    _look(rules, agents, slots, passage, dt_s)
+    _see_junctions(rules, agents, slots, passage, dt_s)
     promised = Promises(np.zeros(len(conflicts.first)), np.zeros(len(conflicts.first)))
     for i, slot in enumerate(slots):
         if agents.grant[slot] >= 0:
@@ -151,8 +151,8 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
 
 
 @compiled
-def _look(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Passages,
-          dt_s: float) -> None:
+def _see_junctions(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Passages,
+                   dt_s: float) -> None:
     """Let those who yield late see a junction at the last tick at which hard braking is enough."""
     for i, slot in enumerate(slots):
         hold = agents.grant_hold[slot] if agents.grant[slot] >= 0 else passage.hold[i]
@@ -287,8 +287,8 @@ def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
     """Return whether the other of a meeting, who was let in, goes before an agent that was."""
     who = meeting.who[n]
     slot, them = at.slots[i], at.slots[who]
-    grant = _let_in_at(agents, slot, passage, i, meeting.step[n])
-    theirs = _let_in_at(agents, them, passage, who, meeting.theirs[n])
+    grant = _admission_tick(agents, slot, passage, i, meeting.step[n])
+    theirs = _admission_tick(agents, them, passage, who, meeting.theirs[n])
     # Who stands behind the agent, or waits for it, lets it go.
     if agents.leader[them] == slot:
         return False
@@ -298,7 +298,7 @@ def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
 
 
 @compiled
-def _let_in_at(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> int:
+def _admission_tick(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> int:
     """Return the tick at which an agent was let into the junction at a step of its way."""
     in_first = agents.before[slot] >= 0 and step <= passage.before[i]
     return int(agents.before[slot] if in_first else agents.grant[slot])

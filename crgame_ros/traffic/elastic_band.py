@@ -124,7 +124,7 @@ class ElasticBand:
         lanes: list[int] = []
         places: list[float] = []
         for lane in np.unique(obstacles.lane[self._rules.in_the_way(obstacles)]).tolist():
-            here = obstacles.take(obstacles.lane == lane)
+            here = obstacles.select(obstacles.lane == lane)
             key = b''.join(column.tobytes()
                            for column in (left[lane], right[lane], speed[lane], *here))
             known = self._known.get(lane)
@@ -147,7 +147,7 @@ class ElasticBand:
         end = self.step * (len(left) - 1)
         reach = obstacles.half_length + self._rules.half_length
         on_grid = (obstacles.s + reach >= 0.0) & (obstacles.s - reach <= end)
-        for group in self._rules.groups(obstacles.take(on_grid), self.step):
+        for group in self._rules.groups(obstacles.select(on_grid), self.step):
             passage = self._rules.choose(group, self.step, left, right, for_wide)
             if passage is not None:
                 passages.append(passage)

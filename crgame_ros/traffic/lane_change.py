@@ -20,8 +20,9 @@ CHANGE_THRESHOLD = 0.2
 
 
 @compiled
-def look_ahead(speed: float, shift: float = 3.5, duration: float = 4.0,
-               shortest: float = SHORTEST_CHANGE, max_lateral_acceleration: float = 2.0) -> float:
+def lane_change_length(speed: float, shift: float = 3.5, duration: float = 4.0,
+                       shortest: float = SHORTEST_CHANGE,
+                       max_lateral_acceleration: float = 2.0) -> float:
     """
     Return the length of a lane change, FS's empirical function of the speed.
 
@@ -172,6 +173,6 @@ def urgency(distance: float, speed: float, changes: float = 1.0, horizon: float 
     :param shortest: distance at which it begins at least [m]
     :return: from 0 to 1
     """
-    last = look_ahead(speed) * changes
+    last = lane_change_length(speed) * changes
     first = max(shortest, horizon * speed) * changes
     return min(max((first - distance) / max(first - last, 1.0), 0.0), 1.0)

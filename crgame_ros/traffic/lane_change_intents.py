@@ -106,7 +106,7 @@ def lane_change_intents(
     left = _list(k, lanes, to, agents, slots, at, thoughts, free, 1, found, 0)
     count = _list(k, lanes, to, agents, slots, at, thoughts, free, -1, found, left)
     return LaneChangeIntents(found.slots[:count], found.side[:count], found.lane[:count],
-                  found.urgency[:count], found.room[:count])
+                             found.urgency[:count], found.room[:count])
 
 
 @inlined

@@ -261,7 +261,7 @@ class Followers:
         self._number = np.zeros(count + 1, dtype=np.int64)
         self.max_acceleration: FloatArray = np.full(count, self.usual.max_acceleration)
 
-    def of(self, slots: IntArray) -> 'CarFollowing | _Several':
+    def for_agents(self, slots: IntArray) -> 'CarFollowing | _Several':
         """Return the model of agents (N), asked about just these; of slot -1 the usual one."""
         if len(self._models) == 1:
             return self.usual

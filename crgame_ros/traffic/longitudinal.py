@@ -225,11 +225,11 @@ class Longitudinal:
         slots = corridor.owner
         speed = agents.speed[slots]
         nobody = np.full(len(slots), np.inf)
-        result = np.asarray(self._followers.of(slots).acceleration(
+        result = np.asarray(self._followers.for_agents(slots).acceleration(
             speed, desired, nobody, speed), dtype=float)
         if len(pairs.agent):
             who, entry = pairs.agent, pairs.entry
-            wanted = self._followers.of(slots[who]).acceleration(
+            wanted = self._followers.for_agents(slots[who]).acceleration(
                 speed[who], desired[who], pairs.gap, entries.speed[entry],
                 agents.relief[slots[who]],
                 # Who changes lanes brakes for what is in the lane that it leaves.

@@ -35,7 +35,7 @@ class Obstacles(NamedTuple):
     half_length: Array
     half_width: Array
 
-    def take(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> 'Obstacles':
+    def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> 'Obstacles':
         """Pick some of them."""
         return Obstacles(self.lane[chosen], self.s[chosen], self.d[chosen],
                          self.half_length[chosen], self.half_width[chosen])
@@ -90,11 +90,11 @@ class PassageRules:
         :param step: of the grid: two groups have no node in common [m]
         """
         order = np.lexsort((obstacles.d, obstacles.s - obstacles.half_length))
-        obstacles = obstacles.take(order)
+        obstacles = obstacles.select(order)
         begin = obstacles.s - obstacles.half_length - self.half_length
         end = np.maximum.accumulate(obstacles.s + obstacles.half_length + self.half_length)
         splits = np.flatnonzero(begin[1:] > end[:-1] + 3.0 * step) + 1
-        return [obstacles.take(part) for part in np.split(np.arange(len(begin)), splits)]
+        return [obstacles.select(part) for part in np.split(np.arange(len(begin)), splits)]
 
     def choose(self, group: Obstacles, step: float, left: Array, right: Array,
                for_wide: bool = True) -> Passage | None:
@@ -110,7 +110,7 @@ class PassageRules:
         :param for_wide: whether to look for one for the widest vehicles first.
         :return: None where no way leaves the least clearance.
         """
-        group = group.take(np.argsort(group.d, kind='stable'))
+        group = group.select(np.argsort(group.d, kind='stable'))
         best = None
         if for_wide and self.wide_half_width > self.half_width:
             best = self._best(group, self.wide_half_width, step, left, right)

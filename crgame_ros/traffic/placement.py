@@ -88,7 +88,7 @@ class Entries(NamedTuple):
     owner: IntArray
     body: IntArray
 
-    def take(self, rows: IntArray) -> 'Entries':
+    def select(self, rows: IntArray) -> 'Entries':
         """Pick some of them; where those of each lane begin is not told."""
         columns: list[Any] = [column[rows] for column in self[1:]]
         return Entries(np.empty(0, np.int64), *columns)
@@ -110,7 +110,7 @@ def place(lanes: LaneTable, cells: CellTable, bodies: Bodies) -> Entries:
     fill = np.empty(len(lanes.first), np.int64)
     _sort(found, count, order, fill)
     result = _empty(len(lanes.first), count)
-    _take(found, order, result)
+    _write_ordered(found, order, result)
     return result
 
 
@@ -227,7 +227,7 @@ def _sort(found: Entries, count: int, order: IntArray, fill: IntArray) -> None:
 
 
 @bare
-def _take(found: Entries, order: IntArray, result: Entries) -> None:
+def _write_ordered(found: Entries, order: IntArray, result: Entries) -> None:
     """Write entries in an order."""
     for lane in range(len(found.begin)):
         result.begin[lane] = found.begin[lane]

@@ -183,7 +183,7 @@ class Traffic:
             self._lines.show(others.signals)
             entries = place(self._graph.table, self._cells.table, with_agents(
                 bodies, agents.table))
-            standing = self._look_at_obstacles(entries, others)
+            standing = self._swerve_around(entries, others)
             acceleration = self._decide(others.k, slots, entries, standing)
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
@@ -192,13 +192,13 @@ class Traffic:
         self._adopt(others.k + 1, bodies)
         self._spawner.arrive(others.k + 1, agents, bodies)
 
-    def _look_at_obstacles(self, entries: Entries, others: WorldView) -> NDArray[np.bool_]:
+    def _swerve_around(self, entries: Entries, others: WorldView) -> NDArray[np.bool_]:
         """Return which entries (E) stand for good, and swerve around them."""
         if not len(self._others):
             return np.zeros(len(entries.owner), dtype=bool)
         standing = standing_entries(entries, self._others.standing(others))
         if self._spec.swerve:
-            self._swerving.update(entries.take(np.flatnonzero(standing)))
+            self._swerving.update(entries.select(np.flatnonzero(standing)))
             if self._swerving.version != self._slowed:
                 self._slowed = self._swerving.version
                 self._longitudinal.slow_for(self._swerving.speed)
@@ -208,10 +208,11 @@ class Traffic:
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Return the accelerations (A) of the agents; begin lane changes, enter junctions."""
         agents, long, lanes = self._agents, self._longitudinal, self._graph.table
-        way, corridor, pairs = self._look_ahead(slots, entries)
+        way, corridor, pairs = self._find_leaders(slots, entries)
         desired, limit = long.speeds(way, agents, slots)
         gap, leader, _ = nearest(pairs, entries.owner, len(slots))
-        wanted = np.asarray(self._followers.of(slots).desired_gap(agents.speed[slots]), float)
+        followers = self._followers.for_agents(slots)
+        wanted = np.asarray(followers.desired_gap(agents.speed[slots]), float)
         note_leaders(agents.table, slots, gap, leader, wanted, self._fading,
                      self._spec.cooperative)
         acceleration = np.minimum(limit, long.behind(agents, desired, pairs, entries, corridor))
@@ -238,13 +239,13 @@ class Traffic:
             return
         slots = np.flatnonzero(agents.active)
         entries = place(self._graph.table, self._cells.table, with_agents(bodies, agents.table))
-        way, _, pairs = self._look_ahead(slots, entries)
+        way, _, pairs = self._find_leaders(slots, entries)
         desired, _ = self._longitudinal.speeds(way, agents, slots)
         gap, _, _ = nearest(pairs, entries.owner, len(slots))
         halts = self._junctions(k, slots, way, entries, pairs, desired, gap, 0.0)
         self._spawner.slow_down(agents, slots, desired, halts, newcomers)
 
-    def _look_ahead(self, slots: IntArray, entries: Entries) -> tuple[Ways, Corridors, Pairs]:
+    def _find_leaders(self, slots: IntArray, entries: Entries) -> tuple[Ways, Corridors, Pairs]:
         """Return the agents' (A) ways, the room that they take on them, and who is in it."""
         agents, lanes, reference = self._agents, self._graph.table, self._swerving.reference
         way = own_ways(lanes, self._routes.next, agents.table, slots)

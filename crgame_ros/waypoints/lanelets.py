@@ -57,7 +57,7 @@ def lanelet_waypoints(network: RoadNetwork, lanelet_id: int) -> FloatArray:
 def lanelet_lane(network: RoadNetwork, lanelet_id: int,
                  kinds: Mapping[str, Interpolation] | None = None) -> WaypointLane:
     """Make a lane of one lanelet; see `lanelet_waypoints`."""
-    return WaypointLane.of_rows(lanelet_waypoints(network, lanelet_id), kinds)
+    return WaypointLane.from_rows(lanelet_waypoints(network, lanelet_id), kinds)
 
 
 def lanelet_chain(network: RoadNetwork, lanelet_id: int, length: float) -> Sequence[int]:
@@ -83,7 +83,7 @@ def lane_of_chain(network: RoadNetwork, chain: Sequence[int]) -> WaypointLane:
         # Where lanelets join, the end of one and the start of the next are the same way-point.
         if np.hypot(*(part[-1, :2] - parts[index + 1][0, :2])) < MIN_SPACING and len(part) > 1:
             parts[index] = part[:-1]
-    return WaypointLane.of_rows(np.concatenate(parts))
+    return WaypointLane.from_rows(np.concatenate(parts))
 
 
 def thinned(s: FloatArray, spacing: float) -> FloatArray:

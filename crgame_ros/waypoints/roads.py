@@ -120,7 +120,7 @@ class WaypointRoads:
         lanes, links = {}, {}
         for lane, entry in rows.items():
             try:
-                lanes[lane] = WaypointLane.of_rows(entry.points, kinds)
+                lanes[lane] = WaypointLane.from_rows(entry.points, kinds)
             except InputError as error:
                 raise InputError(error.what, f'{path}, line {entry.line}, lane {lane}',
                                  error.remedy) from error

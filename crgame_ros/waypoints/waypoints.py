@@ -109,14 +109,14 @@ class WaypointLane:
                              'give the missing limits, or interpolate them as steps')
 
     @classmethod
-    def of_rows(cls, rows: FloatArray,
-                kinds: Mapping[str, Interpolation] | None = None) -> 'WaypointLane':
+    def from_rows(cls, rows: FloatArray,
+                  kinds: Mapping[str, Interpolation] | None = None) -> 'WaypointLane':
         """Build a lane of rows (W, 4): x, y, width, speed limit."""
         return cls(rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3], kinds)
 
     @property
     def rows(self) -> FloatArray:
-        """Return the way-points (W, 4): x, y, width, speed limit; the inverse of `of_rows`."""
+        """Return the way-points (W, 4): x, y, width, speed limit; the inverse of `from_rows`."""
         return np.column_stack((self.points, self.width, self.speed_limit))
 
     @property

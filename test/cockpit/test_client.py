@@ -154,9 +154,9 @@ async def test_a_connection_that_takes_nothing_is_given_up_one_that_is_slow_is_n
 
 def test_the_bucket_allows_the_burst_then_the_rate() -> None:
     bucket = TokenBucket(400.0, 800.0)
-    assert sum(bucket.take(0.0) for _ in range(2000)) == 800
-    assert sum(bucket.take(0.5) for _ in range(2000)) == 200
-    assert sum(bucket.take(100.0) for _ in range(2000)) == 800
+    assert sum(bucket.try_spend(0.0) for _ in range(2000)) == 800
+    assert sum(bucket.try_spend(0.5) for _ in range(2000)) == 200
+    assert sum(bucket.try_spend(100.0) for _ in range(2000)) == 800
 
 
 # As a page tells what it shows; numbers that are flags become booleans.

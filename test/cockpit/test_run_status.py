@@ -15,7 +15,7 @@ def _kinds(status: RunStatus) -> list[str]:
 
 def _take(status: RunStatus, name: str, level: int, text: str, values: Mapping[str, str],
           t: float) -> None:
-    status.take(Status(name, level, text, dict(values)), t)
+    status.add(Status(name, level, text, dict(values)), t)
 
 
 def _begun() -> RunStatus:
@@ -240,8 +240,8 @@ def test_a_contact_that_stops_a_driver_is_counted_once() -> None:
              FiredEvent.contact('hv0', 'av0', 500, 50), FiredEvent.contact('hv0', 'o12', 900, 90)]
     free = {'collision': 'false', 'road_compliance': 'true', 'hit': ''}
     touches = free | {'collision': 'true', 'hit': 'hv0'}
-    status.take_events(stops[:1], 0.01)
-    status.take_events(stops[:2], 0.01)
+    status.add_events(stops[:1], 0.01)
+    status.add_events(stops[:2], 0.01)
     assert status.contacts == [{'vehicle': 'hv0', 'with': 'av0', 't': 70 * 0.01}]
     assert status.verdicts == 1
     # The AV drives on against it.
@@ -249,9 +249,9 @@ def test_a_contact_that_stops_a_driver_is_counted_once() -> None:
     _take(status, 'av0/drivability', 0, 'valid', free, 2.0)
     assert len(status.contacts) == 1
     _take(status, 'av0/drivability', 2, 'collision', touches, 4.9)
-    status.take_events(stops[:3], 0.01)
+    status.add_events(stops[:3], 0.01)
     assert [item['t'] for item in status.contacts] == [70 * 0.01, 4.9]
-    status.take_events(stops, 0.01)
+    status.add_events(stops, 0.01)
     assert status.contacts[-1] == {'vehicle': 'hv0', 'with': 'o12', 't': 9.0}
     status.begin(('hv0', 'av0'))
     assert status.contacts == []

@@ -44,7 +44,7 @@ def test_a_seat_is_held_by_one(table: SeatTable) -> None:
 def test_a_seat_is_given_away_with_the_consent_of_who_gets_it(table: SeatTable) -> None:
     """Only the holder offers; until it is accepted nothing changes; then hands off."""
     first = table.claim('c1', 'hv0', NAMES)
-    first.take(THROTTLE, 0.0)
+    first.apply_input(THROTTLE, 0.0)
     table.ask('c2', 'hv0')
     table.ask('c3', 'hv0')
     with pytest.raises(InputError, match='hv0: you do not have the seat; claim it first'):
@@ -174,7 +174,7 @@ def test_the_driver_is_named_without_the_way_to_its_file(table: SeatTable) -> No
 def test_keys_go_through_the_papers_filter() -> None:
     """CRG 18-19 in simulation time: the same as a keyboard at the same cycles."""
     seat, keyboard = HeldSeat('hv0', 'c1'), KeyboardCycles()
-    seat.take({'keys': [True, False, True, False], 'reverse': False}, 0.0)
+    seat.apply_input({'keys': [True, False, True, False], 'reverse': False}, 0.0)
     for n in range(40):
         assert seat.command(n, DT) == keyboard.command(n, KeyState(True, False, True), DT)
     # r_th+ = 1.8 / s over 40 cycles of 10 ms, s_max = 0.65.
@@ -185,19 +185,19 @@ def test_keys_go_through_the_papers_filter() -> None:
 def test_axes_pass_as_they_are() -> None:
     """The page has calibrated them."""
     seat = HeldSeat('hv0', 'c1')
-    seat.take({'axes': [0.25, 0.0, -0.5], 'reverse': True}, 0.0)
+    seat.apply_input({'axes': [0.25, 0.0, -0.5], 'reverse': True}, 0.0)
     assert seat.command(3, DT) == DriverCommand(0.25, 0.0, -0.5, True)
 
 
 def test_hands_off_means_released_at_once() -> None:
     """No ramp: the next command is released, and the filter begins anew after the return."""
     seat = HeldSeat('hv0', 'c1')
-    seat.take(THROTTLE, 0.0)
+    seat.apply_input(THROTTLE, 0.0)
     for n in range(50):
         seat.command(n, DT)
-    seat.take({'away': True}, 0.5)
+    seat.apply_input({'away': True}, 0.5)
     assert seat.away and seat.command(50, DT) == RELEASED
-    seat.take(THROTTLE, 0.6)
+    seat.apply_input(THROTTLE, 0.6)
     assert seat.command(60, DT).throttle == pytest.approx(1.8 * DT)
 
 
@@ -205,17 +205,17 @@ def test_silence_is_noticed() -> None:
     """A page that hangs sends nothing, not even that it is gone."""
     seat = HeldSeat('hv0', 'c1')
     assert not seat.is_silent(100.0)
-    seat.take(THROTTLE, 100.0)
+    seat.apply_input(THROTTLE, 100.0)
     assert not seat.is_silent(100.0 + 0.9 * SILENCE_S)
     assert seat.is_silent(100.0 + 1.1 * SILENCE_S)
-    seat.let_go()
+    seat.release()
     assert not seat.is_silent(200.0)
 
 
 def test_a_new_run_begins_at_cycle_0() -> None:
     """After a reset the step counter falls: the filter follows instead of refusing."""
     seat = HeldSeat('hv0', 'c1')
-    seat.take(THROTTLE, 0.0)
+    seat.apply_input(THROTTLE, 0.0)
     for n in range(500, 550):
         seat.command(n, DT)
     assert seat.command(0, DT).throttle == pytest.approx(1.8 * DT)

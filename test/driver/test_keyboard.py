@@ -117,7 +117,7 @@ def test_look_ahead_commits_nothing() -> None:
     """Looking ahead gives what advance gives, any number of times, from the committed state."""
     keyboard = KeyboardFilter()
     keyboard.advance(KeyState(throttle=True), DT_S)
-    ahead = [keyboard.look_ahead(KeyState(throttle=True), DT_S) for _ in range(3)]
+    ahead = [keyboard.preview(KeyState(throttle=True), DT_S) for _ in range(3)]
     assert ahead == [(2 * 1.8 * DT_S, 0.0, 0.0, False, 0, False)] * 3
     assert keyboard.advance(KeyState(throttle=True), DT_S) == ahead[0]
 

@@ -146,7 +146,7 @@ def test_a_page_works_the_lever() -> None:
     seat = HeldSeat('hv0', 'c1')
 
     def say(**hands: object) -> int:
-        seat.take(parse_message(json.dumps({'type': 'input', 'seat': 'hv0', **hands})), 0.0)
+        seat.apply_input(parse_message(json.dumps({'type': 'input', 'seat': 'hv0', **hands})), 0.0)
         return seat.command(0, DT_S).lights
 
     assert say(keys=[0, 0, 0, 0]) == 0

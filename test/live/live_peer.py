@@ -55,7 +55,7 @@ class Peer:
         """Take what has come."""
         self._executor.spin_once(timeout_sec=0.01)
         for name, slot in self._slots.items():
-            while (message := slot.take()) is not None:
+            while (message := slot.pop()) is not None:
                 self.messages[name].append(message)
 
     def wait_until(self, condition: Callable[[], object], what: str,

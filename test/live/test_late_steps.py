@@ -58,7 +58,7 @@ def ask_for_much(peer: Peer) -> None:
 def published_ns(slot: PolledSubscription) -> dict[int, int]:
     """Return the time at which each waiting message was published [ns], by its stamp."""
     found = {}
-    while (taken := slot.take_timed()) is not None:
+    while (taken := slot.pop_timed()) is not None:
         found[from_time(taken[0].header.stamp)] = taken[1]
     return found
 

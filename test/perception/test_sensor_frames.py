@@ -108,7 +108,7 @@ def test_scans_lie_on_what_they_hit(endpoints: Endpoints) -> None:
         scans.publish(scheduler, world.perception)
         for _ in range(3 if n % 10 == 0 else 0):
             until_s = time.monotonic() + PATIENCE_S
-            while (message := slot.take()) is None:
+            while (message := slot.pop()) is None:
                 assert time.monotonic() < until_s, 'no scan'
                 time.sleep(0.001)
             stamp_ns = scheduler.stamp_ns(n)
@@ -145,7 +145,7 @@ def test_tf_is_there_where_its_package_is(endpoints: Endpoints) -> None:
         return
     moving, fixed = endpoints.polled('/tf'), endpoints.polled('/tf_static')
     until_s = time.monotonic() + PATIENCE_S
-    while (mounts := fixed.take()) is None or not transforms.wanted:
+    while (mounts := fixed.pop()) is None or not transforms.wanted:
         assert time.monotonic() < until_s
         time.sleep(0.01)
     assert len(mounts.transforms) == len(SENSORS)
@@ -168,7 +168,7 @@ def test_an_estimate_carries_its_filters_covariance(endpoints: Endpoints, known:
         world.observe(n)
     localization.publish(OFFSET_NS, world.perception)
     until_s = time.monotonic() + PATIENCE_S
-    while (message := slot.take()) is None:
+    while (message := slot.pop()) is None:
         assert time.monotonic() < until_s
         time.sleep(0.001)
     pose = np.array(message.pose.covariance).reshape(6, 6)

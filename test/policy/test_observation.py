@@ -41,7 +41,7 @@ def observed(setup: Setup, guide: RouteGuide, state: VehicleState, spec: Observa
              poses: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:
     """Observe one vehicle."""
     guide.restart(state)
-    made = Observation(spec, setup.avs[0].vehicle, THINGS).of(
+    made = Observation(spec, setup.avs[0].vehicle, THINGS).observe(
         [state], [guide.follow(state)], [guide], poses[None], velocities[None])
     return {part: values[0] for part, values in made.items()}
 

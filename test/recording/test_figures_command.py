@@ -124,7 +124,7 @@ def test_plans_are_drawn_as_recorded(run: Path, result: OfflineResult) -> None:
     window = scene.windows([20])[0]
     (plan,) = scene.at(22, window).plans
     ticks = result.states_of('av0')[::result.setup.scheduler.steps_per_tick]
-    np.testing.assert_allclose(plan.points, window.of(ticks[22:41, :2]), atol=1e-9)
+    np.testing.assert_allclose(plan.points, window.to_window(ticks[22:41, :2]), atol=1e-9)
 
 
 def test_frames_at_given_times(run: Path, tmp_path: Path) -> None:

@@ -129,7 +129,7 @@ def test_a_run_that_cannot_be_scored_has_its_tables_all_the_same(
     """The table of runs says why; with `--no-scores` nobody asks."""
     def refuse(*_: Any) -> None:
         raise InputError('has no step', 'the run', 'record again')
-    monkeypatch.setattr(ScoredScenario, 'of_run', refuse)
+    monkeypatch.setattr(ScoredScenario, 'from_run', refuse)
     for words, notices in (((), 'no scores: the run: has no step; record again'),
                            (('--no-scores',), None)):
         assert main(['export', str(run), '--out', str(tmp_path), *words]) == 0
@@ -171,14 +171,14 @@ def test_scores_of_an_offline_run(record: RunRecord, result: OfflineResult) -> N
 
 def test_the_vehicle_itself_is_no_obstacle_to_its_solution(record: RunRecord) -> None:
     """The exported scenario holds everybody; without the own vehicle nobody collides."""
-    scored, exported = ScoredScenario.of_run(record.log)
+    scored, exported = ScoredScenario.from_run(record.log)
     for name, number in exported.problem_ids.items():
         assert scored.own[number] == exported.obstacle_ids[name]
         left = {each.obstacle_id for each in scored.without_own({number}).obstacles}
         assert left == {each.obstacle_id for each in scored.loaded.scenario.obstacles} \
             - {exported.obstacle_ids[name]}
     # The same from the file alone, which somebody else may have.
-    assert ScoredScenario.of_file(scored.loaded).own == scored.own
+    assert ScoredScenario.from_file(scored.loaded).own == scored.own
 
 
 def test_valid_solution_says_the_same(record: RunRecord,
@@ -186,7 +186,7 @@ def test_valid_solution_says_the_same(record: RunRecord,
     """The checker's own function, but for the road, whose check needs a package of its own."""
     monkeypatch.setattr(solution_checker, '_construct_boundary_checker',
                         lambda scenario: create_collision_checker(type(scenario)(scenario.dt)))
-    scored, _ = ScoredScenario.of_run(record.log)
+    scored, _ = ScoredScenario.from_run(record.log)
     for vehicle in score_run(record).vehicles:
         number = vehicle.commonroad.solved.planning_problem_id
         scenario = scored.without_own({number})

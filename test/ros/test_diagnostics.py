@@ -48,7 +48,7 @@ def _heard(endpoints: Endpoints, count: int) -> list[DiagnosticArray]:
     diagnostics.publish('planner_node: av0', DiagnosticStatus.WARN, '\udfff', {'\ud800': '\ud800'})
     while len(found) < count:
         assert time.monotonic() < until_s
-        if (message := slot.take()) is not None:
+        if (message := slot.pop()) is not None:
             found.append(message)
     return found
 

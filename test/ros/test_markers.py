@@ -46,10 +46,10 @@ LIGHT = """
 
 def _documents(setup: Setup) -> ScenarioSet:
     collector = DocumentCollector()
-    collector.take('xml', setup.loaded.xml_text)
-    collector.take('objects', objects_document(setup.descriptions))
-    collector.take('game', game_document(setup, epoch=0, clock_offset_ns=OFFSET_NS,
-                                         real_time_factor=1.0))
+    collector.add('xml', setup.loaded.xml_text)
+    collector.add('objects', objects_document(setup.descriptions))
+    collector.add('game', game_document(setup, epoch=0, clock_offset_ns=OFFSET_NS,
+                                        real_time_factor=1.0))
     documents = collector.complete()
     assert documents is not None
     return documents

@@ -31,10 +31,10 @@ def test_odometry_is_exact_and_can_be_inverted(ros_domain: int) -> None:
         state = VehicleState(3.0, -4.0, 2.5, -1.5, 0.1, 0.2, 0.3, 0.4)
         until_s = time.monotonic() + PATIENCE_S
         while not outputs.wanted:
-            outputs.look_for_subscribers()
+            outputs.count_subscribers()
             assert time.monotonic() < until_s
         outputs.publish(state, 5_000_000_007)
-        while (message := slot.take()) is None:
+        while (message := slot.pop()) is None:
             assert time.monotonic() < until_s
             time.sleep(0.001)
     finally:

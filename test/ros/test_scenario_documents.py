@@ -40,14 +40,14 @@ def test_a_set_is_given_once(order: tuple[str, ...], cut_in: dict[str, str]) -> 
     collector = DocumentCollector()
     for kind in order:
         assert collector.complete() is None
-        collector.take(kind, cut_in[kind])
+        collector.add(kind, cut_in[kind])
     documents = collector.complete()
     assert documents is not None
     assert [item.id for item in documents.driven] == ['hv0', 'av0']
     assert documents.others == ()
     assert documents.loaded.sha256 == documents.game.scenario_sha256
     assert documents.texts == cut_in
-    collector.take('game', cut_in['game'])
+    collector.add('game', cut_in['game'])
     assert collector.complete() is None
 
 
@@ -57,12 +57,12 @@ def test_a_new_game_never_mixes_with_the_old(
     """Text, objects and game of the new scenario count together only."""
     collector = DocumentCollector()
     for kind, text in cut_in.items():
-        collector.take(kind, text)
+        collector.add(kind, text)
     assert collector.complete() is not None
     for kind in order[:2]:
-        collector.take(kind, two_avs[kind])
+        collector.add(kind, two_avs[kind])
         assert collector.complete() is None
-    collector.take(order[2], two_avs[order[2]])
+    collector.add(order[2], two_avs[order[2]])
     documents = collector.complete()
     assert documents is not None
     assert [item.id for item in documents.driven] == ['hv0', 'av0', 'av1']
@@ -72,9 +72,9 @@ def test_a_reset_does_not_read_the_same_scenario_again(cut_in: dict[str, str]) -
     """The game of the next epoch is a new set with the scenario that was read already."""
     collector = DocumentCollector()
     for kind, text in cut_in.items():
-        collector.take(kind, text)
+        collector.add(kind, text)
     first = collector.complete()
-    collector.take('game', _texts('cut_in', epoch=1)['game'])
+    collector.add('game', _texts('cut_in', epoch=1)['game'])
     second = collector.complete()
     assert first is not None
     assert second is not None
@@ -87,9 +87,9 @@ def test_what_cannot_be_read_is_said(cut_in: dict[str, str]) -> None:
     """The error names the topic, and what was there before stays: it is given with what is new."""
     collector = DocumentCollector()
     for kind, text in cut_in.items():
-        collector.take(kind, text)
+        collector.add(kind, text)
     with pytest.raises(InputError, match='/scenario/objects'):
-        collector.take('objects', '[{}]')
+        collector.add('objects', '[{}]')
     with pytest.raises(InputError, match='/scenario/game'):
-        collector.take('game', '{}')
+        collector.add('game', '{}')
     assert collector.complete() is not None

@@ -54,7 +54,7 @@ class Table(NamedTuple):
     def order(self, source: str, now_ns: int = 0) -> None:
         """Order a source for hv0, and have it obeyed."""
         self.orders.publish(String(data=json.dumps({'seat': 'hv0', 'source': source})))
-        wait_until(lambda: self.seats.take_orders(now_ns)[0], f'the order {source}')
+        wait_until(lambda: self.seats.apply_orders(now_ns)[0], f'the order {source}')
 
     def drive(self, first_ms: int, last_ms: int) -> DriverCommand | None:
         """Drive hv0 at 20 m/s, one cycle each 10 ms of the steady clock; give the last command."""
@@ -137,7 +137,7 @@ def test_given_back_is_forgotten(table: Table, ordered: list[str]) -> None:
     """In the next game, that one's driver has the seat: nothing of this game's driver is kept."""
     for source in ordered:
         table.orders.publish(String(data=json.dumps({'seat': 'hv0', 'source': source})))
-    wait_until(lambda: table.seats.take_orders(0) and table.human.source == 'game'
+    wait_until(lambda: table.seats.apply_orders(0) and table.human.source == 'game'
                and 'hv0' not in table.sources, 'the seat given back')
 
 
@@ -147,7 +147,7 @@ def test_released_in_a_cockpit_game_it_is_the_next_games_drivers(table: Table) -
     table.order('cockpit')
     assert table.sources == {'hv0': 'cockpit'}
     table.orders.publish(String(data='{"seat": "hv0", "source": "game"}'))
-    wait_until(lambda: table.seats.take_orders(0) is not None and not table.sources, 'the order')
+    wait_until(lambda: table.seats.apply_orders(0) is not None and not table.sources, 'the order')
     seats = Seats(Endpoints(table.node), build_setup(load_game(CUT_IN)), OFFSET_NS, table.sources)
     assert seats.humans[0].source == GAME
 
@@ -158,7 +158,7 @@ def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
         table.orders.publish(String(data='nonsense'))
     table.orders.wait_for_all_acked()
     taken = []
-    wait_until(lambda: taken.append(len(table.seats.take_orders(0)[1]))
+    wait_until(lambda: taken.append(len(table.seats.apply_orders(0)[1]))
                or sum(taken) == 3 * MAX_ORDERS, 'all refusals')
     assert max(taken) <= MAX_ORDERS
     asked = 0
@@ -241,7 +241,7 @@ def _demand(table: Table, **fields: object) -> tuple[bool, list[str]]:
     told: list[tuple[bool, list[str]]] = []
 
     def obeyed() -> bool:
-        told.append(table.seats.take_orders(0))
+        told.append(table.seats.apply_orders(0))
         return told[-1] != (False, [])
     wait_until(obeyed, 'the order')
     return told[-1]

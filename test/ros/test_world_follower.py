@@ -29,9 +29,9 @@ def scenario() -> ScenarioSet:
     """Return the documents of a game with recorded traffic."""
     setup = build_setup(load_game(SCENARIOS / 'traffic.yaml'))
     collector = DocumentCollector()
-    collector.take('xml', setup.loaded.xml_text)
-    collector.take('objects', objects_document(setup.descriptions))
-    collector.take('game', game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    collector.add('xml', setup.loaded.xml_text)
+    collector.add('objects', objects_document(setup.descriptions))
+    collector.add('game', game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
     documents = collector.complete()
     assert documents is not None and documents.others
     return documents

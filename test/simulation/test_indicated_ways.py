@@ -44,7 +44,7 @@ def test_who_settles_beside_the_middle_has_changed_lanes() -> None:
     y = (WIDTH - 0.5) * 0.5 * (1.0 - np.cos(np.pi * np.clip((x - 20.0) / 60.0, 0.0, 1.0)))
     way, shown = plan(x, y), {}
     for first in range(len(way) - 10):
-        indicator.take(way[first:first + 11])
+        indicator.update(way[first:first + 11])
         shown[int(x[first])] = indicator.shown
     assert {bits for at, bits in shown.items() if 10 <= at <= 65} == {Light.LEFT}
     assert {bits for at, bits in shown.items() if at >= 85} == {0}
@@ -54,12 +54,12 @@ def test_who_is_held_up_between_lanes_goes_on_indicating() -> None:
     """A plan that does not move says nothing else."""
     indicator = indicator_on(two_lanes(), 1)
     x = np.linspace(0.0, 60.0, 11)
-    indicator.take(plan(x, WIDTH * x / 60.0))
+    indicator.update(plan(x, WIDTH * x / 60.0))
     stands = np.tile((36.0, 2.1, 0.05), (11, 1))
-    indicator.take(stands)
+    indicator.update(stands)
     assert indicator.shown == Light.LEFT
     # Back in its own lane it has given the change up.
-    indicator.take(plan(36.0 + x, np.zeros(11)))
+    indicator.update(plan(36.0 + x, np.zeros(11)))
     assert indicator.shown == 0
 
 
@@ -70,9 +70,9 @@ def test_a_change_that_was_never_made_is_over_on_another_lane() -> None:
         2: Piece((0.0, WIDTH, 0.0), 300.0, right=1),
         3: Piece((0.0, -WIDTH, 0.0), 300.0, left=1)}), 1)
     x = np.linspace(0.0, 60.0, 11)
-    indicator.take(plan(x, WIDTH * x / 60.0))
+    indicator.update(plan(x, WIDTH * x / 60.0))
     assert indicator.shown == Light.LEFT
-    indicator.take(plan(x, -WIDTH - 0.8 + 0.8 * x / 60.0))
+    indicator.update(plan(x, -WIDTH - 0.8 + 0.8 * x / 60.0))
     assert indicator.shown == 0
 
 
@@ -84,7 +84,7 @@ def test_who_stands_before_a_fork_indicates_within_30_m(x: float, expected: int)
     line = Piece(before.end, 10.0, after=(3, 4))
     indicator = indicator_on(made({1: before, 2: line, 3: Piece(line.end, 20.0, 90.0),
                                    4: Piece(line.end, 20.0)}), 3)
-    indicator.take(np.tile((x, 0.0, 0.0), (11, 1)))
+    indicator.update(np.tile((x, 0.0, 0.0), (11, 1)))
     assert indicator.shown == expected
 
 
@@ -101,7 +101,7 @@ def test_a_turn_behind_another_fork_is_not_shown_before_that() -> None:
         # Whether it stands there or drives on.
         for poses in (np.tile(way[x], (11, 1)), way[x:x + 22:2]):
             indicator.forget()
-            indicator.take(poses)
+            indicator.update(poses)
             assert indicator.shown == expected
 
 
@@ -115,7 +115,7 @@ def test_who_follows_the_one_way_there_is_turns_off_nowhere() -> None:
     way = np.concatenate((first.poses(), third.poses()[1:]))
     # Also once it is on it.
     for at in range(20, 70, 5):
-        indicator.take(way[at:at + 20:2])
+        indicator.update(way[at:at + 20:2])
         assert indicator.shown == 0, at
 
 
@@ -131,7 +131,7 @@ def test_overtaking_on_the_lane_of_oncomers_is_shown() -> None:
                        - np.cos(np.pi * np.clip((x - 60.0) / 40.0, 0.0, 1.0)))
     way, shown = plan(x, y), {}
     for first in range(len(way) - 10):
-        indicator.take(way[first:first + 11])
+        indicator.update(way[first:first + 11])
         shown[int(x[first])] = indicator.shown
     assert shown[0] == 0 and {shown[at] for at in range(40, 90, 5)} == {Light.LEFT}
     # On the other lane, until the plan leads back.

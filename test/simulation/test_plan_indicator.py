@@ -70,14 +70,14 @@ def test_lane_change_is_shown_up_to_the_middle_of_the_new_lane(side: Light) -> N
     way = planned(roads.line(lane).poses(s, offset)[:, :2])
     shown = []
     for start in range(0, 100, 5):
-        indicator.take(way[start:start + 51:5])
+        indicator.update(way[start:start + 51:5])
         # How far it has come to the new lane's middle.
         aside = abs(roads.locate(beside, *way[start, :2])[1])
         shown.append((aside, indicator.shown))
     assert {bits for aside, bits in shown if 0.5 < aside < abs(across) - 0.01} == {side}
     assert shown[-1][1] == 0 and shown[-1][0] < 0.1
     # To stay in a lane, though not in its middle, is no change.
-    indicator.take(planned(roads.line(lane).poses(s[:51], np.sin(s[:51] / 4.0))[:, :2])[::5])
+    indicator.update(planned(roads.line(lane).poses(s[:51], np.sin(s[:51] / 4.0))[:, :2])[::5])
     assert indicator.shown == 0
 
 
@@ -93,7 +93,7 @@ def test_who_leaves_a_roundabout_indicates_and_who_goes_round_does_not() -> None
         onward, = (lanelet for lanelet in roads.successors(before) if lanelet in ring)
         for way, expected in ((out, Light.RIGHT), (onward, 0)):
             indicator.forget()
-            indicator.take(along(roads, before, way)[::5])
+            indicator.update(along(roads, before, way)[::5])
             assert indicator.shown == expected, (before, way)
 
 
@@ -129,7 +129,7 @@ def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> Non
                         # Some call straight on what bends by 90 degrees, or left what does not.
                         if bend > 45.0 if light else bend < 15.0:
                             indicator.forget()
-                            indicator.take(along(roads, before, way)[::5])
+                            indicator.update(along(roads, before, way)[::5])
                             count += 1
                             if indicator.shown != light:
                                 wrong.append((path.stem, before, way, light, indicator.shown))

@@ -100,7 +100,7 @@ def test_avs_are_looked_at_one_by_one_each_half_second(
         self, []).append(n))
     indicators = PlanIndicators(setup)
     for n in range(1, round(10.0 * rate_hz) + 1):
-        indicators.look(n, avs)
+        indicators.update(n, avs)
     steps = [n for each in looks.values() for n in each]
     assert len(looks) == count and len(set(steps)) == len(steps)
     assert scheduler.steps_per_tick == 1 or not any(map(scheduler.is_tick, steps))

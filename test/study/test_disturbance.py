@@ -32,22 +32,22 @@ def disturbance(clocks: Clocks) -> Disturbance:
 def test_time_alone_disturbs_nothing(clocks: Clocks, disturbance: Disturbance) -> None:
     for _ in range(100):
         clocks.pass_s(0.5)
-        assert disturbance.look(False) is None
+        assert disturbance.check(False) is None
 
 
 def test_a_closed_lid_is_noticed(clocks: Clocks, disturbance: Disturbance) -> None:
     clocks.pass_s(3.0)
     clocks.pass_s(600.0, asleep=True)
-    assert disturbance.look(False) == 'the machine slept for 600 s'
+    assert disturbance.check(False) == 'the machine slept for 600 s'
 
 
 def test_a_page_may_come_back(clocks: Clocks, disturbance: Disturbance) -> None:
     for lost in (True, True, False, True, True):
-        assert disturbance.look(lost) is None
+        assert disturbance.check(lost) is None
         clocks.pass_s(1.0)
     clocks.pass_s(0.5)
-    assert disturbance.look(True) == "the participant's page was gone for 2 s"
+    assert disturbance.check(True) == "the participant's page was gone for 2 s"
 
 
 def test_the_clocks_of_this_machine_agree() -> None:
-    assert Disturbance(2.0).look(False) is None
+    assert Disturbance(2.0).check(False) is None

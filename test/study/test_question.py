@@ -41,7 +41,7 @@ def test_what_is_no_answer_is_told(name: str, answer: Any) -> None:
 
 
 def test_texts_are_given_in_the_language_that_there_is() -> None:
-    both, plain = LocalText.of({'en': 'Age', 'de': 'Alter'}), LocalText.of('Age')
+    both, plain = LocalText.from_value({'en': 'Age', 'de': 'Alter'}), LocalText.from_value('Age')
     assert [both.in_language(code) for code in ('de', 'en', 'fr')] == ['Alter', 'Age', 'Age']
     assert plain.in_language('de') == 'Age' and not plain.lacks('de')
     assert both.lacks('fr') and not LocalText().lacks('fr')

@@ -21,7 +21,8 @@ import pytest
 
 Array = NDArray[np.float64]
 # The functions of one vehicle, for several.
-look_ahead, urgency = np.vectorize(lane_change.look_ahead), np.vectorize(lane_change.urgency)
+lane_change_length = np.vectorize(lane_change.lane_change_length)
+urgency = np.vectorize(lane_change.urgency)
 
 
 def random_changes(count: int) -> tuple[Array, Array, Array, Array, Array]:
@@ -81,9 +82,9 @@ def test_a_change_in_progress_is_continued_smoothly() -> None:
 
 def test_the_look_ahead_distance_grows_with_the_speed_and_stays_comfortable() -> None:
     speed = np.array([0.0, 2.0, 10.0, 20.0, 35.0])
-    np.testing.assert_allclose(look_ahead(speed), [12.0, 12.0, 40.0, 80.0, 140.0])
+    np.testing.assert_allclose(lane_change_length(speed), [12.0, 12.0, 40.0, 80.0, 140.0])
     # Over two lanes 4 s would take 5.7735 * 7 / 16 = 2.5 m/s^2: it takes longer.
-    wide = look_ahead(speed, shift=7.0)
+    wide = lane_change_length(speed, shift=7.0)
     assert (PEAK * 7.0 * speed**2 / wide**2 <= 2.0 + 1e-9).all()
     assert wide[4] / 35.0 == pytest.approx(math.sqrt(10.0 / math.sqrt(3.0) * 7.0 / 2.0))
 

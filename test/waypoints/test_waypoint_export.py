@@ -77,7 +77,7 @@ def errors_of(exported: ExportedRoads) -> list[str]:
 def rejoined(roads: WaypointRoads, exported: ExportedRoads, number: int) -> WaypointLane:
     """Join the lanes of the pieces of a lane, each of which begins where the last one ended."""
     rows = [roads.lane(piece).rows for piece in exported.lanelets(number)]
-    return WaypointLane.of_rows(np.concatenate([*(part[:-1] for part in rows[:-1]), rows[-1]]))
+    return WaypointLane.from_rows(np.concatenate([*(part[:-1] for part in rows[:-1]), rows[-1]]))
 
 
 @pytest.mark.slow

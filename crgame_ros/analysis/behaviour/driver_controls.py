@@ -34,8 +34,8 @@ class DriverControls:
     dt_s: float
 
     @classmethod
-    def of(cls, times_s: FloatArray, commands: FloatArray, max_wheel_angle: float,
-           dt_s: float) -> 'DriverControls':
+    def from_commands(cls, times_s: FloatArray, commands: FloatArray, max_wheel_angle: float,
+                      dt_s: float) -> 'DriverControls':
         """
         Take them from commands.
 

@@ -101,9 +101,10 @@ def controls_of(run: RunRecord, vehicle_id: str) -> DriverControls | None:
     if vehicle_id not in ids:
         return None
     number = ids.index(vehicle_id)
-    vehicle = run.log.game.vehicles[number].vehicle
-    return DriverControls.of(run.times_s, run.commands[:, number],
-                             vehicle.max_steering_wheel_angle, run.log.game.scheduler.dt_s)
+    game = run.log.game
+    return DriverControls.from_commands(
+        run.times_s, run.commands[:, number],
+        game.vehicles[number].vehicle.max_steering_wheel_angle, game.scheduler.dt_s)
 
 
 def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:

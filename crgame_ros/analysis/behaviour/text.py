@@ -40,7 +40,7 @@ def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
     for change in found.lane_changes:
         yield from _lane_change(change)
     for take_over in found.take_overs:
-        yield from _take_over(take_over)
+        yield from _take_over_lines(take_over)
 
 
 def detection_lines(found: DetectionScore) -> Iterator[str]:
@@ -76,7 +76,7 @@ def _lane_change(change: LaneChangeGap) -> Iterator[str]:
         yield f'  lane change {where}: nobody near'
 
 
-def _take_over(take_over: TakeOver) -> Iterator[str]:
+def _take_over_lines(take_over: TakeOver) -> Iterator[str]:
     by = '' if take_over.request is None else f', asked for by {take_over.request.by}'
     yield f'  taken over from {take_over.seat_s:.1f} to {take_over.end_s:.1f} s{by}'
     for name, value in (('take_over_hands_on', take_over.to_hands_on_s),

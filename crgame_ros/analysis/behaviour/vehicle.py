@@ -92,7 +92,7 @@ class DriverBehaviour:
                 for each in self.reactions],
             'response_limits': self.limits._asdict(),
             'lane_changes': [_lane_change(each) for each in self.lane_changes],
-            'take_overs': [_take_over(each) for each in self.take_overs]}
+            'take_overs': [_take_over_values(each) for each in self.take_overs]}
         if series:
             found['series'] = {'time_s': self.times_s.tolist(),
                                'tlc': list(map(_finite, self.tlc_s.tolist())),
@@ -111,7 +111,7 @@ def _lane_change(change: LaneChangeGap) -> dict[str, Any]:
     return found
 
 
-def _take_over(take_over: TakeOver) -> dict[str, Any]:
+def _take_over_values(take_over: TakeOver) -> dict[str, Any]:
     request = take_over.request
     return {'request': None if request is None else request.by,
             'request_s': None if request is None else request.time_s,

@@ -259,7 +259,7 @@ class Criticality:
         other, moves, accelerations = int(others[leader.number]), scene.moves, scene.accelerations
         here, there = (np.array((math.cos(yaw), math.sin(yaw)))
                        for yaw in (leader.own_heading, leader.heading))
-        values[leader.number, :_OF_LEADER] = _of_leader(
+        values[leader.number, :_OF_LEADER] = _compute_leader_measures(
             leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
             float(accelerations[subject] @ here), float(accelerations[other] @ there))
 
@@ -283,8 +283,8 @@ class Criticality:
                     self._found[number].crossings.append(crossing)
 
 
-def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: float,
-               leader_acceleration: float) -> tuple[float, ...]:
+def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acceleration: float,
+                             leader_acceleration: float) -> tuple[float, ...]:
     """Return the measures of car following, in the order of `MEASURES`."""
     headway = time_gap(gap, speed)
     return (gap, headway, headway, time_to_collision(gap, speed, leader_speed),
@@ -296,4 +296,4 @@ def _of_leader(gap: float, speed: float, leader_speed: float, acceleration: floa
 
 # Of who leads nobody.
 # The measures of car following to somebody who is not the leader.
-WITHOUT_LEADER = _of_leader(math.nan, 0.0, 0.0, 0.0, 0.0)
+WITHOUT_LEADER = _compute_leader_measures(math.nan, 0.0, 0.0, 0.0, 0.0)

@@ -57,7 +57,7 @@ class Touch(NamedTuple):
     n: int
 
     @classmethod
-    def of(cls, entry: Mapping[str, Any]) -> 'Touch':
+    def from_entry(cls, entry: Mapping[str, Any]) -> 'Touch':
         """Read one."""
         return cls(entry['vehicle'], entry['with'], entry['n'])
 

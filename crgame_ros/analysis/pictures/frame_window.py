@@ -49,7 +49,7 @@ class FrameWindow:
     length: float
     height: float
 
-    def of(self, points: FloatArray) -> FloatArray:
+    def to_window(self, points: FloatArray) -> FloatArray:
         """Map points (..., 2) of the map into the window's own coordinates."""
         return np.asarray((points - (self.x, self.y)) @ _turn(self.yaw))
 

@@ -72,7 +72,7 @@ class PicturedRun:
         # Without cycles nobody says at which step; what touches at a tick is found all the same.
         if log.cycles is not None:
             report = timing_report(self.bag, log=log)
-            touches = tuple(map(Touch.of, report['contacts'] or ()))
+            touches = tuple(map(Touch.from_entry, report['contacts'] or ()))
         return critical_moments(
             self.record, measure_log(log, progress=self._progress('measuring')), touches)
 

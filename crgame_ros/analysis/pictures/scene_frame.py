@@ -104,11 +104,11 @@ class PicturedRoad:
         points = shapely.get_coordinates(shapely.intersection(self._surface, cut))
         if not len(points):
             return 0.0, 0.0
-        heights = window.of(points + self._origin)[:, 1]
+        heights = window.to_window(points + self._origin)[:, 1]
         return float(heights.min()), float(heights.max())
 
     def _seen(self, line: shapely.LineString, window: FrameWindow) -> FloatArray:
-        return window.of(shapely.get_coordinates(line) + self._origin)
+        return window.to_window(shapely.get_coordinates(line) + self._origin)
 
 
 def _extent(lanelet: Lanelet) -> list[float]:
@@ -237,10 +237,10 @@ class FrameScene:
             self._cut = (window, self.road.within(window))
         first = max(0, row - round(trace_s / scheduler.time_step_s))
         states = self.log.vehicle_states[first:row + 1]
-        traces = tuple(FrameLine(item.id, window.of(states[:, i, :2]), self.styles[item.id].colour,
-                                 item.role is Role.AUTONOMOUS)
+        traces = tuple(FrameLine(item.id, window.to_window(states[:, i, :2]),
+                                 self.styles[item.id].colour, item.role is Role.AUTONOMOUS)
                        for i, item in enumerate(self.log.vehicles) if row > first)
-        plans = tuple(FrameLine(av, window.of(plan[:, :2]), self.styles[av].colour, True,
+        plans = tuple(FrameLine(av, window.to_window(plan[:, :2]), self.styles[av].colour, True,
                                 max(1, round(DOTS_S / scheduler.time_step_s)))
                       for av in self._plans
                       if (plan := self._plan(av, time_s)) is not None)
@@ -295,11 +295,11 @@ class FrameScene:
             if not near[i]:
                 continue
             item = self.log.descriptions[i]
-            corners = window.of(footprints([item], poses[i:i + 1])[0])
+            corners = window.to_window(footprints([item], poses[i:i + 1])[0])
             if not ((corners.max(axis=0) > -half) & (corners.min(axis=0) < half)).all():
                 continue
             bodies.append(FrameBody(
-                item.id, corners, window.of(front_mark(item, poses[i])) if _has_front(item)
+                item.id, corners, window.to_window(front_mark(item, poses[i])) if _has_front(item)
                 else None, self.styles[item.id].colour if item.role.is_ego
                 else object_colour(item), item.role.is_ego,
                 item.role.is_ego if labelled is None else item.id in labelled))

@@ -71,7 +71,8 @@ class TimingTable:
     def text(self) -> str:
         """Return it for a terminal."""
         rows = [('', *self.labels), *(
-            (row.name, *(_told(row, found) for found in self.summaries)) for row in TIMING_ROWS)]
+            (row.name, *(_format_value(row, found) for found in self.summaries))
+            for row in TIMING_ROWS)]
         widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
         return ''.join(
             '  '.join((f'{row[0]:<{widths[0]}}', *(
@@ -92,8 +93,8 @@ class TimingTable:
         """Return it as Markdown."""
         labels = [label.replace('\\', '\\\\').replace('|', '\\|') for label in self.labels]
         lines = ['| metric | ' + ' | '.join(labels) + ' |', '|---|' + '---:|' * len(labels)]
-        lines += [f'| {row.name} | ' + ' | '.join(_told(row, found) for found in self.summaries)
-                  + ' |' for row in TIMING_ROWS]
+        lines += [f'| {row.name} | ' + ' | '.join(
+            _format_value(row, found) for found in self.summaries) + ' |' for row in TIMING_ROWS]
         return '\n'.join(lines) + '\n'
 
     def latex(self) -> str:
@@ -108,7 +109,7 @@ class TimingTable:
                 group = row.group
                 lines += [r'\hline', rf'\multicolumn{{{len(self.labels) + 1}}}{{l}}'
                           rf'{{\textit{{{group}}}}} \\']
-            cells = ' & '.join(_latex(_told(row, found)) for found in self.summaries)
+            cells = ' & '.join(_latex(_format_value(row, found)) for found in self.summaries)
             lines.append(rf'{row.name} (${row.symbol}$) & {cells} \\')
         return '\n'.join([*lines, r'\hline', r'\end{tabular}', ''])
 
@@ -119,7 +120,7 @@ def _summary(run: TimedRun) -> TimingSummary:
     return metrics.summary()
 
 
-def _told(row: TimingRow, found: TimingSummary) -> str:
+def _format_value(row: TimingRow, found: TimingSummary) -> str:
     value = f'{row.value(found):{row.form}}'
     return f'{value}{"" if row.unit == "%" else " "}{row.unit}' if row.unit else value
 

@@ -62,7 +62,7 @@ def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
     yield 'events that took effect', lambda run: str(len(run.record.fired))
     yield 'plans accepted', accepted
     yield 'worst latency p99 [ms]', _latency
-    yield 'greatest cumulative error [ms]', lambda run: _told(
+    yield 'greatest cumulative error [ms]', lambda run: _format_value(
         run, lambda timing: number(timing['max_cumulative_error_ms'], 1))
 
 
@@ -84,7 +84,7 @@ def accepted(run: ReportRun) -> str:
     return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING
 
 
-def _told(run: ReportRun, say: Callable[[Any], str]) -> str:
+def _format_value(run: ReportRun, say: Callable[[Any], str]) -> str:
     return NOTHING if run.timing is None else say(run.timing)
 
 

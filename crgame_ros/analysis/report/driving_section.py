@@ -44,7 +44,7 @@ def driving_section(run: ReportRun) -> Section | None:
             (_lane_changes(run, found), 'Gaps accepted', (
                 'driver', 'side', 'first wheel across at [s]', 'leader', 'time gap to it [s]',
                 'follower', 'time gap to it [s]')),
-            (_take_overs(run, found), 'Take-overs', (
+            (_take_over_rows(run, found), 'Take-overs', (
                 'vehicle', 'asked for by', 'from [s]', 'to [s]', 'hands on after [s]',
                 'first stable second after [s]'))):
         told = list(rows)
@@ -85,7 +85,7 @@ def _lane_changes(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[
                                   number(None if gap is None else gap.time_gap_s))))
 
 
-def _take_overs(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+def _take_over_rows(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
     for driver in found:
         for each in driver.take_overs:
             yield (named(run, driver.vehicle_id),

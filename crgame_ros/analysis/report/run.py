@@ -135,13 +135,13 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
     course = np.full((len(log.vehicles), len(PLOTTED), len(log.ks)), np.nan)
     row = 0
 
-    def take(criticality: Criticality) -> None:
+    def add_step(criticality: Criticality) -> None:
         nonlocal row
         for subject, _, values in criticality.latest:
             course[subject, :, row] = _most_critical(values)
         row += 1
     found = measure_log(log, progress=lambda part: progress(
-        _READ_SHARE + _MEASURE_SHARE * part), on_tick=take)
+        _READ_SHARE + _MEASURE_SHARE * part), on_tick=add_step)
     measured = _READ_SHARE + _MEASURE_SHARE
     outcome = timing if offline is None else offline
     scores = scores_of(record, plans_of_report(outcome), drives_only=drives_only,

@@ -45,7 +45,8 @@ def story_moments(record: RunRecord, criticality: Criticality,
     first_s, last_s = ((int(k) - scheduler.k0) * scheduler.time_step_s
                        for k in (log.ks[0], log.ks[-1]))
     ends = [Moment(first_s, 'start', ()), Moment(last_s, 'end', ())]
-    found = list(critical_moments(record, criticality, [Touch.of(item) for item in contacts]))
+    found = list(critical_moments(record, criticality,
+                                  [Touch.from_entry(item) for item in contacts]))
     found += [Moment(worst.time_s, f'{WORDS.get(name, name)} of {vehicle.vehicle_id} to '
                      f'{worst.other} is {worst.value:.2f} '
                      + MEASURES[name].unit.replace('^2', '²'),

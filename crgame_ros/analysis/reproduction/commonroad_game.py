@@ -56,7 +56,8 @@ def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, fol
     log = run.log
     record = RunRecord(log, np.empty(0, dtype=np.int64),
                        np.empty((0, len(log.vehicles), len(COMMAND_COLUMNS))), ())
-    moments = critical_moments(record, run.criticality, tuple(map(Touch.of, run.contacts or ())))
+    moments = critical_moments(record, run.criticality,
+                               tuple(map(Touch.from_entry, run.contacts or ())))
     scene = FrameScene(log)
     frames, profiles = numbers
     written: list[Path] = []

@@ -64,7 +64,7 @@ class _Drives:
         self._expert = expert
         original = parse_scenario(log.xml_text, '/scenario/xml')
         self._nuplan = NuplanScorer(original)
-        self._original = ScoredScenario.of_file(original)
+        self._original = ScoredScenario.from_file(original)
         self._problems = {problem.planning_problem_id: problem
                           for problem in original.planning_problems}
 

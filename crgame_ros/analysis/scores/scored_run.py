@@ -40,7 +40,7 @@ def score_run(record: RunRecord, *, expert: Expert | None = None,
     log = record.log
     drives = score_drives(log, expert=expert, plans=plans, put_back=record.put_back)
     ends = first_ends(log, record.put_back)
-    scored, exported = ScoredScenario.of_run(log)
+    scored, exported = ScoredScenario.from_run(log)
     judge = SolutionJudge(scored)
     vehicles = [
         _judged(ends.get(drive.vehicle_id, log), number, drive,

@@ -50,7 +50,7 @@ class ScoredScenario:
     own: dict[int, int] = field(default_factory=dict)
 
     @classmethod
-    def of_file(cls, loaded: LoadedScenario) -> 'ScoredScenario':
+    def from_file(cls, loaded: LoadedScenario) -> 'ScoredScenario':
         """
         Take a scenario as it is published.
 
@@ -72,7 +72,7 @@ class ScoredScenario:
         return cls(loaded, own | loaded.human_problems)
 
     @classmethod
-    def of_run(cls, log: RunLog) -> tuple['ScoredScenario', ExportedScenario]:
+    def from_run(cls, log: RunLog) -> tuple['ScoredScenario', ExportedScenario]:
         """
         Export a run and take its scenario.
 

@@ -86,7 +86,7 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     """
     dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
     if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):
-        return _of_inputs(found, problem, dynamics, dt_s)
+        return _check_inputs(found, problem, dynamics, dt_s)
     stride = max(1, round(LEAST_STEP_S / dt_s))
     states = found.trajectory.state_list[::stride]
     if len(states) < 2:
@@ -174,8 +174,8 @@ def _why(position: float, heading: float, acceleration: float, rate: float,
             'beside it')
 
 
-def _of_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
-               dynamics: VehicleDynamics, dt_s: float) -> TrajectoryFeasibility:
+def _check_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
+                  dynamics: VehicleDynamics, dt_s: float) -> TrajectoryFeasibility:
     """Ask of a solution that holds inputs: each within bounds and friction."""
     try:
         feasible, made = feasibility_checker.input_vector_feasibility(

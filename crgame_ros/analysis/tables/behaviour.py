@@ -79,7 +79,7 @@ BEHAVIOUR_TABLES = REACTIONS, LANE_CHANGES, TAKE_OVERS
 def write_behaviour(run: TabulatedRun, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of reactions, lane changes and take-overs."""
     for table, rows in ((REACTIONS, _reactions(run)), (LANE_CHANGES, _lane_changes(run)),
-                        (TAKE_OVERS, _take_overs(run))):
+                        (TAKE_OVERS, _take_over_rows(run))):
         found = list(rows)
         if found:
             writers[table.name].add({column.name: [row[column.name] for row in found]
@@ -110,7 +110,7 @@ def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, A
             f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
 
 
-def _take_overs(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+def _take_over_rows(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
     for driver in run.behaviour:
         for each in driver.take_overs:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'seat_s': each.seat_s,

@@ -76,7 +76,7 @@ def write_criticality(run: TabulatedRun, pairs: TableRows, crossings: TableRows,
     """
     collected = _Collected(run, pairs, crossings)
     criticality = measure_log(run.record.log, progress=progress,
-                              on_tick=collected.look)
+                              on_tick=collected.add)
     collected.flush()
     run.criticality = {found.vehicle_id: found for found in criticality.report()}
 
@@ -92,7 +92,7 @@ class _Collected:
         self._values: list[Any] = []
         self._rows = 0
 
-    def look(self, criticality: Criticality) -> None:
+    def add(self, criticality: Criticality) -> None:
         """Take what was measured at a step."""
         if self._ids is None:
             self._ids = pa.array(criticality.ids, TEXT)

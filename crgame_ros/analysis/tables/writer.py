@@ -43,12 +43,12 @@ class TableRows(ABC):
         if not rows:
             return
         self.rows += rows
-        self.take(pa.RecordBatch.from_arrays(
+        self.add_batch(pa.RecordBatch.from_arrays(
             [_array(columns.get(column.name), column.type, rows)
              for column in self.declaration.columns], schema=self.declaration.schema))
 
     @abstractmethod
-    def take(self, batch: pa.RecordBatch) -> None:
+    def add_batch(self, batch: pa.RecordBatch) -> None:
         """Take rows in the table's own types."""
 
 
@@ -59,7 +59,7 @@ class KeptTable(TableRows):
         super().__init__(declaration)
         self._kept: list[pa.RecordBatch] = []
 
-    def take(self, batch: pa.RecordBatch) -> None:
+    def add_batch(self, batch: pa.RecordBatch) -> None:
         """Keep rows."""
         self._kept.append(batch)
 
@@ -130,7 +130,7 @@ class TableWriter(TableRows):
         else:
             self._parquet = pq.ParquetWriter(path, declaration.schema, compression='zstd')
 
-    def take(self, batch: pa.RecordBatch) -> None:
+    def add_batch(self, batch: pa.RecordBatch) -> None:
         """Keep rows until a piece is worth writing."""
         self._kept.append(batch)
         self._kept_rows += len(batch)

@@ -46,7 +46,7 @@ def score(path: Path) -> dict[str, Any]:
     record = read_run_record(path)
     scores = scores_of(record, {}, drives_only=True)
     return {'vehicles': [
-        {'vehicle': each.vehicle_id, 'role': each.role, **_told(each.nuplan),
+        {'vehicle': each.vehicle_id, 'role': each.role, **_score_values(each.nuplan),
          **_motion(record.log, number), 'remarks': list(each.remarks)}
         for number, each in enumerate(scores.vehicles)], 'refusal': scores.refusal}
 
@@ -95,7 +95,7 @@ def compare(path: Path, others: Sequence[str], names: Sequence[str], out: str) -
     return {}
 
 
-def _told(found: NuplanScore | None) -> dict[str, Any]:
+def _score_values(found: NuplanScore | None) -> dict[str, Any]:
     if found is None:
         return {'score': None, 'parts': []}
     parts = [(name, value, 0.0) for name, value in found.multipliers.items()]

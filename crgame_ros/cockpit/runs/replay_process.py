@@ -29,7 +29,7 @@ def main() -> int:
     try:
         backend = ReplayBackend(Path(sys.argv[1]))
     except CrgameError as error:
-        _say({'error': str(error).replace(f'{Path(sys.argv[1]).parent}/', '')})
+        _send({'error': str(error).replace(f'{Path(sys.argv[1]).parent}/', '')})
         return error.exit_code
     asyncio.run(_serve(backend, Access(HOST, 0, token)))
     return 0
@@ -37,14 +37,14 @@ def main() -> int:
 
 async def _serve(backend: ReplayBackend, access: Access) -> None:
     runner, port = await listen(create_app(backend, access, None), HOST, 0)
-    _say({'port': port})
+    _send({'port': port})
     try:
         await asyncio.to_thread(sys.stdin.read)
     finally:
         await runner.cleanup()
 
 
-def _say(content: dict[str, object]) -> None:
+def _send(content: dict[str, object]) -> None:
     print(json.dumps(content), flush=True)
 
 

@@ -43,7 +43,7 @@ class _Pending:
     def close(self) -> None:
         """Do nothing: who sends it knows its end."""
 
-    def take(self) -> bytes:
+    def read(self) -> bytes:
         data = b''.join(self._parts)
         self._parts.clear()
         return data
@@ -69,8 +69,8 @@ def zip_chunks(name: str, files: Mapping[str, Path]) -> Iterator[bytes]:
             with source, archive.open(entry, 'w', force_zip64=True) as target:
                 while data := source.read(_CHUNK_BYTES):
                     target.write(data)
-                    yield pending.take()
-    yield pending.take()
+                    yield pending.read()
+    yield pending.read()
 
 
 READER = 'crgame_ros.cockpit.runs.jobs'

@@ -144,7 +144,7 @@ class CellBlocks:
             own_seeds = pc.fill_null(batch.rows['seed'], 0).to_numpy()
             digests = self._pairs(numbers, own_seeds)
             mine = digests % np.uint64(self.count) == number
-            tables.append(_told(batch.rows.filter(pa.array(mine))))
+            tables.append(_failure_columns(batch.rows.filter(pa.array(mine))))
             labels.append(numbers[mine])
             seeds.append(own_seeds[mine])
             pairs.append(digests[mine])
@@ -172,7 +172,7 @@ def _all_labels(parts: EvaluatedParts) -> dict[str, set[str]]:
     return found
 
 
-def _told(rows: pa.RecordBatch) -> pa.RecordBatch:
+def _failure_columns(rows: pa.RecordBatch) -> pa.RecordBatch:
     status = pc.fill_null(rows['status'], '')
     return pa.RecordBatch.from_arrays([
         pc.fill_null(rows['cell'], ''), pc.not_equal(status, _OK), status,
@@ -210,7 +210,7 @@ class CellGroups:
         self.labels: list[tuple[str, ...]] = []
         self._numbers: dict[tuple[str, ...], int] = {}
 
-    def of(self, block: CellBlock) -> IntArray:
+    def numbers(self, block: CellBlock) -> IntArray:
         """Return the number of each cell's group (N)."""
         columns = [TEXT_FACTORS.index(factor) for factor in self._by]
         different, inverse = np.unique(block.labels[:, columns], axis=0, return_inverse=True)

@@ -47,8 +47,8 @@ class FailureReasons:
             self._counts.setdefault(kind, Counter())[group] += 1
             self._examples[kind] = min(key, self._examples.get(kind, key))
 
-    def told(self, parts: EvaluatedParts,
-             labels: Sequence[tuple[str, ...]]) -> tuple[FailureReason, ...]:
+    def reasons(self, parts: EvaluatedParts,
+                labels: Sequence[tuple[str, ...]]) -> tuple[FailureReason, ...]:
         """
         Return the most frequent ones, and what is left in one of each status.
 
@@ -133,7 +133,7 @@ def tally_cells(blocks: CellBlocks, by: Sequence[str], baseline: str) -> CellTal
     found = CellTally(CellGroups(blocks, by), baseline,
                       planners.index(baseline) if baseline else -1)
     for block in blocks:
-        groups, clusters = found.groups.of(block), blocks.clusters(block)
+        groups, clusters = found.groups.numbers(block), blocks.clusters(block)
         _count_units(found.units, blocks.count, block.number, groups, clusters)
         found.failed.update(groups[~block.ok].tolist())
         found.failures.add(block, groups)

@@ -49,9 +49,9 @@ class EvaluatedParts:
         if not self._parts['cells']:
             raise InputError('no cell is finished', str(folder),
                              'give the folder of an evaluation, or wait until its first cells are')
-        self.rows = sum(_look_at(part, 'cells').num_rows for part in self._parts['cells'])
+        self.rows = sum(_read_metadata(part, 'cells').num_rows for part in self._parts['cells'])
         self.columns = frozenset(name for part in self._parts['vehicles']
-                                 for name in _look_at(part, 'vehicles').schema.names)
+                                 for name in _read_metadata(part, 'vehicles').schema.names)
 
     def batches(self, table: str, columns: Mapping[str, pa.DataType],
                 batch_rows: int = 32_768) -> Iterator[PartBatch]:
@@ -100,7 +100,7 @@ def _opened(part: Path | pa.Buffer) -> Path | pa.BufferReader:
     return part if isinstance(part, Path) else pa.BufferReader(part)
 
 
-def _look_at(part: Path | pa.Buffer, table: str) -> pq.FileMetaData:
+def _read_metadata(part: Path | pa.Buffer, table: str) -> pq.FileMetaData:
     try:
         found = pq.read_metadata(_opened(part))
     except (pa.ArrowException, OSError) as error:

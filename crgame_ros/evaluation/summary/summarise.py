@@ -131,7 +131,7 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
     return Summary(
         folder, tuple(by), tally.baseline, chosen, len(tally.scenarios),
         _groups(tally, means), _differences(tally, differences), worst_by, found.worst(),
-        tally.failures.told(parts, tally.groups.labels), resamples, seed)
+        tally.failures.reasons(parts, tally.groups.labels), resamples, seed)
 
 
 def _baseline(wanted: str | None, by: Sequence[str], blocks: CellBlocks) -> str:
@@ -164,7 +164,7 @@ def _sum_up(parts: EvaluatedParts, blocks: CellBlocks, tally: CellTally,
         vehicles = measured_vehicles(parts, block, columns)
         found.add(blocks, block, vehicles)
         sums, counts = (each[:, :len(chosen)] for each in vehicles.sums(block, columns))
-        groups, clusters = tally.groups.of(block), blocks.clusters(block)
+        groups, clusters = tally.groups.numbers(block), blocks.clusters(block)
         _add(means, block.number, groups, (sums, counts, clusters))
         if tally.pairs:
             pairs = paired_cells(block, tally.baseline_number)

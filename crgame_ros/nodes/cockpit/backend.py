@@ -42,8 +42,8 @@ class PageReport:
         self._diagnostics = diagnostics
         self._told: dict[str, _Told] = {}
 
-    def tell(self, seats: Iterable[HeldSeat], clients: Mapping[str, Client],
-             stamp_ns: int) -> None:
+    def publish(self, seats: Iterable[HeldSeat], clients: Mapping[str, Client],
+                stamp_ns: int) -> None:
         """
         Publish what has changed, and what has not been told for a second.
 
@@ -164,7 +164,7 @@ class LiveBackend:
         message = self._seat_slot.latest()
         if message is not None:
             try:
-                self._desk.take_seats(message.data)
+                self._desk.receive_seats(message.data)
             except InputError as error:
                 self._node.get_logger().warning(str(error), throttle_duration_sec=COMPLAIN_S)
         if self._lost != self._feed.status.seats_lost:
@@ -176,9 +176,9 @@ class LiveBackend:
         self._seat_who_chose()
         # People come and change their names.
         self._desk.serve()
-        self._people.tell(time.monotonic())
+        self._people.publish(time.monotonic())
         if self._feed.scenario is not None:
-            self._page_report.tell(
+            self._page_report.publish(
                 self._desk.table.held.values(), self._hub.clients,
                 self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 

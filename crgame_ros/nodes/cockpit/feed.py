@@ -141,7 +141,7 @@ class AvFeed:
         slot = self._slots['/<av>/scan', av]
         newest = {}
         for _ in range(SCAN_DEPTH):
-            message = slot.take()
+            message = slot.pop()
             if message is None:
                 break
             newest[message.header.frame_id] = message
@@ -346,7 +346,7 @@ class CockpitFeed:
 
     def _poll_criticality(self) -> None:
         for _ in range(QUEUE):
-            message = self._criticality.take()
+            message = self._criticality.pop()
             if message is None:
                 return
             if self._frames is not None \
@@ -361,7 +361,7 @@ class CockpitFeed:
             epoch, events = parse_events_document(fired.data)
             if epoch == self.scenario.game.epoch:
                 self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
-                self.status.take_events(events, self.scenario.game.scheduler.dt_s)
+                self.status.add_events(events, self.scenario.game.scheduler.dt_s)
         if signals is not None:
             k, states = parse_signals_document(signals.data)
             self._hub.set_document('signals', {'k': k, 'states': states})
@@ -370,14 +370,14 @@ class CockpitFeed:
         for slot in (self._diagnostics, *self._verdicts.values()):
             # A flood waits its turn.
             for _ in range(QUEUE):
-                message = slot.take()
+                message = slot.pop()
                 if message is None:
                     break
                 stamp_ns = from_time(message.header.stamp)
                 for status in message.status:
-                    self._take_status(status, stamp_ns)
+                    self._add_status(status, stamp_ns)
 
-    def _take_status(self, status: DiagnosticStatus, stamp_ns: int) -> None:
+    def _add_status(self, status: DiagnosticStatus, stamp_ns: int) -> None:
         # Others speak before they have heard of any time.
         timeless = stamp_ns == 0 and not (
             status.name.startswith('sim_node: ') or status.name.endswith('/drivability'))
@@ -385,7 +385,7 @@ class CockpitFeed:
                 and stamp_ns < self.scenario.game.scheduler.clock_offset_ns:
             # Of the run before.
             return
-        self.status.take(read_status(status), self.t)
+        self.status.add(read_status(status), self.t)
         if status.name == 'sim_node: run':
             self._run_heard_s = time.monotonic()
 

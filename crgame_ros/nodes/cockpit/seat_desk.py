@@ -48,7 +48,7 @@ class PeopleFeed:
         self._told_s = 0.0
         self._shown: frozenset[str] = frozenset()
 
-    def tell(self, now_s: float) -> None:
+    def publish(self, now_s: float) -> None:
         """
         Tell who is here if a second has passed, or somebody has come or gone.
 
@@ -123,10 +123,10 @@ class SeatDesk:
     def close(self) -> None:
         """Let go of every seat."""
         for seat in list(self.table.held.values()):
-            self._let_go(seat)
+            self._publish_hands_off(seat)
             self._orders.order_seat(SeatDemand(seat.id, left=seat.person))
 
-    def take_seats(self, text: str) -> None:
+    def receive_seats(self, text: str) -> None:
         """
         Take what `/seats` says.
 
@@ -164,7 +164,7 @@ class SeatDesk:
         for seat in self.table.held.values():
             seat.delay.stepped(now_s, self._feed.n)
             if seat.is_silent(now_s):
-                self._let_go(seat)
+                self._publish_hands_off(seat)
             elif new_cycle and not seat.away:
                 self._publish(seat)
 
@@ -189,7 +189,7 @@ class SeatDesk:
         """Take the hands of a page that is gone off the controls, at once."""
         seat = self.table.left(client.id)
         if seat is not None:
-            self._let_go(seat)
+            self._publish_hands_off(seat)
             self._told.pop(seat.id, None)
             self._orders.order_seat(SeatDemand(seat.id, left=seat.person))
         self.show()
@@ -202,7 +202,7 @@ class SeatDesk:
         """
         seat = self.table.holding(client.id, message['seat'])
         now_s = time.monotonic()
-        if seat.take(message, now_s):
+        if seat.apply_input(message, now_s):
             # The newest step, for the one that obeys this is measured from it.
             self._feed.poll_states()
             seat.delay.changed(now_s, self._feed.n)
@@ -215,7 +215,7 @@ class SeatDesk:
 
         :raises CrgameError: if it cannot be done.
         """
-        orders = {'claim': self._claim, 'release': self._give_back, 'hand_over': self._offer,
+        orders = {'claim': self._claim, 'release': self._release_asked, 'hand_over': self._offer,
                   'answer': self._answer, 'ask': self._ask, 'ready': self._ready}
         if message['type'] not in orders:
             raise InputError('cannot be done in a live run', str(message['type']))
@@ -256,7 +256,7 @@ class SeatDesk:
         held = self.table.held.get(seat)
         if held is not None and held.person == client.person and held.holder != client.id:
             # The server has not noticed yet that the old connection is gone.
-            self._let_go(held)
+            self._publish_hands_off(held)
             del self.table.held[seat]
             held = None
         if held is None and seat not in self._awaited:
@@ -283,14 +283,14 @@ class SeatDesk:
         displaced = None if tenant is None or tenant.person.id == person.id else tenant.person.id
         self._order(SeatDemand(held.id, COCKPIT, person, displaced))
 
-    def _give_back(self, client: Client, message: Mapping[str, Any]) -> str:
+    def _release_asked(self, client: Client, message: Mapping[str, Any]) -> str:
         self._release(client, message['seat'])
         return f'{message["seat"]} is given back'
 
     def _release(self, client: Client, seat: str) -> None:
         held = self.table.release(client.id, seat)
         if held is not None:
-            self._let_go(held)
+            self._publish_hands_off(held)
         self._told.pop(seat, None)
         self._order(SeatDemand(seat, GAME))
 
@@ -304,18 +304,18 @@ class SeatDesk:
     def _answer(self, client: Client, message: Mapping[str, Any]) -> str:
         seat = message['seat']
         if not message['accept']:
-            self._tell(self.table.decline(client.id, seat).holder,
+            self._send(self.table.decline(client.id, seat).holder,
                        f'{client.name} does not want {seat}')
             return f'you do not take {seat}'
         taken = self.table.seat_of(client.id)
         before = self.table.accept(client.id, seat, client.person)
-        self._let_go(before)
+        self._publish_hands_off(before)
         if taken is not None:
-            self._let_go(taken)
+            self._publish_hands_off(taken)
             self.table.held.pop(taken.id, None)
             self._order(SeatDemand(taken.id, GAME))
         self._sit(client, self.table.held[seat])
-        self._tell(before.holder, f'{client.name} drives {seat} now')
+        self._send(before.holder, f'{client.name} drives {seat} now')
         return f'you drive {seat}'
 
     def _ask(self, client: Client, message: Mapping[str, Any]) -> str:
@@ -330,7 +330,7 @@ class SeatDesk:
             SeatDemand(seat, person=_person(client), ready=bool(message['ready'])))
         return 'you are ready' if message['ready'] else 'you are not ready'
 
-    def _tell(self, client_id: str, text: str) -> None:
+    def _send(self, client_id: str, text: str) -> None:
         client = self._hub.clients.get(client_id)
         if client is not None:
             self._hub.send_event('notice', {'level': 'info', 'text': text}, only=client)
@@ -339,9 +339,9 @@ class SeatDesk:
         self._orders.order_seat(demand)
         self._awaited.note(demand, self.table.seats, self.table.tenants, time.monotonic())
 
-    def _let_go(self, seat: HeldSeat) -> None:
+    def _publish_hands_off(self, seat: HeldSeat) -> None:
         """Say once that the hands are off; then silence, on which the seat's watchdog brakes."""
-        seat.let_go()
+        seat.release()
         self._publish(seat)
 
     def _publish(self, seat: HeldSeat) -> None:

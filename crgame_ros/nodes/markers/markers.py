@@ -199,7 +199,7 @@ class AvPaths:
         step_s = float(series.times_ns[1] - series.times_ns[0]) * 1e-9
         stride = max(1, round(PREDICTION_STEP_S / max(step_s, 1e-3)))
         chosen = np.unique([*range(0, len(series.times_ns), stride), len(series.times_ns) - 1])
-        layout = RequestLayout.of(series.names, self._own)
+        layout = RequestLayout.from_names(series.names, self._own)
         poses = series.positions[chosen][:, layout.columns]
         poses = self._transform.to_simulation(poses)
         ends = np.stack((poses[:-1, :, :2], poses[1:, :, :2]), axis=2)

@@ -96,30 +96,30 @@ class SimInputs:
         response.message = f'{av_id}: planner {"goes" if request.data else "stops"}'
         return response
 
-    def take_plan(self, av_id: str) -> JointSeries | None:
+    def pop_plan(self, av_id: str) -> JointSeries | None:
         """
         Take an AV's plan, if one has come.
 
         :raises InputError: if the message is malformed.
         """
-        message = self._plans[av_id].take()
+        message = self._plans[av_id].pop()
         return None if message is None else from_joint_trajectory(message, f'/{av_id}/plan')
 
-    def take_perceived(self, av_id: str) -> JointSeries | None:
+    def pop_perceived(self, av_id: str) -> JointSeries | None:
         """
         Take the head of the request that perception has sent to an AV's planner, if one has come.
 
         :raises InputError: if the message is malformed.
         """
         slot = self._perceived.get(av_id)
-        message = None if slot is None else slot.take()
+        message = None if slot is None else slot.pop()
         return None if message is None else request_head(message, f'/{av_id}/plan_request')
 
-    def take_agents(self) -> list[JointSeries]:
+    def pop_agents(self) -> list[JointSeries]:
         """Take the agents' states that have come; a flood waits its turn."""
         taken: list[JointSeries] = []
         while self._agents is not None and len(taken) < MAX_AGENTS \
-                and (message := self._agents.take()) is not None:
+                and (message := self._agents.pop()) is not None:
             with suppress(InputError):
                 taken.append(from_joint_trajectory(message, '/traffic/agents'))
         return taken
@@ -132,7 +132,7 @@ class SimInputs:
     def triggers(self) -> list[str]:
         """Take the names of the events that have been triggered; a flood waits its turn."""
         names: list[str] = []
-        while len(names) < MAX_TRIGGERS and (message := self._triggers.take()) is not None:
+        while len(names) < MAX_TRIGGERS and (message := self._triggers.pop()) is not None:
             names.append(str(message.data))
         return names
 
@@ -143,7 +143,7 @@ class SimInputs:
         :param take: gives the reason for which it takes none, else None.
         """
         for _ in range(MAX_REPORTS):
-            message = None if self._task_reports is None else self._task_reports.take()
+            message = None if self._task_reports is None else self._task_reports.pop()
             if message is None:
                 return
             try:
@@ -156,7 +156,7 @@ class SimInputs:
     def stop_request(self) -> tuple[str, str] | None:
         """Return (vehicle, n) of a violation that asks for a stop, None if there is none."""
         for vehicle_id, slot in self._drivability.items():
-            while (message := slot.take()) is not None:
+            while (message := slot.pop()) is not None:
                 if from_time(message.header.stamp) < self._clock_offset_ns:
                     # A verdict on the run before a reset.
                     continue

@@ -65,24 +65,24 @@ class LiveDiagnostics:
     def publish(self) -> None:
         """Report on every AV and seat."""
         self.begin()
-        while self.tell_next():
+        while self.publish_next():
             pass
 
     def begin(self) -> None:
-        """Begin a report on every AV and seat, of which each `tell_next` tells a part."""
+        """Begin a report on every AV and seat, which `publish_next` publishes part by part."""
         self._refusals = 0
         self._waiting = deque((
-            *(partial(self._tell_plans, av) for av in self._simulation.avs),
-            *(partial(self._tell_seat, seat) for seat in self._inputs.seats.all)))
+            *(partial(self._publish_plans, av) for av in self._simulation.avs),
+            *(partial(self._publish_seat, seat) for seat in self._inputs.seats.all)))
 
-    def tell_next(self) -> bool:
+    def publish_next(self) -> bool:
         """Return what is next of the report, if there is anything left; tell whether there was."""
         if not self._waiting:
             return False
         self._waiting.popleft()()
         return True
 
-    def _tell_plans(self, av: AutonomousVehicle) -> None:
+    def _publish_plans(self, av: AutonomousVehicle) -> None:
         n, scheduler = self._simulation.n, self._simulation.scheduler
         counters, age, dt_s = av.counters, av.plan_age_steps(n), scheduler.dt_s
         stale = av.uses_no_plan
@@ -99,7 +99,7 @@ class LiveDiagnostics:
              'age_ms': '' if age is None else round(age * dt_s * 1e3, 3),
              'last_refusal': counters.last_refusal, **_tracking(av)}, scheduler.stamp_ns(n))
 
-    def _tell_seat(self, seat: Seat) -> None:
+    def _publish_seat(self, seat: Seat) -> None:
         self._outputs.publish_diagnostics(
             f'{seat.id} seat', DiagnosticStatus.WARN if seat.lost else DiagnosticStatus.OK,
             'driver lost' if seat.lost else 'driven',

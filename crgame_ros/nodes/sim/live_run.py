@@ -118,7 +118,7 @@ class LiveRun:
             node, setup, clock_offset_ns, control.seat_sources, recorded, control.seat_tenants)
         scheduler = replace(setup.scheduler, clock_offset_ns=clock_offset_ns)
         feed = None if setup.traffic is None else RemoteTraffic(
-            self._inputs.take_agents, setup.traffic, scheduler)
+            self._inputs.pop_agents, setup.traffic, scheduler)
         self.simulation = Simulation(setup, clock_offset_ns, feed)
         self._inputs.choose(self._answers, None if feed is None else feed.wants)
         self._dt_s = scheduler.dt_s
@@ -151,7 +151,7 @@ class LiveRun:
         outcome = self._wait_for_companions(result)
         if outcome is not None:
             self._reason = self._reason or outcome.reason(self._stop.requested)
-            self._state.tell('ended', self._reason)
+            self._state.publish('ended', self._reason)
             return outcome
         if not self._watch.tells_waiting:
             self._node.get_logger().info('this kernel does not tell how long the loop waits for '
@@ -173,7 +173,7 @@ class LiveRun:
             gc.unfreeze()
             self._outputs.publish_rows()
             self._diagnostics.publish()
-            self._state.tell('ended', self._reason)
+            self._state.publish('ended', self._reason)
             self._outputs.wait_until_received()
 
     def hold_after_end(self) -> Outcome:
@@ -182,10 +182,10 @@ class LiveRun:
         control.over, control.stop_wanted = True, False
         self._state.stand()
         while not (self._stop.requested or control.reset_wanted):
-            self._state.tell('ended', self._reason)
+            self._state.publish('ended', self._reason)
             self._executor.spin_once(timeout_sec=0.02)
             self._state.show_newcomers()
-            self._take_orders(time.monotonic_ns())
+            self._apply_orders(time.monotonic_ns())
         control.over = False
         return Outcome.STOPPED if self._stop.requested else Outcome.RESET
 
@@ -204,11 +204,11 @@ class LiveRun:
     def _wait_for_companions(self, result: StepResult) -> Outcome | None:
         """Stay at step 0 until everybody is there, or an order ends it."""
         control = self._control
-        self._state.tell('waiting')
+        self._state.publish('waiting')
         heard = HeardTopics(Endpoints(self._node), self.simulation.scheduler.clock_offset_ns) \
             if 'recorder_node' in control.companions else None
         gate = StartGate(self._outputs, self._inputs, self.simulation, result,
-                         control.companions, self._take_plan, self._node.get_logger().warning,
+                         control.companions, self._accept_plan, self._node.get_logger().warning,
                          None if self._feed is None else self._feed.is_ahead, heard)
         try:
             return self._wait_at(gate)
@@ -223,25 +223,25 @@ class LiveRun:
             is_open = gate.is_open(now_ns, control.planner_timeout_s)
             if people.opens(now_ns, is_open):
                 return None
-            self._state.tell('paused' if is_open and control.stands_still else 'waiting')
+            self._state.publish('paused' if is_open and control.stands_still else 'waiting')
             self._executor.spin_once(timeout_sec=0.005)
             if is_open:
                 self._state.show_newcomers()
-            self._take_orders(time.monotonic_ns())
+            self._apply_orders(time.monotonic_ns())
             outcome = self._ordered_end()
             if outcome is not None:
                 return outcome
 
     def _ordered_end(self) -> Outcome | None:
         control = self._control
-        self._look_for_violation()
+        self._end_on_violation()
         if control.stop_wanted or self._stop.requested:
             return Outcome.STOPPED
         if control.reset_wanted:
             return Outcome.RESET
         return None
 
-    def _look_for_violation(self) -> None:
+    def _end_on_violation(self) -> None:
         """End the run if a human's violation says so, and record where it did."""
         stop = self._inputs.stop_request()
         if stop is None:
@@ -263,13 +263,13 @@ class LiveRun:
             self._diagnostics.refusal(av_id, reason)
         return reason is None
 
-    def _take_plan(self, av_id: str) -> bool:
+    def _accept_plan(self, av_id: str) -> bool:
         """Offer an AV the plan that has come for it; tell whether it was accepted."""
         try:
-            perceived = self._inputs.take_perceived(av_id)
+            perceived = self._inputs.pop_perceived(av_id)
             reason = None if perceived is None else self.simulation.request_perceived(
                 av_id, perceived)
-            plan = self._inputs.take_plan(av_id)
+            plan = self._inputs.pop_plan(av_id)
             if plan is not None:
                 reason = self.simulation.offer_plan(av_id, plan)
             elif reason is None:
@@ -281,9 +281,9 @@ class LiveRun:
             self._diagnostics.refusal(av_id, reason)
         return reason is None
 
-    def _take_orders(self, now_ns: int) -> None:
+    def _apply_orders(self, now_ns: int) -> None:
         """Obey who is to drive what, and which planners are to go or stop."""
-        changed, refusals = self._inputs.seats.take_orders(now_ns)
+        changed, refusals = self._inputs.seats.apply_orders(now_ns)
         if changed:
             self._publish_seats()
         for refusal in refusals:
@@ -297,7 +297,7 @@ class LiveRun:
         self._spells.note(self.simulation.n, self._inputs.seats.driven())
         self._outputs.publish_seats(self._inputs.seats.document(), self._spells.document())
 
-    def _take_triggers(self) -> None:
+    def _queue_triggers(self) -> None:
         """Hand the events over that somebody triggered since the last tick."""
         for name in self._inputs.triggers():
             if (reason := self.simulation.trigger(name)) is not None:
@@ -324,12 +324,12 @@ class LiveRun:
         """Serve orders while everything else stands still."""
         self._state.stand()
         self._outputs.publish_rows()
-        self._state.tell('paused')
+        self._state.publish('paused')
         while self._control.stands_still and self._ordered_end() is None:
             self._executor.spin_once(timeout_sec=0.02)
-            self._state.tell('paused')
+            self._state.publish('paused')
             self._state.show_newcomers()
-            self._take_orders(time.monotonic_ns())
+            self._apply_orders(time.monotonic_ns())
         now_ns = time.monotonic_ns()
         self._controller.resume(now_ns)
         self._watch.begin()
@@ -342,8 +342,8 @@ class LiveRun:
             self.simulation, self._outputs, self._inputs, self._watch
         watch.mark(Phase.INPUTS)
         for av in simulation.avs:
-            self._take_plan(av.setup.id)
-        self._take_orders(start_ns)
+            self._accept_plan(av.setup.id)
+        self._apply_orders(start_ns)
         # A recorded human moves over the recorded intervals, whatever this machine is busy with.
         cycle = self._controller.begin_cycle(start_ns, inputs.seats.interval_s(simulation.n))
         factor = self._controller.real_time_factor
@@ -352,7 +352,7 @@ class LiveRun:
         if inputs.seats.repetition_changed():
             self._publish_seats()
         if simulation.scheduler.is_tick(simulation.n + 1):
-            self._take_triggers()
+            self._queue_triggers()
         inputs.pass_task_reports(simulation.report_task)
         watch.mark(Phase.STEP)
         simulation.move(cycle.dt_eff_s, commands)
@@ -385,7 +385,7 @@ class LiveRun:
 
     def _report(self, n: int) -> None:
         """Tell how the run is, little by little, in steps that have no tick's work to do."""
-        self._state.tell('running')
-        if not self._diagnostics.tell_next() and n >= self._report_n:
+        self._state.publish('running')
+        if not self._diagnostics.publish_next() and n >= self._report_n:
             self._report_n = n + self._second
             self._diagnostics.begin()

@@ -59,7 +59,7 @@ class VehicleOutputs:
         self._accel = AccelStamped()
         self._accel.header.frame_id = f'{vehicle_id}/base_link'
 
-    def look_for_subscribers(self) -> None:
+    def count_subscribers(self) -> None:
         """Find out whether anybody listens."""
         self._listened_to = [item.get_subscription_count() > 0 for item in self.publishers]
         self.wanted = any(self._listened_to)
@@ -206,7 +206,7 @@ class SimOutputs:
             self._publish_objects(result.objects, stamp_ns)
             self._publish_signals(result.k)
             for vehicle in self._vehicles:
-                vehicle.look_for_subscribers()
+                vehicle.count_subscribers()
         self._publish_states(simulation.states, stamp_ns, result.objects is not None)
 
     @property

@@ -65,7 +65,7 @@ class RemoteTraffic:
             self._keep(series, self._k)
         return self._k + 1 in self._waiting
 
-    def tell(self, view: 'WorldView') -> None:
+    def publish(self, view: 'WorldView') -> None:
         """Tell nothing: traffic_node reads the published world."""
 
     def obey(self, order: TrafficOrder) -> None:

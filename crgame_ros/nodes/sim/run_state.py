@@ -54,7 +54,7 @@ class RunState:
         self._listeners = 0
         self._shown_ns = self._show_until_ns = 0
 
-    def tell(self, state: str, reason: str = '') -> None:
+    def publish(self, state: str, reason: str = '') -> None:
         """
         Tell a new state at once, and the present one every second.
 

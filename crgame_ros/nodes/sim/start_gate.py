@@ -81,7 +81,7 @@ class StartGate:
         if self._connected:
             self._listen(now_ns)
         if now_ns - self._began_ns > timeout_s * NS_PER_S:
-            self._give_up(now_ns, timeout_s)
+            self._time_out(now_ns, timeout_s)
         return self._connected and not self._planners and not self._seats \
             and self._traffic_answers is None and not self._unrecorded
 
@@ -124,7 +124,7 @@ class StartGate:
         for seat_id in seat_ids:
             self._unrecorded.pop(seat_id, None)
 
-    def _give_up(self, now_ns: int, timeout_s: float) -> None:
+    def _time_out(self, now_ns: int, timeout_s: float) -> None:
         missing = [] if self._connected else sorted(self._outputs.missing(self._companions))
         missing += [f'the planner of {av_id}' for av_id in sorted(self._planners)]
         missing += ['the traffic'] if self._traffic_answers is not None else []
@@ -167,10 +167,10 @@ class ReadyGate:
         """
         control = self._control
         control.awaited = self._seats.awaited(now_ns)
-        self._take_readiness()
+        self._check_readiness()
         begins = others_ready and not control.awaited and not control.stands_still
         # A step that is ordered during a pause is one at once.
-        if not begins or control.paused or not self._seats.of_cockpits:
+        if not begins or control.paused or not self._seats.cockpit_seats:
             self._began_ns, control.countdown_s = None, 0
             return begins
         if self._began_ns is None:
@@ -179,9 +179,9 @@ class ReadyGate:
         control.countdown_s = max(0, math.ceil(left_s))
         return left_s <= 0.0
 
-    def _take_readiness(self) -> None:
+    def _check_readiness(self) -> None:
         """Start when all are ready, and no longer when one of them has thought better of it."""
-        control, seats = self._control, self._seats.of_cockpits
+        control, seats = self._control, self._seats.cockpit_seats
         ready = bool(seats) and all(seat.ready for seat in seats)
         if ready and not control.started:
             control.paused, control.started, self._by_all = False, True, True

@@ -63,18 +63,18 @@ class Director:
 
     def poll(self) -> None:
         """Take what has come."""
-        self._take_game()
-        self._take_clock()
-        self._take_events()
+        self._read_game()
+        self._read_clock()
+        self._read_events()
         for slot in (self._diagnostics, self._verdicts):
             for _ in range(_QUEUE):
-                message = None if slot is None else slot.take()
+                message = None if slot is None else slot.pop()
                 if message is None:
                     break
                 stamp_ns = from_time(message.header.stamp)
                 if self.game is not None and stamp_ns >= self.game.scheduler.clock_offset_ns:
                     for status in message.status:
-                        self.status.take(read_status(status), self.time_s)
+                        self.status.add(read_status(status), self.time_s)
 
     async def load(self, game: Path) -> None:
         """
@@ -93,7 +93,7 @@ class Director:
         """End the run."""
         await self._orders.control('stop')
 
-    def tell(self, subject: str, text: str, **values: object) -> None:
+    def record(self, subject: str, text: str, **values: object) -> None:
         """Say something that the recording is to keep."""
         self._endpoints.diagnostics.publish(
             f'study_node: {subject}', DiagnosticStatus.OK, text, values, self._stamp_ns)
@@ -113,7 +113,7 @@ class Director:
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
-    def _take_game(self) -> None:
+    def _read_game(self) -> None:
         try:
             message = self._games.latest()
             game = None if message is None else parse_game_document(message.data)
@@ -125,7 +125,7 @@ class Director:
             self._stamp_ns = game.scheduler.clock_offset_ns
             self.status.begin([vehicle.id for vehicle in game.vehicles])
 
-    def _take_events(self) -> None:
+    def _read_events(self) -> None:
         message = self._events.latest()
         if message is None or self.game is None:
             return
@@ -133,9 +133,9 @@ class Director:
         with suppress(InputError):
             epoch, fired = parse_events_document(message.data)
             if epoch == self.game.epoch:
-                self.status.take_events(fired, self.game.scheduler.dt_s)
+                self.status.add_events(fired, self.game.scheduler.dt_s)
 
-    def _take_clock(self) -> None:
+    def _read_clock(self) -> None:
         message = self._clock.latest()
         if message is not None:
             stamp_ns = from_time(message.clock)

@@ -97,11 +97,11 @@ class LiveDrives:
             self._abort = reason
             self._news.set()
 
-    def tell(self, kind: str, text: str) -> None:
+    def record(self, kind: str, text: str) -> None:
         """Let the recording keep a note or marker, if one goes on."""
         if self._director is not None and self._state.phase is DrivePhase.DRIVING:
             self._director.poll()
-            self._director.tell(kind, text)
+            self._director.record(kind, text)
 
     async def run(self) -> None:
         """Prepare and conduct drives until the session is over."""
@@ -109,7 +109,7 @@ class LiveDrives:
             item = self._next()
             if item is None:
                 # Recordings are finished while people answer what is left.
-                self._tell(DrivePhase.NONE)
+                self._set_phase(DrivePhase.NONE)
                 await self.close()
                 await self._wait()
                 continue
@@ -119,7 +119,7 @@ class LiveDrives:
                 await self._lose()
             except CrgameError as error:
                 await self._fail(item, str(error))
-        self._tell(DrivePhase.NONE)
+        self._set_phase(DrivePhase.NONE)
         await self.close()
 
     async def close(self) -> None:
@@ -157,7 +157,7 @@ class LiveDrives:
         while self._next() is item:
             due = self._is_due(item)
             # The page may load its frame while people still answer.
-            self._tell(DrivePhase.READY if due else DrivePhase.NONE, item.id, drive=drive)
+            self._set_phase(DrivePhase.READY if due else DrivePhase.NONE, item.id, drive=drive)
             if due and self._ready == item.id:
                 await self._drive(drive)
                 return
@@ -167,7 +167,7 @@ class LiveDrives:
         if self._loaded is not None and self._loaded.item.id == item.id:
             return self._loaded
         if self._is_due(item):
-            self._tell(DrivePhase.PREPARING, item.id, 'the game is loaded')
+            self._set_phase(DrivePhase.PREPARING, item.id, 'the game is loaded')
         drive = write_drive(item, self._folder / 'games')
         assert drive is not None
         if self._graph is None:
@@ -203,26 +203,26 @@ class LiveDrives:
         self._loaded, self._abort = None, None
         asked_at_s = time.time()
         attempt = session.start(run)
-        self._tell(DrivePhase.COUNTDOWN, item.id, attempt=attempt, drive=drive)
+        self._set_phase(DrivePhase.COUNTDOWN, item.id, attempt=attempt, drive=drive)
         await director.start()
         began_at_s = 0.0
         disturbance = Disturbance(LOST_S)
         while director.status.run != 'ended':
             if director.status.run == 'running' and not began_at_s:
                 began_at_s = time.time()
-                self._tell(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
+                self._set_phase(DrivePhase.DRIVING, item.id, attempt=attempt, drive=drive)
             if began_at_s and self._abort is None:
-                self._abort = disturbance.look(director.status.seats_lost.get(drive.seat, False))
+                self._abort = disturbance.check(director.status.seats_lost.get(drive.seat, False))
             if self._abort is None and director.epoch != epoch:
                 self._abort = cut_short(RESET)
             if self._abort is not None or not self._is_due(item):
                 await self._break_off(item, self._abort)
                 return
-            await self._look()
+            await self._poll()
         if reason := cut_short(director.status.reason):
             await self._break_off(item, reason)
             return
-        self._tell(DrivePhase.ENDED, item.id, attempt=attempt, drive=drive)
+        self._set_phase(DrivePhase.ENDED, item.id, attempt=attempt, drive=drive)
         told = {'run': run, 'attempt': attempt, 'asked_at': asked_at_s, 'start_at': began_at_s,
                 **outcome_of(director.status, drive.seat, director.time_s)}
         await self._until(lambda: _is_closed(folder), CLOSES_S, 'the recording is not closed')
@@ -232,13 +232,13 @@ class LiveDrives:
             session.practised(told['clean_s'] >= wanted_s, **told)
         else:
             session.finish(**told)
-        self._tell(DrivePhase.NONE)
+        self._set_phase(DrivePhase.NONE)
 
     async def _break_off(self, item: SessionItem, reason: str | None) -> None:
         """End a run that counts for nothing: aborted, or its item was skipped."""
         director = self._directs()
         self._session.abort(reason or 'the session went on with something else', item.id)
-        self._tell(DrivePhase.PREPARING, item.id, 'the drive was ended')
+        self._set_phase(DrivePhase.PREPARING, item.id, 'the drive was ended')
         if director.status.run != 'ended':
             await director.stop()
         await self._until(lambda: director.status.run == 'ended', CLOSES_S,
@@ -252,14 +252,14 @@ class LiveDrives:
         item = self._state.item
         if self._is_under_way:
             self._session.abort(f'the simulation ended by itself: {words}', item)
-        self._tell(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
+        self._set_phase(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
         await self.close()
-        self._tell(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
+        self._set_phase(DrivePhase.PREPARING, item, f'the simulation is started again: {words}')
         now_s = time.monotonic()
         self._deaths_s = [at for at in self._deaths_s if now_s - at < DEATHS_S] + [now_s]
         if len(self._deaths_s) >= MAX_DEATHS:
             self._deaths_s.clear()
-            self._tell(DrivePhase.FAILED, item, f'the simulation does not start: {words}')
+            self._set_phase(DrivePhase.FAILED, item, f'the simulation does not start: {words}')
             await self._wait()
 
     async def _fail(self, item: SessionItem, text: str) -> None:
@@ -270,7 +270,7 @@ class LiveDrives:
         if self._is_under_way:
             self._session.abort(text, item.id)
         self._loaded = None
-        self._tell(DrivePhase.FAILED, item.id, text)
+        self._set_phase(DrivePhase.FAILED, item.id, text)
         await self._wait()
 
     def _directs(self) -> Director:
@@ -278,13 +278,13 @@ class LiveDrives:
             raise _LostGraphError
         return self._director
 
-    async def _look(self, pause_s: float = LOOK_S) -> None:
+    async def _poll(self, pause_s: float = LOOK_S) -> None:
         """Follow the graph for a moment."""
         graph, director = self._graph, self._director
         if graph is not None and director is not None:
             if graph.has_ended:
                 raise _LostGraphError
-            graph.look()
+            graph.poll()
             director.poll()
         await asyncio.sleep(pause_s)
 
@@ -293,16 +293,16 @@ class LiveDrives:
         while not condition():
             if time.monotonic() > until_s:
                 raise CrgameError(f'{what} in {patience_s:g} s')
-            await self._look()
+            await self._poll()
 
     async def _wait(self) -> None:
         """Follow the graph until something is new."""
         self._news.clear()
         while not self._news.is_set():
-            await self._look()
+            await self._poll()
 
-    def _tell(self, phase: DrivePhase, item: str = '', text: str = '', *, attempt: int = 0,
-              drive: StudyDrive | None = None) -> None:
+    def _set_phase(self, phase: DrivePhase, item: str = '', text: str = '', *, attempt: int = 0,
+                   drive: StudyDrive | None = None) -> None:
         link = '' if drive is None or self._graph is None \
             else drive.link(self._graph.cockpit, self._language(), self._key)
         state = DriveState(phase, item, attempt, link, None, text)

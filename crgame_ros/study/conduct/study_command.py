@@ -219,7 +219,7 @@ def run_command(values: argparse.Namespace) -> int:
     from crgame_ros.study.folder import check_participant, StudyFolder
     require_ros()
     prepare_environment()
-    from crgame_ros.launcher.interruption import say
+    from crgame_ros.launcher.interruption import print_now
     study = load_study(values.file)
     participant = check_participant(values.participant)
     if not 1 <= values.port <= 65_000:
@@ -229,9 +229,9 @@ def run_command(values: argparse.Namespace) -> int:
     folder = StudyFolder(values.out or Path('studies') / study.name)
     folder.keep_study(study, values.file, pictures_of(study))
     place = folder.place_of(participant) if values.place is None else values.place - 1
-    say(f'{participant}, place {place + 1} of {study.name}; data go to {folder.root}')
+    print_now(f'{participant}, place {place + 1} of {study.name}; data go to {folder.root}')
     over = conduct(SessionRequest(study, folder.participant(participant).resolve(), participant,
-                                  place, values.port), say)
-    say(f'{participant} is done' if over
-        else f'{participant} goes on with the same command')
+                                  place, values.port), print_now)
+    print_now(f'{participant} is done' if over
+              else f'{participant} goes on with the same command')
     return 0

@@ -90,7 +90,7 @@ class Disturbance:
         self._ahead_s = boot_s() - steady_s()
         self._lost_s: float | None = None
 
-    def look(self, lost: bool) -> str | None:
+    def check(self, lost: bool) -> str | None:
         """
         Return why the drive does not count, None while it does.
 

@@ -61,7 +61,7 @@ class StudyGraph:
         """Whether a signal ended the launcher."""
         return (self._process.poll() or 0) < 0
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Read what it has said since: where the cockpit is."""
         with self._log.open('rb') as log:
             log.seek(self._read)

@@ -43,7 +43,7 @@ ANSWERS = TableDeclaration('answers', 'a question that was put', (
 def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[dict[str, Any]]:
     """Yield the rows of a participant: each item's last answers."""
     for answered in record.answered:
-        scale = asked.of(answered.item)
+        scale = asked.find(answered.item)
         times = _times(record, answered)
         after_s = answered.told.get('after_s')
         for question, answer in answered.answers.items():

@@ -74,7 +74,7 @@ class AskedQuestions:
                 prefix = unlike(prefix.rstrip('_'), (name.rstrip('_') for name in known)) + '_'
             self._by_item[item.id] = known.setdefault(prefix, AskedScale(prefix, scale))
 
-    def of(self, item: SessionItem) -> AskedScale | None:
+    def find(self, item: SessionItem) -> AskedScale | None:
         """Return the questionnaire of an item; None where none is."""
         return self._by_item.get(item.id)
 

@@ -67,7 +67,7 @@ class ParticipantsTable:
                'end_reason': next((entry.get('reason') for entry in record.entries
                                    if entry['entry'] == SessionEvent.ENDED), None)}
         for answered in record.answered:
-            scale = self._asked.of(answered.item)
+            scale = self._asked.find(answered.item)
             if isinstance(answered.item.what, Fields):
                 row |= {self._fields[name].name: plain_answer(answer)
                         for name, answer in answered.answers.items() if name in self._fields}

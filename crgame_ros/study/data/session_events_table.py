@@ -52,9 +52,9 @@ def event_rows(record: ParticipantRecord,
 
     :param runs: measures of the trials that count, by item.
     """
-    rows = list(_of_journal(record))
+    rows = list(_journal_rows(record))
     for item, run in runs.items():
-        rows += _of_run(record.counted[item], run, record)
+        rows += _run_rows(record.counted[item], run, record)
     # Equal times stay in the order of the journal.
     rows.sort(key=lambda row: row['wall_s'])
     for number, row in enumerate(rows, 1):
@@ -62,7 +62,7 @@ def event_rows(record: ParticipantRecord,
     return rows
 
 
-def _of_journal(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
+def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
     attempts = {(each.item, each.attempt): each for each in record.attempts}
     running: TrialAttempt | None = None
     for entry in record.entries:
@@ -101,8 +101,8 @@ def _kind(kind: str, item: SessionItem | None) -> str:
     return f'{what}_{kind}'
 
 
-def _of_run(attempt: TrialAttempt, run: MeasuredRun,
-            record: ParticipantRecord) -> Iterator[dict[str, Any]]:
+def _run_rows(attempt: TrialAttempt, run: MeasuredRun,
+              record: ParticipantRecord) -> Iterator[dict[str, Any]]:
     start_s = drive_start_s(attempt)
     folder = None if attempt.folder is None else attempt.folder.relative_to(
         record.folder).as_posix()

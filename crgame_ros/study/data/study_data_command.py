@@ -94,7 +94,7 @@ def rerun_command(values: argparse.Namespace) -> int:
     with only_writer(folder.data):
         data = _read(folder)
         out = values.out or folder.data / 'rerun'
-        told = rerun_study(data, values.planner, out, values.workers, _say)
+        told = rerun_study(data, values.planner, out, values.workers, _print)
     print('\n'.join(told))
     print(out)
     return 0
@@ -103,17 +103,17 @@ def rerun_command(values: argparse.Namespace) -> int:
 def _read(folder: Any, reports: bool = False) -> 'StudyData':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.data.study_data import read_study_data
-    progress = Progress(_say, '')
+    progress = Progress(_print, '')
 
-    def tell(what: str, share: float) -> None:
+    def show_progress(what: str, share: float) -> None:
         progress.what = what
         progress(share)
 
-    data = read_study_data(folder, _say, tell, reports)
+    data = read_study_data(folder, _print, show_progress, reports)
     for problem in data.problems:
-        _say(f'note: {problem}')
+        _print(f'note: {problem}')
     return data
 
 
-def _say(line: str) -> None:
+def _print(line: str) -> None:
     print(line, file=sys.stderr, flush=True)

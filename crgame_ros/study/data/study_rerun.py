@@ -78,7 +78,7 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
         rows += _compared(of_seed, labels, folder)
     rows.sort(key=lambda row: (row['participant'], row['trial'], row['planner'], row['vehicle']))
     _write(rows, out, data.folder.study.name)
-    return [_told(rows, planner) for planner in dict.fromkeys(row['planner'] for row in rows)]
+    return [_summarize(rows, planner) for planner in dict.fromkeys(row['planner'] for row in rows)]
 
 
 def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
@@ -170,7 +170,7 @@ def _write(rows: Sequence[Mapping[str, Any]], out: Path, study: str) -> None:
     write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n', folder / PACKAGE_FILE)
 
 
-def _told(rows: Sequence[Mapping[str, Any]], planner: str) -> str:
+def _summarize(rows: Sequence[Mapping[str, Any]], planner: str) -> str:
     mine = [row for row in rows if row['planner'] == planner]
     runs = {(row['participant'], row['trial']): row['status'] for row in mine}
     ok = sum(status == 'ok' for status in runs.values())

@@ -220,7 +220,7 @@ class TrialsTable:
     def _answers(self, record: ParticipantRecord, trial: PlannedTrial) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for answered in record.answered:
-            scale = self._asked.of(answered.item)
+            scale = self._asked.find(answered.item)
             if answered.item.trial == trial.number and scale is not None:
                 found |= scale.values(answered.answers)
                 found['answered_attempt'] = answered.attempt

@@ -35,7 +35,7 @@ class Drives(Protocol):
     def ready(self, item: str) -> None:
         """Take the participant's word that the drive of an item may begin."""
 
-    def tell(self, kind: str, text: str) -> None:
+    def record(self, kind: str, text: str) -> None:
         """Let the recording that goes on, if one does, keep a note or marker at this moment."""
 
     def abort(self, reason: str) -> None:
@@ -159,14 +159,14 @@ class Desk:
     def note(self, text: str) -> None:
         """Keep a remark, with the run and its clock."""
         self.session.note(text, **self.moment())
-        self.drives.tell('note', text)
-        self._tell()
+        self.drives.record('note', text)
+        self._notify()
 
     def mark(self, name: str) -> None:
         """Set a marker, with the run and its clock."""
         self.session.mark(name, **self.moment())
-        self.drives.tell('marker', name)
-        self._tell()
+        self.drives.record('marker', name)
+        self._notify()
 
     def repeat(self, item: str, reason: str) -> None:
         """Let a finished item come again, now."""
@@ -190,7 +190,7 @@ class Desk:
         if not self.can_abort:
             raise InputError('has ended', item[:60], 'repeat it once it is recorded')
         self.drives.abort(reason)
-        self._tell()
+        self._notify()
 
     def end(self, reason: str) -> None:
         """End the session; a drive that is under way is aborted first."""
@@ -224,12 +224,12 @@ class Desk:
             self.session.end(self.ending)
             self.drives.wake()
         self._begin_break()
-        self._tell()
+        self._notify()
 
     def _moved(self) -> None:
         self._begin_break()
         self.drives.wake()
-        self._tell()
+        self._notify()
 
     def _begin_break(self) -> None:
         """Start the clock of a break once, when nothing keeps it from beginning."""
@@ -242,7 +242,7 @@ class Desk:
         if last != SessionEvent.STARTED:
             self.session.start()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         for changed in self._watchers:
             try:
                 changed()

@@ -105,7 +105,7 @@ class DeskPages:
         return {'connected': self._used is not None, 'open': len(self._participants),
                 **self._told}
 
-    def tell_experimenters(self) -> None:
+    def update_experimenters(self) -> None:
         """Send the present document to the experimenter's pages."""
         self._is_due = False
         if self._experimenters:
@@ -160,7 +160,7 @@ class DeskPages:
         except CrgameError as error:
             ok, text = False, str(error)
         client.put_event(_text({'type': 'reply', 'to': message['id'], 'ok': ok, 'text': text}))
-        self.tell_experimenters()
+        self.update_experimenters()
 
     def _do(self, message: Mapping[str, Any]) -> None:
         match message['type']:

@@ -104,20 +104,20 @@ class DeskSocket:
             if message.type in (WSMsgType.CLOSE, WSMsgType.CLOSING, WSMsgType.CLOSED,
                                 WSMsgType.ERROR):
                 return WSCloseCode.OK, ''
-            if not self._bucket.take(loop.time()):
+            if not self._bucket.try_spend(loop.time()):
                 return (WSCloseCode.POLICY_VIOLATION,
                         f'more than {MESSAGES_PER_S:g} messages a second')
             if message.type is WSMsgType.PING:
                 await self.socket.pong(message.data)
             elif message.type is WSMsgType.TEXT:
-                self._take(client, message.data)
+                self._handle(client, message.data)
             elif message.type is WSMsgType.BINARY:
                 self._malformed += 1
             if self._malformed >= MAX_MALFORMED:
                 return (WSCloseCode.POLICY_VIOLATION,
                         f'{MAX_MALFORMED} messages that cannot be read')
 
-    def _take(self, client: Client, text: str) -> None:
+    def _handle(self, client: Client, text: str) -> None:
         try:
             message: dict[str, Any] = (parse_experimenter if self._is_experimenter
                                        else parse_participant)(text)
@@ -303,20 +303,20 @@ def _frames(request: web.Request, desk: Desk) -> str:
 
 def _telling(pages: DeskPages) -> Callable[[web.Application], AsyncIterator[None]]:
     """Yield experimenters what has changed, some times a second, and drop who never reads."""
-    async def tell() -> None:
+    async def notify() -> None:
         loop = asyncio.get_running_loop()
         checked_s = loop.time()
         while True:
             await asyncio.sleep(TOLD_EVERY_S)
             if pages.is_due:
-                pages.tell_experimenters()
+                pages.update_experimenters()
             if loop.time() - checked_s > _STALL_CHECK_S:
                 checked_s = loop.time()
                 for client in pages.clients:
                     client.check_stall(checked_s)
 
     async def telling(_: web.Application) -> AsyncIterator[None]:
-        task = asyncio.create_task(tell())
+        task = asyncio.create_task(notify())
         yield
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):

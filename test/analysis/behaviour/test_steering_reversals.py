@@ -101,7 +101,8 @@ def test_uneven_times_are_made_even_and_gaps_cut() -> None:
     commands = np.zeros((MINUTE, 4))
     commands[:, 2] = _sine(5.0, 0.2) / 450.0
     for rows, count in ((kept, 23), (kept & (np.abs(times_s - 30.0) > 0.5), 22)):
-        controls = DriverControls.of(times_s[rows], commands[rows], math.radians(450.0), DT_S)
+        controls = DriverControls.from_commands(
+            times_s[rows], commands[rows], math.radians(450.0), DT_S)
         pieces = controls.even_pieces(controls.wheel_deg)
         assert len(pieces) == 24 - count
         minutes = DT_S * sum(map(len, pieces)) / 60.0

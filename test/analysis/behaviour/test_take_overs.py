@@ -22,7 +22,7 @@ def _driven(pieces: tuple[tuple[float, float], ...],
         commands[driven] = 0.0
         if wheel is not None:
             commands[driven, 2] = wheel[driven] / 450.0
-    return DriverControls.of(TIMES_S, commands, math.radians(450.0), DT_S)
+    return DriverControls.from_commands(TIMES_S, commands, math.radians(450.0), DT_S)
 
 
 def test_hands_on_and_the_first_stable_second() -> None:

@@ -73,7 +73,7 @@ def test_footprints_are_the_placed_outlines(name: str, request: pytest.FixtureRe
             assert np.all((bodies[body] > (left, bottom)) & (bodies[body] < (right, top)))
         # Nobody whose footprint reaches into the window is left out.
         for body, corners in expected.items():
-            inside = np.abs(window.of(corners)) < (0.5 * window.length, 0.5 * window.height)
+            inside = np.abs(window.to_window(corners)) < (0.5 * window.length, 0.5 * window.height)
             assert not inside.all(axis=1).any() or body in bodies
     assert len({(window.length, window.height) for window in windows}) == 1
     # A metre is as long across as along.
@@ -138,7 +138,8 @@ def test_a_camera_goes_along_where_one_stretch_is_too_long(cut_in: RunRecord) ->
     far = series_windows(cut_in.log, [0, 40, 80])
     assert len(set(far)) == 3
     states = cut_in.log.vehicle_states[[0, 40, 80], 1]
-    away = [window.of(state[None, :2])[0] for window, state in zip(far, states, strict=True)]
+    away = [window.to_window(state[None, :2])[0]
+            for window, state in zip(far, states, strict=True)]
     np.testing.assert_allclose(away, [away[0]] * 3, atol=1e-9)
 
 

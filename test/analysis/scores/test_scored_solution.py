@@ -73,7 +73,7 @@ def _score(parts: list[PlanningProblemSolution], problems: tuple[PlanningProblem
            obstacles: tuple[Obstacle, ...] = ()) -> tuple[VehicleScores, ...]:
     loaded = replace(road(), planning_problems=problems or (_problem(),))
     loaded.scenario.add_objects(list(obstacles))
-    scores = score_solutions(ScoredScenario.of_file(loaded), {
+    scores = score_solutions(ScoredScenario.from_file(loaded), {
         'mine.xml': Solution(loaded.scenario.scenario_id, parts)})
     json.dumps(scores.as_dict(), allow_nan=False)
     return scores.vehicles
