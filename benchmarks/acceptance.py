@@ -14,7 +14,7 @@ from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import export_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.scenario.export_network import schema_errors
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import run_offline
@@ -27,7 +27,7 @@ def report(name: str, request: RunRequest, planner: str) -> None:
     """Run one game with one planner, export it, and print its row and contacts."""
     setup = with_planners(build_setup(effective_game(request)), (planner,))
     result = run_offline(setup, clock_s=time.perf_counter)
-    exported = export_scenario(run_log_of(result))
+    exported = export_scenario(trajectories_of(result))
     assert not schema_errors(etree.fromstring(exported.xml_text.encode('utf-8')))
     violations = sorted({item.vehicle_id for item in result.violations if not item.is_valid})
     for av_id, record in result.planners.items():

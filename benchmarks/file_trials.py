@@ -20,7 +20,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import read_run_log, RunLog
+from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.control_settings import load_control_settings
@@ -207,17 +207,17 @@ def _bag(path: Path, dice: random.Random) -> None:
         except InputError as error:
             refusals.append(error)
     try:
-        log = read_run_log(bag)
+        log = read_trajectories(bag)
         # SQLite has no checksums: a bit that turned in a number is another number.
         if path.suffix != '.db3':
-            _compare(log, read_run_log(bag.parent.parent / 'sound' / 'bag'))
+            _compare(log, read_trajectories(bag.parent.parent / 'sound' / 'bag'))
     except InputError as error:
         refusals.append(error)
     if refusals:
         raise refusals[-1]
 
 
-def _compare(log: RunLog, sound: RunLog) -> None:
+def _compare(log: RunTrajectories, sound: RunTrajectories) -> None:
     """See that what was read of a broken recording is what was recorded."""
     rows = log.ks - sound.ks[0]
     if rows[0] < 0 or rows[-1] >= len(sound.ks):

@@ -17,7 +17,7 @@ from crgame_ros.paths import numbered
 
 if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.analysis.counterfactual import Alternative
-    from crgame_ros.recording.run_log import RunLog
+    from crgame_ros.recording.run_trajectories import RunTrajectories
 
 DESCRIPTION = """\
 Drive the human of a recording again, against one planner after the other, and compare.
@@ -61,10 +61,10 @@ def replay(values: argparse.Namespace) -> int:
     from crgame_ros.analysis.criticality.recorded import measure_log
     from crgame_ros.planner.registry import planner_class
     from crgame_ros.recording.run_folder import recording_in
-    from crgame_ros.recording.run_log import read_run_log
+    from crgame_ros.recording.run_trajectories import read_trajectories
     _check(values)
     bag = recording_in(values.run)
-    recorded = read_run_log(bag)
+    recorded = read_trajectories(bag)
     if not recorded.game.humans or not recorded.game.avs:
         raise InputError('has no human and an AV', str(bag), 'give a run in which both drive')
     # Every planner is known before the first of them drives.
@@ -97,7 +97,7 @@ def _check(values: argparse.Namespace) -> None:
         raise InputError('goes with --live', '--headless')
 
 
-def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunLog') -> _Runs:
+def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') -> _Runs:
     """Drive against each planner as fast as it goes, and write the runs as scenarios."""
     from crgame_ros.analysis.counterfactual import drive_against
     from crgame_ros.launcher.arguments import RunRequest
@@ -119,7 +119,7 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunLog') -> _Runs
     return folder, runs()
 
 
-def _live(values: argparse.Namespace, bag: Path, recorded: 'RunLog') -> _Runs:
+def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') -> _Runs:
     """Drive against each planner in real time, one graph after the other."""
     from crgame_ros.analysis.counterfactual import driven_live
     folder = _make_folder(values.out, values.run)

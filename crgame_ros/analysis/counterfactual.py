@@ -14,7 +14,11 @@ from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import (
+    read_trajectories,
+    run_log_of,
+    RunTrajectories,
+)
 from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
@@ -45,7 +49,7 @@ class Alternative:
     """
 
     planner: str
-    log: RunLog
+    log: RunTrajectories
     criticality: Criticality
     human_differs_s: float | None
     others_differ_s: float | None
@@ -67,7 +71,7 @@ class Alternative:
             'criticality': self.criticality.as_dict()}
 
 
-def drive_against(planner: str, setup: Setup, recorded: RunLog, latency_steps: int = 0,
+def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency_steps: int = 0,
                   traces: Mapping[str, FloatArray] | None = None,
                   inputs: RecordedInputs | None = None) -> Alternative:
     """
@@ -92,14 +96,14 @@ def drive_against(planner: str, setup: Setup, recorded: RunLog, latency_steps: i
         [item.as_dict() for item in contacts_of(result)], result)
 
 
-def driven_live(planner: str, folder: Path, recorded: RunLog) -> Alternative:
+def driven_live(planner: str, folder: Path, recorded: RunTrajectories) -> Alternative:
     """
     Compare a live run of a recorded human against a planner, from the run's folder.
 
     :raises InputError: if its recording cannot be used.
     """
     bag = recording_in(folder)
-    log = read_run_log(bag)
+    log = read_trajectories(bag)
     report = timing_report(bag, log=log)
     return _compare(planner, log, recorded, {
         av: None if told['accepted'] is None or not told['plans'] else
@@ -127,7 +131,7 @@ def _drive_trajectory(setup: Setup, latency_steps: int,
                        clock_s=time.perf_counter)
 
 
-def _compare(planner: str, log: RunLog, recorded: RunLog,
+def _compare(planner: str, log: RunTrajectories, recorded: RunTrajectories,
              accepted_ratio: Mapping[str, float | None],
              contacts: Sequence[Mapping[str, Any]] | None,
              result: OfflineResult | None = None) -> Alternative:
@@ -140,7 +144,7 @@ def _compare(planner: str, log: RunLog, recorded: RunLog,
         accepted_ratio, contacts, result)
 
 
-def _differs_s(log: RunLog, recorded: RunLog, found: NDArray[np.float64],
+def _differs_s(log: RunTrajectories, recorded: RunTrajectories, found: NDArray[np.float64],
                expected: NDArray[np.float64]) -> float | None:
     """Return the time at which poses (K, N, 3) of two runs begin to differ, None if never."""
     ks, here, there = np.intersect1d(log.ks, recorded.ks, return_indices=True)

@@ -87,13 +87,14 @@ def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':
     from crgame_ros.analysis.scores.scored_run import score_run
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
     from crgame_ros.recording.run_folder import recording_in
-    from crgame_ros.recording.run_log import read_run_log
     from crgame_ros.recording.run_record import read_run_record
+    from crgame_ros.recording.run_trajectories import read_trajectories
     from crgame_ros.recording.timing_report import timing_report
     bag = recording_in(values.run)
     record = read_run_record(bag, values.epoch, _progress(f'reading {values.run}'))
     expert = None if values.expert is None else expert_of_run(
-        read_run_log(recording_in(values.expert), None, _progress(f'reading {values.expert}')),
+        read_trajectories(recording_in(values.expert), None,
+                          _progress(f'reading {values.expert}')),
         record.log, str(values.expert))
     plans = {}
     if record.log.game.avs:

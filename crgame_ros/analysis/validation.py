@@ -19,7 +19,7 @@ from crgame_ros.recording.info import describe
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import bags_of, recording_in, run_folders
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.recording.timing_report import REPORT_KEYS
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_network import schema_errors, solution_schema_errors
@@ -280,7 +280,7 @@ def _recording(path: Path, progress: Progress | None) -> FileVerdict:
         epochs = epoch_numbers(reader)
     for number, epoch in enumerate(epochs):
         try:
-            log = read_run_log(bag, epoch, progress)
+            log = read_trajectories(bag, epoch, progress)
             remarks += [f'run {number + 1}: {notice}' for notice in log.notices]
         except RunTooShortError as error:
             remarks.append(str(error))

@@ -25,7 +25,7 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.recording.epochs import Epoch, epoch_numbers, read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.scenario.loading import parse_scenario
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def measured_criticality(run: Epoch, path: Path) -> bytes:
         if (frame := frames.criticality_of(rows)) is not None:
             found.append(frame.data)
 
-    measure_log(read_run_log(path, run.game.epoch), on_tick=add_step)
+    measure_log(read_trajectories(path, run.game.epoch), on_tick=add_step)
     return pack(found)
 
 

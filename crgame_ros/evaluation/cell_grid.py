@@ -26,7 +26,7 @@ from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.source_digest import engine_digest, planner_digest
 from crgame_ros.planner.registry import create_planner, EXTERNAL
 from crgame_ros.schema.writing import write
-from crgame_ros.simulation.cast import OWN
+from crgame_ros.simulation.av_assignment import OWN
 
 
 @dataclass(frozen=True)

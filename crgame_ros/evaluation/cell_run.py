@@ -11,7 +11,7 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.tables.score_columns import score_vehicles
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
@@ -26,7 +26,7 @@ from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.cast import adapt_game, OWN
+from crgame_ros.simulation.av_assignment import adapt_game, OWN
 from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
@@ -91,10 +91,10 @@ def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
              if name.startswith('command_')}, file['intervals_s'])
 
 
-def measured(cell: Cell, result: OfflineResult) -> TabulatedRun:
+def measured(cell: Cell, result: OfflineResult) -> TableRun:
     """Measure a run, as a run to tabulate."""
     record = run_record_of(result)
-    run = TabulatedRun(cell.key, record, offline=offline_outcome(result))
+    run = TableRun(cell.key, record, offline=offline_outcome(result))
     found = measure_log(record.log)
     run.criticality.update({item.vehicle_id: item for item in found.report()})
     score_vehicles(run, drives_only=not cell.commonroad_scores)

@@ -24,7 +24,7 @@ from crgame_ros.recording.run_folder import folder_name, recording_in
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.writing import write
-from crgame_ros.simulation.cast import cast_avs
+from crgame_ros.simulation.av_assignment import assign_avs
 import numpy as np
 
 # What is for people alone may look like a file's name and is none.
@@ -114,7 +114,7 @@ def scene_of_run(path: Path, store: ContentStore) -> CellScene:
 
 def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name: str = '',
            human: str = '', inputs: str = '') -> CellScene:
-    parts, _ = cast_avs(game, loaded)
+    parts, _ = assign_avs(game, loaded)
     game = replace(game, avs=tuple(spec for spec, _ in parts))
     digests = tuple(planner_digest(spec.planner) for spec in game.avs or ())
     return CellScene(loaded.benchmark_id, game_name, human, values_of_game(game, store, loaded),

@@ -13,7 +13,7 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Folder, Listed, Named, Within
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.cast import OWN
+from crgame_ros.simulation.av_assignment import OWN
 from crgame_ros.yaml_text import read_yaml
 
 MOST_SEEDS = 1_000_000

@@ -22,7 +22,7 @@ from crgame_ros.ros.environment import (
     prepare_environment,
     require_ros,
 )
-from crgame_ros.ros.place import held
+from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.shared_memory import remove_stale
 from crgame_ros.traffic.kernel_cache import compile_now, compiling_when_idle
 
@@ -50,7 +50,8 @@ def launch(arguments: Sequence[str] | None = None) -> int:
         remove_stale()
         finisher = Finisher(plan.folder, print_now, not request.no_report)
         try:
-            with compiling_when_idle(), held(os.environ['ROS_DOMAIN_ID'], request.namespace):
+            domain = os.environ['ROS_DOMAIN_ID']
+            with compiling_when_idle(), hold_namespace(domain, request.namespace):
                 specs = node_specs(plan)
                 load(shared_modules(specs, plan))
                 graph = Graph(specs, print_now, Roster(plan.roster), finisher, request.namespace)

@@ -12,7 +12,7 @@ from pathlib import Path
 import shutil
 
 from crgame_ros.cockpit.access import check_address
-from crgame_ros.cockpit.opening import check_certificate
+from crgame_ros.cockpit.exposure import check_certificate
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import PlannerSwap

@@ -7,9 +7,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from crgame_ros.cockpit.exposure import Exposure
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.cockpit.library import Library
-from crgame_ros.cockpit.opening import Opening
 from crgame_ros.cockpit.runs.archive import RunArchive
 from crgame_ros.cockpit.runs.routes import add_run_routes
 from crgame_ros.cockpit.server import create_app, listen
@@ -30,7 +30,7 @@ class CockpitNode(Node):
         declare = self.declare_parameter
         # Removed at the end.
         self._private = ExitStack()
-        self._opening = self._declare_opening()
+        self._opening = self._declare_exposure()
         self._framed_by: str = declare('framed_by', '', ParameterDescriptor(
             description='origin of the one page that may show this one within it, such as '
                         'http://127.0.0.1:8070; nobody may if empty', read_only=True)).value
@@ -49,7 +49,7 @@ class CockpitNode(Node):
             description='folder for uploaded scenarios and for the games that people choose',
             read_only=True)).value
 
-    def _declare_opening(self) -> Opening:
+    def _declare_exposure(self) -> Exposure:
         declare = self.declare_parameter
 
         def text(name: str, default: str, what: str) -> str:
@@ -65,7 +65,7 @@ class CockpitNode(Node):
             integer_range=[IntegerRange(from_value=1, to_value=65535, step=1)])).value
         certificate = text('certificate', '', 'PEM file for TLS; plain HTTP if empty')
         key = text('key', '', 'PEM file with the key of the certificate')
-        return Opening(
+        return Exposure(
             text('listen', '127.0.0.1', 'address to listen on; beyond this machine everybody '
                  'needs the token of the printed address'), port,
             flag('token', 'ask for a token on this machine too'),

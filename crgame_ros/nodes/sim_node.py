@@ -17,9 +17,9 @@ from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_run import LiveRun
 from crgame_ros.nodes.sim.run_state import Outcome
 from crgame_ros.recording.run_folder import run_folder
+from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.other_simulation import refuse_another
-from crgame_ros.ros.place import held
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.time_slice import lock_memory, shorten_time_slice
@@ -51,7 +51,7 @@ class SimNode(Node):
     def run(self, stop: StopFlag) -> None:
         """Run until the game ends or a stop is asked for."""
         # A launcher holds the place of those that it started.
-        place = held(str(self.context.get_domain_id()), self.get_namespace()) \
+        place = hold_namespace(str(self.context.get_domain_id()), self.get_namespace()) \
             if self._control.roster is None else nullcontext()
         with place:
             self._run(stop)

@@ -14,8 +14,8 @@ from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.recorded_inputs import RecordedInputs
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ if TYPE_CHECKING:  # They take a second to import, and not everybody asks for me
     from crgame_ros.analysis.report.run import ReportRun
     from crgame_ros.analysis.scores.plan_record import PlanRecord
     from crgame_ros.analysis.scores.vehicle import VehicleScores
-    from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+    from crgame_ros.analysis.tables.table_run import TableRun
     from crgame_ros.recording.recorded_plans import RecordedPlan
     import pyarrow as pa
 
@@ -43,7 +43,7 @@ class Run(ABC):
 
     @property
     @abstractmethod
-    def log(self) -> RunLog:
+    def log(self) -> RunTrajectories:
         """Return how everybody moved, at the scenario's time steps."""
 
     @property
@@ -196,11 +196,11 @@ class Run(ABC):
         from crgame_ros.analysis.tables.run_tables import tables_of
         return tables_of([self.tabulated(scores)])
 
-    def tabulated(self, scores: bool = True) -> 'TabulatedRun':
+    def tabulated(self, scores: bool = True) -> 'TableRun':
         """Return it as tables want it."""
-        from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
-        return TabulatedRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
-                            self.recorded_plans(), self._offline, scores)
+        from crgame_ros.analysis.tables.table_run import TableRun
+        return TableRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
+                        self.recorded_plans(), self._offline, scores)
 
     def reported(self, key: str = 'run1') -> 'ReportRun':
         """

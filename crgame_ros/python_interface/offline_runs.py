@@ -27,8 +27,8 @@ from crgame_ros.recording.recorded_inputs import (
     RecordedInputs,
     with_recorded_events,
 )
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import run_record_of, RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
@@ -87,7 +87,7 @@ class OfflineRun(Run):
         return run_record_of(self.result)
 
     @property
-    def log(self) -> RunLog:
+    def log(self) -> RunTrajectories:
         """Return how everybody moved, at the scenario's time steps."""
         return self.record.log
 

@@ -17,8 +17,8 @@ from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.recorded_plans import read_plans, RecordedPlan
 from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_log import read_run_log, RunLog
 from crgame_ros.recording.run_record import record_of_log, RunRecord
+from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.setup import Setup
 import numpy as np
@@ -34,7 +34,7 @@ class RecordedRun(Run):
     :param log: the run in it.
     """
 
-    def __init__(self, name: str, bag: Path, log: RunLog) -> None:
+    def __init__(self, name: str, bag: Path, log: RunTrajectories) -> None:
         super().__init__(name)
         self._bag, self._log = bag, log
 
@@ -44,7 +44,7 @@ class RecordedRun(Run):
         return self._bag
 
     @property
-    def log(self) -> RunLog:
+    def log(self) -> RunTrajectories:
         """Return how everybody moved, at the scenario's time steps."""
         return self._log
 
@@ -113,10 +113,10 @@ def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if it cannot be read.
     """
-    from crgame_ros.analysis.tables.tabulated_run import run_name
+    from crgame_ros.analysis.tables.table_run import run_name
     place = as_path(path, 'run')
     bag = recording_in(place)
-    return RecordedRun(run_name(place), bag, read_run_log(bag, epoch))
+    return RecordedRun(run_name(place), bag, read_trajectories(bag, epoch))
 
 
 def as_run(run: Run | FileName) -> Run:

@@ -61,7 +61,7 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
     :raises InputError: if a run cannot be read, or the folder not be written.
     """
     from crgame_ros.analysis.tables.run_tables import write_tables
-    from crgame_ros.analysis.tables.tabulated_run import own_id
+    from crgame_ros.analysis.tables.table_run import own_id
     from crgame_ros.analysis.tables.writer import FORMATS
     out = as_path(folder, 'folder')
     file_format = next((name for name in FORMATS if name == to), None)

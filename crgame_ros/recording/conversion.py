@@ -11,7 +11,7 @@ from crgame_ros.recording.epochs import epoch_numbers
 from crgame_ros.recording.exceptions import RunTooShortError
 from crgame_ros.recording.export import export_scenario, scenario_path, write_text
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import read_run_log, RunLog
+from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 
 
 @dataclass(frozen=True)
@@ -46,16 +46,17 @@ def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
     :param out: the file (`*.xml`) or the folder for `<benchmark id>.xml`; None puts it beside the
         recording.
     :param epoch: which run, where the recording holds several; None for the last that began.
-    :param progress: as for `read_run_log`.
+    :param progress: as for `read_trajectories`.
     :raises RunTooShortError: if the run ended before its second scenario step.
     :raises InputError: if there is no run in it, or another file is in the way.
     :raises CrgameError: if the schema refuses the result; nothing is written then.
     """
-    log = read_last_run(bag, progress) if epoch is None else read_run_log(bag, epoch, progress)
+    log = (read_last_run(bag, progress) if epoch is None
+           else read_trajectories(bag, epoch, progress))
     return convert_log(log, bag, out)
 
 
-def convert_log(log: RunLog, bag: Path, out: Path | None = None) -> ConversionReport:
+def convert_log(log: RunTrajectories, bag: Path, out: Path | None = None) -> ConversionReport:
     """
     Write the scenario of a run that has been read; parameters and errors as for `convert`.
 
@@ -68,20 +69,20 @@ def convert_log(log: RunLog, bag: Path, out: Path | None = None) -> ConversionRe
                             exported.obstacle_ids, exported.problem_ids, exported.notices)
 
 
-def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) -> RunLog:
+def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) -> RunTrajectories:
     """
     Read the last run of a recording that did begin; a notice names those that did not.
 
-    :param progress: as for `read_run_log`.
+    :param progress: as for `read_trajectories`.
     :raises RunTooShortError: if none did.
-    :raises InputError: as `read_run_log`.
+    :raises InputError: as `read_trajectories`.
     """
     with BagReader(bag, parts=True) as reader:
         epochs = epoch_numbers(reader)
     told: list[str] = []
     for epoch in reversed(epochs):
         try:
-            log = read_run_log(bag, epoch, progress)
+            log = read_trajectories(bag, epoch, progress)
         except RunTooShortError as error:
             told.append(error.what)
             refusal = error

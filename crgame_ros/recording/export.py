@@ -19,7 +19,7 @@ from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.paths import check_room
 from crgame_ros.recording.export_objects import named, ObjectWriter
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_elements import exact_number, goal_state, planning_problem
 from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
@@ -49,7 +49,7 @@ class ProblemWriter:
     :ivar humans: who of these is, or was, a human.
     """
 
-    def __init__(self, log: RunLog, loaded: LoadedScenario, lanelets: dict[int, int],
+    def __init__(self, log: RunTrajectories, loaded: LoadedScenario, lanelets: dict[int, int],
                  ids: IdPool, notices: list[str]) -> None:
         self._log, self._lanelets, self._notices = log, lanelets, notices
         self._network = loaded.scenario.lanelet_network
@@ -155,8 +155,9 @@ class ExportedScenario:
     notices: tuple[str, ...]
 
 
-def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str | None = None,
-                    source: str | None = None, day: date | None = None) -> ExportedScenario:
+def export_scenario(log: RunTrajectories, *, author: str | None = None,
+                    affiliation: str | None = None, source: str | None = None,
+                    day: date | None = None) -> ExportedScenario:
     """
     Turn a run into a CommonRoad scenario.
 
@@ -199,7 +200,7 @@ def export_scenario(log: RunLog, *, author: str | None = None, affiliation: str 
                             tuple(map(one_line, notices)))
 
 
-def write_scenario(log: RunLog, out: Path, **header: Any) -> ExportedScenario:
+def write_scenario(log: RunTrajectories, out: Path, **header: Any) -> ExportedScenario:
     """
     Write a run as a CommonRoad scenario; the file is there whole or not at all.
 
@@ -274,7 +275,7 @@ def write_bytes(content: bytes, path: Path) -> None:
                          'choose a folder that can be written') from error
 
 
-def _header(log: RunLog, loaded: LoadedScenario, problems: int,
+def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,
             notices: list[str]) -> dict[str, str]:
     """Return the attributes of the file, as far as they follow from run and original."""
     original = guard.parse_hardened(log.xml_text, loaded.source)

@@ -9,7 +9,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.export_elements import (
     dynamic_obstacle,
     DYNAMIC_TYPES,
@@ -54,7 +54,7 @@ class ObjectWriter:
     :raises InputError: if the state of a vehicle holds no numbers.
     """
 
-    def __init__(self, log: RunLog, ids: IdPool, notices: list[str]) -> None:
+    def __init__(self, log: RunTrajectories, ids: IdPool, notices: list[str]) -> None:
         self._log = log
         self._pool = ids
         self._notices = notices
@@ -146,7 +146,7 @@ class ObjectWriter:
                 f'{number}, which holds its places, but not its type and speed')
 
 
-def _vehicle_rows(log: RunLog) -> FloatArray:
+def _vehicle_rows(log: RunTrajectories) -> FloatArray:
     states = log.vehicle_states
     if not np.isfinite(states).all():
         step, column, _ = np.argwhere(~np.isfinite(states))[0].tolist()

@@ -15,7 +15,7 @@ from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recover import recover
 from crgame_ros.recording.run_cycles import CYCLE_TOPIC
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, parts_of
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import write_timing_report
 
 # Exit codes.
@@ -35,7 +35,7 @@ class FinishedRecording(NamedTuple):
 
     bag: Path
     suffix: str
-    log: RunLog
+    log: RunTrajectories
     timing: dict[str, Any] | None
 
 
@@ -89,7 +89,7 @@ def _derive(bag: Path, suffix: str, say: Callable[[str], object],
     if not _has_cycles(bag):
         say(f'{folder}: {_NOTHING}')
         return EMPTY, None
-    logs: list[RunLog] = []
+    logs: list[RunTrajectories] = []
     try:
         reading = Progress(tell, f'reading {bag}')
         code = _attempt(lambda: logs.append(read_last_run(bag, reading)), say)

@@ -7,8 +7,8 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.messages.joints import VEHICLE_JOINTS, vehicles_from_joints
 from crgame_ros.messages.world_messages import VEHICLES_TOPIC
-from crgame_ros.recording.bridging import farthest, piece_around
 from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.gap_filling import farthest, piece_around
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.resampling import resample
 from crgame_ros.recording.run_points import read_points

@@ -23,7 +23,11 @@ from crgame_ros.messages.world_messages import VEHICLES_TOPIC
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import (
+    read_trajectories,
+    run_log_of,
+    RunTrajectories,
+)
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 import numpy as np
@@ -199,7 +203,7 @@ class RunRecord:
     :param tasks: what happened in the game's tasks, in order.
     """
 
-    log: RunLog
+    log: RunTrajectories
     ns: NDArray[np.int64]
     commands: NDArray[np.float64]
     fired: tuple[FiredEvent, ...]
@@ -251,14 +255,14 @@ class RunRecord:
 def read_run_record(path: Path, epoch: int | None = None,
                     progress: Callable[[float], object] | None = None) -> RunRecord:
     """
-    Read a run from a recording; parameters and errors are those of `read_run_log`.
+    Read a run from a recording; parameters and errors are those of `read_trajectories`.
 
     Without recorded cycles there are no commands.
     """
-    return record_of_log(path, read_run_log(path, epoch, progress))
+    return record_of_log(path, read_trajectories(path, epoch, progress))
 
 
-def record_of_log(path: Path, log: RunLog) -> RunRecord:
+def record_of_log(path: Path, log: RunTrajectories) -> RunRecord:
     """
     Read what else there is of a run that has been read from a recording.
 

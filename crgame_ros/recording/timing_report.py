@@ -22,8 +22,8 @@ from crgame_ros.recording.export import write_text
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_plans import OpenRequests
 from crgame_ros.recording.run_cycles import read_cycles
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_points import read_points
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.recording.view_periods import SeatSound, ViewPeriods
 from crgame_ros.simulation.contacts import Contact, find_contacts, Motions
@@ -114,7 +114,7 @@ PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'reali
 _BRAKING, _WORST = 'braking: ', 'worst_'
 
 
-def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None,
+def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | None = None,
                   progress: Callable[[float], object] | None = None) -> dict[str, Any]:
     """
     Report on a recorded run; `docs/recordings.md` and `docs/timing.md` define the keys.
@@ -162,7 +162,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunLog | None = None
 
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
-                        log: RunLog | None = None,
+                        log: RunTrajectories | None = None,
                         progress: Callable[[float], object] | None = None) -> dict[str, Any]:
     """
     Write `timing.json`; the file is there whole or not at all.

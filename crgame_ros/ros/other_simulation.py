@@ -16,7 +16,7 @@ def refuse_another(node: Node, until_s: float) -> None:
     """
     Check that no other simulation speaks here: two on the same topics would mix everything.
 
-    On this machine a lock tells (`place.held`); this is about other machines, and other users.
+    On this machine a lock tells (`namespace_lock`); this is about other machines, and other users.
 
     :param node: in the namespace in question.
     :param until_s: how long others may take to be discovered, by the steady clock.

@@ -26,8 +26,8 @@ from crgame_ros.roads.surface import lanelet_ring
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.format_2017a import upgrade
 from crgame_ros.scenario.heights import LaneletHeights, read_heights
-from crgame_ros.scenario.mending import mend
 from crgame_ros.scenario.recorded_humans import read_human_note
+from crgame_ros.scenario.repair import mend
 from lxml import etree
 import numpy as np
 from numpy.typing import NDArray

@@ -67,14 +67,14 @@ def predict_constant_steering(states: FloatArray, wheelbases: FloatArray, steps:
     return poses, velocities
 
 
-class KnownCourses(Protocol):
+class KnownMotions(Protocol):
     """Whatever knows where all objects are at a scenario time step."""
 
     def states_at(self, k: int) -> ObjectStates:
         """Return the poses and velocities of all objects at a time step."""
 
 
-def recorded_future(obstacles: KnownCourses, k: int,
+def recorded_future(obstacles: KnownMotions, k: int,
                     steps: int) -> tuple[FloatArray, FloatArray]:
     """
     Return the true future of all obstacles (`prediction: recorded`, which leaks).

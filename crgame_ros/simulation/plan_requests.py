@@ -15,7 +15,7 @@ from crgame_ros.messages.joints import (
 )
 from crgame_ros.messages.request_layout import with_lights
 from crgame_ros.planner.registry import PLANNERS
-from crgame_ros.scenario.courses import ObstacleCourses
+from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.scenario.prediction import (
     LanePrediction,
     predict_constant_steering,
@@ -56,7 +56,7 @@ class PlanRequests:
     :param courses: the objects as events change them; None where no event can.
     """
 
-    def __init__(self, setup: Setup, courses: ObstacleCourses | None = None) -> None:
+    def __init__(self, setup: Setup, courses: ObstacleMotions | None = None) -> None:
         self._setup = setup
         self._courses = courses
         self._mode = setup.game.prediction.mode

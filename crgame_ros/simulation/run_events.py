@@ -16,7 +16,7 @@ from crgame_ros.game.events import (
     TrafficChange,
 )
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.scenario.courses import ObstacleCourses
+from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.simulation.condition_check import ConditionCheck
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.state import VehicleState
@@ -40,7 +40,7 @@ class RunEvents:
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
-        self.obstacles = ObstacleCourses(setup.obstacles)
+        self.obstacles = ObstacleMotions(setup.obstacles)
         self.fired: tuple[FiredEvent, ...] = ()
         self._waiting = {event.name: event for event in setup.game.events}
         self._actions = {event.name: event.action for event in setup.game.events}

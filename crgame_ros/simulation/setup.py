@@ -25,8 +25,8 @@ from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedSce
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.scripted.objects import ScriptedObjects
+from crgame_ros.simulation.av_assignment import assign_avs, Part
 from crgame_ros.simulation.av_models import check_models
-from crgame_ros.simulation.cast import cast_avs, Part
 from crgame_ros.simulation.event_check import (
     check_changes,
     check_events,
@@ -198,7 +198,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     """
     loaded = load_scenario(game.scenario) if loaded is None else loaded
     network = RoadNetwork(loaded.scenario.lanelet_network)
-    parts, remarks = cast_avs(game, loaded)
+    parts, remarks = assign_avs(game, loaded)
     avs = _place_avs(parts, network)
     k0 = min((av.planning_problem.initial_state.time_step for av in avs), default=0)
     doubles = _recorded_egos(loaded, avs, k0)

@@ -14,7 +14,7 @@ from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.cast import adapt_game, OWN
+from crgame_ros.simulation.av_assignment import adapt_game, OWN
 from crgame_ros.study.trial_settings import tasks_over, TrialSettings
 from crgame_ros.yaml_text import read_yaml
 

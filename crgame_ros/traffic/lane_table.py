@@ -22,7 +22,7 @@ class Point(Protocol):
     :param half_width: of the lane [m]
     :param swing, swing_long: where a bend is too tight, how far to the left cars and long
         vehicles swing out for the square of the distance from rear axle to front [1/m]; see
-        `tightness`.
+        `tight_lanes`.
     """
 
     x: float

@@ -45,7 +45,7 @@ from crgame_ros.traffic.routes import leaving, Routes
 from crgame_ros.traffic.spawning import CAR, is_long, LARGE_CAR, slot_descriptions, Spawner, TRUCK
 from crgame_ros.traffic.stop_lines import StopLines
 from crgame_ros.traffic.swerving import Swerving
-from crgame_ros.traffic.tightness import tight_lanes
+from crgame_ros.traffic.tight_lanes import find_tight_lanes
 from crgame_ros.traffic.waiting import (
     break_circles,
     hopeless,
@@ -100,7 +100,7 @@ class Traffic:
         side, movements = driving_side(scenario), Movements(self._graph)
         self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
-        for_cars, for_trucks = tight_lanes(self._graph, CAR, LARGE_CAR, TRUCK)
+        for_cars, for_trucks = find_tight_lanes(self._graph, CAR, LARGE_CAR, TRUCK)
         self._routes = Routes(
             self._graph, np.where(self._conflicts.tapers() | for_cars, TAPER_COST, 0.0),
             for_trucks, side.keeps_left)

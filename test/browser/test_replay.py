@@ -12,7 +12,7 @@ from crgame_ros.analysis.criticality.criticality import COLUMN, Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.cockpit.frames import STATE_COLUMNS
 from crgame_ros.cockpit.replay_backend import ReplayBackend
-from crgame_ros.recording.run_log import read_run_log, RunLog
+from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import pytest
@@ -62,9 +62,9 @@ def bag(first_run: OfflineResult, tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 @pytest.fixture(scope='module')
-def log(bag: Path) -> RunLog:
+def log(bag: Path) -> RunTrajectories:
     """Read the first run as the converter does."""
-    return read_run_log(bag, 0)
+    return read_trajectories(bag, 0)
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def seek(page: Browser, t: float) -> dict[str, Any]:
     return drawn(page)
 
 
-def test_poses_are_those_of_the_bag(page: Browser, log: RunLog,
+def test_poses_are_those_of_the_bag(page: Browser, log: RunTrajectories,
                                     first_run: OfflineResult) -> None:
     """At ten seeded ticks, in any order, vehicles and objects agree to the last bit."""
     for k in np.random.default_rng(11).permutation(321)[:10].tolist():
@@ -111,7 +111,7 @@ def test_poses_are_those_of_the_bag(page: Browser, log: RunLog,
 
 
 @pytest.mark.exhaustive
-def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunLog) -> None:
+def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunTrajectories) -> None:
     """The world stands as it was, instead of moving what it knows to where nobody was."""
     before = seek(page, 1.0)
     page.run("""
@@ -143,7 +143,7 @@ def test_states_between_the_ticks(page: Browser, first_run: OfflineResult) -> No
                                rtol=0, atol=1e-9)
 
 
-def test_steps_land_on_ticks(page: Browser, log: RunLog) -> None:
+def test_steps_land_on_ticks(page: Browser, log: RunTrajectories) -> None:
     """Keys and buttons go from tick to tick, also back, over the border of two chunks."""
     seek(page, 4.837)
     body = page.driver.find_element(By.TAG_NAME, 'body')
@@ -160,7 +160,7 @@ def test_steps_land_on_ticks(page: Browser, log: RunLog) -> None:
 
 
 @pytest.mark.exhaustive
-def test_slider_is_dragged_and_steered_by_keys(page: Browser, log: RunLog) -> None:
+def test_slider_is_dragged_and_steered_by_keys(page: Browser, log: RunTrajectories) -> None:
     """A drag to the middle and back shows each place; the slider tells where it is."""
     slider = page.driver.find_element(By.ID, 'timeline-slider')
     page.run("""
@@ -258,7 +258,7 @@ def test_documents_follow_the_time_back_too(page: Browser) -> None:
 
 
 @pytest.mark.exhaustive
-def test_plots_have_the_past_and_the_future(page: Browser, log: RunLog) -> None:
+def test_plots_have_the_past_and_the_future(page: Browser, log: RunTrajectories) -> None:
     """After a jump the history is there at once, from the recording."""
     seek(page, 20.0)
     page.wait('crgame.store.history(0, 10).t.length > 100')
@@ -272,7 +272,7 @@ def test_plots_have_the_past_and_the_future(page: Browser, log: RunLog) -> None:
 @pytest.mark.exhaustive
 def test_another_run_of_the_recording(page: Browser, bag: Path) -> None:
     """The list of runs leads to the other one, with its own scene, and back."""
-    second = read_run_log(bag, 1)
+    second = read_trajectories(bag, 1)
     choice = page.driver.find_element(By.CSS_SELECTOR, '#timeline select[aria-label="Run"]')
     assert [o.text for o in choice.find_elements(By.TAG_NAME, 'option')] == ['1 of 2', '2 of 2']
     choice.find_elements(By.TAG_NAME, 'option')[1].click()
@@ -288,7 +288,8 @@ def test_another_run_of_the_recording(page: Browser, bag: Path) -> None:
 
 
 @pytest.mark.exhaustive
-def test_criticality_is_measured_and_shown_at_any_time(page: Browser, log: RunLog) -> None:
+def test_criticality_is_measured_and_shown_at_any_time(page: Browser,
+                                                       log: RunTrajectories) -> None:
     """The panel has the smallest distance now and so far, as measured from the bag."""
     found: dict[int, tuple[float, str]] = {}
 

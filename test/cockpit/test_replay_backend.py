@@ -23,7 +23,7 @@ from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.joints import vehicles_from_joints
 from crgame_ros.recording.mcap_file import McapFile
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import pytest
@@ -100,7 +100,7 @@ def test_every_state_is_that_of_the_message(bag: Path, backend: ReplayBackend,
 
 def test_ticks_are_those_of_the_run_log(bag: Path, backend: ReplayBackend) -> None:
     """Vehicles and objects at each scenario step agree with the reader of conversions."""
-    log = read_run_log(bag)
+    log = read_trajectories(bag)
     frames = read_frames(*map(backend.chunk, range(3)))
     at_ticks = np.array([body[1:].reshape(2, 13)[:, :8] for _, head, body in frames.states
                          if head[2] % N == 0])

@@ -19,7 +19,7 @@ from crgame_ros.analysis.criticality.rows import (
     PLACE_COLUMNS,
 )
 from crgame_ros.cockpit.replay_backend import ReplayBackend
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ def parked() -> OfflineResult:
 def rows(parked: OfflineResult) -> dict[int, FloatArray]:
     """Measure the run beside the code under test, by step."""
     found: dict[int, FloatArray] = {}
-    measure_log(run_log_of(parked), on_tick=lambda it: found.update(
+    measure_log(trajectories_of(parked), on_tick=lambda it: found.update(
         {it.n: criticality_rows(it, 0, it.n)}))
     return found
 

@@ -12,7 +12,7 @@ from crgame_ros.game.events import AtStep, FiredEvent
 from crgame_ros.game.file import load_game
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_inputs import recorded_inputs, with_replayed_events
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.ros.messages import from_time
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
@@ -186,7 +186,7 @@ def test_recorded_events_repeat_offline_and_live(tmp_path: Path) -> None:
     known, fired = read_run_events(folder / 'bag')
     assert [event.name for event in fired] == ['pedestrian', 'leader-brakes']
     assert {'pedestrian', 'slow-zone'} <= known
-    log = read_run_log(folder / 'bag')
+    log = read_trajectories(folder / 'bag')
     game = load_game(folder / 'game.yaml')
     human = replace(game.humans[0], driver=f'replay:{folder / "bag"}')
     setup = with_replayed_events(build_setup(replace(game, humans=(human,))))
@@ -201,6 +201,6 @@ def test_recorded_events_repeat_offline_and_live(tmp_path: Path) -> None:
         assert launcher.wait() == 0, launcher.text
     assert {event.name: event.when for event in load_game(second / 'game.yaml').events
             if event.when is not None} == {event.name: AtStep(event.k) for event in fired}
-    np.testing.assert_array_equal(read_run_log(second / 'bag').object_poses, log.object_poses)
+    np.testing.assert_array_equal(read_trajectories(second / 'bag').object_poses, log.object_poses)
     assert [(event.name, event.n) for event in read_run_events(second / 'bag').fired] == [
         (event.name, event.n) for event in fired]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bag_player import BagPlayer
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.ros.messages import from_time
 from live_peer import Peer
 from live_support import Launcher, PATIENCE_S, SCENARIOS
@@ -152,7 +152,7 @@ def test_markers_are_deleted_and_drawn_anew(played: Played) -> None:
 
 
 def _offset_s(played: Played) -> float:
-    return read_run_log(played.folder / 'run' / 'bag').game.scheduler.clock_offset_ns * 1e-9
+    return read_trajectories(played.folder / 'run' / 'bag').game.scheduler.clock_offset_ns * 1e-9
 
 
 @pytest.mark.parametrize(('topic', 'within_s'), [
@@ -186,11 +186,11 @@ def test_each_round_is_a_recording_of_its_own(played: Played) -> None:
     """Nothing is lost once the game is known: each bag holds what was played, and is a run."""
     bags = sorted(path for path in played.folder.glob('bag*'))
     assert [bag.name for bag in bags] == ['bag', 'bag_2']
-    original = read_run_log(played.folder / 'run' / 'bag')
+    original = read_trajectories(played.folder / 'run' / 'bag')
     for bag, offset_s in zip(bags, (0.0, OFFSET_S), strict=True):
         with BagReader(bag) as reader:
             counts = {name: topic.message_count for name, topic in reader.topics.items()}
-        log = read_run_log(bag)
+        log = read_trajectories(bag)
         assert log.ks[0] - original.ks[0] <= 10.0 * offset_s + 1.0
         assert abs(int(log.ks[-1] - original.ks[-1])) <= 1
         for topic in ('/vehicles/state', '/timing/cycle'):

@@ -11,7 +11,7 @@ import sys
 
 from commonroad.common.file_reader import CommonRoadFileReader
 from crgame_ros.game.file import load_game
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.vehicle.state import StateColumn
 from live_support import CUT_IN, Launcher, ROOT
 import numpy as np
@@ -55,7 +55,7 @@ def test_every_plan_of_the_policy_is_followed(run: Launcher) -> None:
 
 
 def test_the_recording_names_the_policy_and_holds_what_it_did(run: Launcher) -> None:
-    log = read_run_log(run.out / 'bag')
+    log = read_trajectories(run.out / 'bag')
     # Both were there in time.
     assert not run.says('starting without')
     vehicles = [item.id for item in log.vehicles]

@@ -23,7 +23,7 @@ from crgame_ros.game.file import load_game
 from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS, wait_until
@@ -115,7 +115,7 @@ def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> No
     assert sorted(set(live[:, 1].tolist())) == list(range(first, STEPS + 1, STEPS_PER_TICK))
     assert np.isfinite(live[:, COLUMNS.index('min_distance')]).all()
     blocks: list[NDArray[np.float64]] = []
-    log = read_run_log(finished.out / 'bag')
+    log = read_trajectories(finished.out / 'bag')
     measure_log(log, on_tick=lambda it: blocks.append(criticality_rows(it, 0, it.n)))
     again = np.concatenate(blocks)
     # Others' accelerations, differences from step to step, are known from its second step on.
@@ -138,8 +138,8 @@ def test_the_human_drives_live_against_another_planner(finished: Launcher, tmp_p
     assert found['human_differs_s'] is None
     assert found['accepted_ratio']['av0'] > 0.5
     assert found['criticality']['vehicles'].keys() == recorded['criticality']['vehicles'].keys()
-    again = read_run_log(tmp_path / 'out' / 'constant_velocity' / 'bag')
-    assert len(again.ks) == len(read_run_log(finished.out / 'bag').ks)
+    again = read_trajectories(tmp_path / 'out' / 'constant_velocity' / 'bag')
+    assert len(again.ks) == len(read_trajectories(finished.out / 'bag').ks)
 
 
 def test_the_timing_report_has_table_one(finished: Launcher) -> None:

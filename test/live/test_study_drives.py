@@ -13,7 +13,7 @@ from typing import Any
 
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.schema.reading import read
 from crgame_ros.study.conduct.live_drives import LiveDrives
 from crgame_ros.study.drive_state import DrivePhase
@@ -165,7 +165,7 @@ def test_what_is_finished_was_driven_to_its_end(journal: list[dict[str, Any]]) -
         assert entry['outcome'] == 'time'
         assert entry['end_time_s'] == pytest.approx(DURATION_S)
         assert entry['asked_at'] < entry['start_at'] < entry['at']
-        log = read_run_log(recording_in(entry['folder'] / entry['run']))
+        log = read_trajectories(recording_in(entry['folder'] / entry['run']))
         # Scenario steps of 0.1 s, the first included.
         assert len(log.ks) == round(DURATION_S / 0.1) + 1
 

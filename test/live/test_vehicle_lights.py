@@ -11,7 +11,7 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.recording.export import export_scenario
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from live_support import Launcher, SCENARIOS
@@ -71,7 +71,7 @@ def test_lights_are_recorded_and_change_no_motion(tmp_path: Path) -> None:
     cycles = read_cycles(bag)
     lights = cycles.commands('hv0')[:, 4]
     # The planner asks for them: each request says what they are at its time.
-    log = read_run_log(bag)
+    log = read_trajectories(bag)
     shown = dict(zip(cycles.column('n').tolist(), lights.tolist(), strict=True))
     with BagReader(bag) as reader:
         requests = [from_joint_trajectory(item.message, item.topic)

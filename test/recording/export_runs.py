@@ -19,7 +19,7 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import ExportedScenario
-from crgame_ros.recording.run_log import run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories, trajectories_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from lxml import etree
@@ -41,7 +41,7 @@ class ExportRuns:
 
     @staticmethod
     def drive(text: str, directory: Path, avs: tuple[AvSpec, ...] | None = None,
-              duration_s: float = 2.0) -> RunLog:
+              duration_s: float = 2.0) -> RunTrajectories:
         """Drive a scenario with a human who accelerates and steers, and AVs at constant speed."""
         file = directory / 'original.xml'
         file.write_text(text, encoding='utf-8')
@@ -56,8 +56,8 @@ class ExportRuns:
         # Second by second: left, right with the horn, hazard, nothing but the brake.
         commands[:, 4] = np.resize((1, 6, 3, 0), steps // 50 + 1).repeat(50)[:steps]
         commands[150:, 1] = 0.05
-        return run_log_of(run_offline(setup, duration_s=duration_s, check_drivability=False,
-                                      drivers={'hv0': ReplayDriver(commands)}))
+        return trajectories_of(run_offline(setup, duration_s=duration_s, check_drivability=False,
+                                           drivers={'hv0': ReplayDriver(commands)}))
 
     @staticmethod
     def own(name: str) -> str:
@@ -82,7 +82,7 @@ class ExportRuns:
         return scenario, problems
 
     @staticmethod
-    def assert_poses(log: RunLog, exported: ExportedScenario, scenario: Scenario) -> None:
+    def assert_poses(log: RunTrajectories, exported: ExportedScenario, scenario: Scenario) -> None:
         """Compare every pose at every step with the log; vehicles in closed form."""
         for column, item in enumerate(log.vehicles):
             obstacle = scenario.obstacle_by_id(exported.obstacle_ids[item.id])
@@ -126,7 +126,8 @@ class ExportRuns:
         return etree.tostring(root, encoding='unicode')
 
     @staticmethod
-    def with_objects(log: RunLog, *objects: tuple[ObjectDescription, Any]) -> RunLog:
+    def with_objects(log: RunTrajectories,
+                     *objects: tuple[ObjectDescription, Any]) -> RunTrajectories:
         """Put objects with poses (K, 3) into a log without any; all of them drive at 3 m/s."""
         poses = np.stack([np.asarray(track, dtype=np.float64) for _, track in objects], axis=1)
         velocities = np.stack((3.0 * np.cos(poses[..., 2]), 3.0 * np.sin(poses[..., 2]),

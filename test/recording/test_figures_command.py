@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from crgame_ros.analysis.pictures.figure_run import FigureRun
 from crgame_ros.analysis.pictures.followed_plans import read_followed_plans
-from crgame_ros.analysis.pictures.pictured_run import PicturedRun
 from crgame_ros.cli import main
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import VehicleState
@@ -114,13 +114,13 @@ def test_two_runs_are_compared(run: Path, result: OfflineResult, recorder: Any, 
 
 def test_plans_are_drawn_as_recorded(run: Path, result: OfflineResult) -> None:
     """In force 30 ms after they were asked for, the first from the start on, for it is awaited."""
-    log = read_run_log(run / 'bag')
+    log = read_trajectories(run / 'bag')
     (plans,) = read_followed_plans(run / 'bag', log).values()
     assert [plan.stamp_s for plan in plans] == pytest.approx(0.5 * np.arange(len(plans)))
     assert [plan.start_s for plan in plans] == pytest.approx(
         [0.0, *(0.5 * np.arange(1, len(plans)) + 0.03)])
     # The AV did what its plans said: its way lies on each of them.
-    scene = PicturedRun(run, None, None, print).scene
+    scene = FigureRun(run, None, None, print).scene
     window = scene.windows([20])[0]
     (plan,) = scene.at(22, window).plans
     ticks = result.states_of('av0')[::result.setup.scheduler.steps_per_tick]

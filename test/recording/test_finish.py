@@ -12,7 +12,7 @@ from crgame_ros.cli import main
 from crgame_ros.recording.finish import EMPTY, finish_run, OK
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import bags_of, parts_of
-from crgame_ros.recording.run_log import read_run_log, run_log_of
+from crgame_ros.recording.run_trajectories import read_trajectories, trajectories_of
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import pytest
@@ -99,7 +99,7 @@ def test_a_recorder_that_was_started_again(tmp_path: Path, recorder: Any,
     assert report['scenario_steps'] == {'first': 0, 'last': 60}
     assert 30 < report['gaps'] < 140
     assert any('interpolated between states' in notice for notice in report['notices'])
-    log, whole = read_run_log(tmp_path / 'bag'), run_log_of(result)
+    log, whole = read_trajectories(tmp_path / 'bag'), trajectories_of(result)
     np.testing.assert_array_equal(log.ks, whole.ks)
     # A change of acceleration of 8 m/s^2 over less than 1.4 s without a state: a T^2 / 32.
     assert np.abs(log.vehicle_states[:, :, :2] - whole.vehicle_states[:, :, :2]).max() < 0.5

@@ -14,7 +14,7 @@ from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.info import describe
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_events import read_run_events
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
@@ -58,7 +58,7 @@ def test_another_type_on_every_topic_of_a_run(
     mixed = sorted([*own, *strangers], key=lambda message: message[2])
     sound = recorder.rosbag2(tmp_path / 'sound', own, storage)
     foreign = record(tmp_path / 'foreign', samples, mixed, storage)
-    before, after = read_run_log(sound), read_run_log(foreign)
+    before, after = read_trajectories(sound), read_trajectories(foreign)
     assert np.array_equal(before.vehicle_states, after.vehicle_states)
     assert np.array_equal(before.object_poses, after.object_poses, equal_nan=True)
     assert '3 messages of /vehicles/state are not of this run: left out' in after.notices
@@ -93,7 +93,7 @@ def test_log_times_that_no_clock_gives(log_ns: int, result: OfflineResult, recor
         index = index_run(reader, read_epoch(reader))
         assert (index.first_n, index.last_n) == (0, 100)
     assert describe(bag).cycles is not None
-    assert np.array_equal(read_run_log(bag).ks, np.arange(11))
+    assert np.array_equal(read_trajectories(bag).ks, np.arange(11))
     assert convert(bag, tmp_path / 'run.xml').time_steps == 11
 
 

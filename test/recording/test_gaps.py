@@ -9,9 +9,13 @@ from typing import Any, NamedTuple
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
 from crgame_ros.game.game import AvSpec
-from crgame_ros.recording.bridging import bridge_objects, LONGEST_GAP_S
 from crgame_ros.recording.finish import finish_run, OK
-from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.recording.gap_filling import bridge_objects, LONGEST_GAP_S
+from crgame_ros.recording.run_trajectories import (
+    read_trajectories,
+    RunTrajectories,
+    trajectories_of,
+)
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import pytest
@@ -30,7 +34,7 @@ class Whole(NamedTuple):
 
     result: OfflineResult
     messages: list[Message]
-    log: RunLog
+    log: RunTrajectories
 
 
 @pytest.fixture(scope='module')
@@ -44,14 +48,14 @@ def whole(recorder: Any, drive: Callable[..., OfflineResult]) -> Whole:
                    avs=(AvSpec('av0', 'constant-velocity'),))
     messages = recorder.messages(result, offset_ns=3_000_000_000, intervals_s=intervals_s,
                                  tick_states=True)
-    return Whole(result, messages, run_log_of(result))
+    return Whole(result, messages, trajectories_of(result))
 
 
 def _time_s(message: Message) -> float:
     return (message[2] - START_NS) * 1e-9
 
 
-def _worst_m(log: RunLog, whole: RunLog) -> tuple[float, float]:
+def _worst_m(log: RunTrajectories, whole: RunTrajectories) -> tuple[float, float]:
     """Return the largest distances of vehicles and objects from the whole run's."""
     rows = log.ks - whole.ks[0]
     vehicles = log.vehicle_states[:, :, :2] - whole.vehicle_states[rows, :, :2]
@@ -68,7 +72,7 @@ def test_one_percent_of_all_messages_is_missing(tmp_path: Path, recorder: Any, w
     kept = np.random.default_rng(seed).random(len(whole.messages)) > 0.01
     messages = [message for message, keep in zip(whole.messages, kept, strict=True)
                 if keep or message[0].startswith('/scenario/')]
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, np.arange(201))
     vehicles_m, objects_m = _worst_m(log, whole.log)
     assert vehicles_m < 1e-3
@@ -86,7 +90,7 @@ def test_single_ticks_of_a_topic_are_missing(tmp_path: Path, recorder: Any, whol
     lost = {START_NS + 1_000_000 + k * 100_000_000 for k in (23, 100, 199)}
     messages = [m for m in whole.messages if m[0] != topic or m[2] not in lost]
     assert len(whole.messages) - len(messages) == 3
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, np.arange(201))
     vehicles_m, objects_m = _worst_m(log, whole.log)
     # Of what another topic holds to the last bit nothing but the roundings differs.
@@ -103,7 +107,7 @@ def test_a_third_of_a_second_of_everything_is_missing(tmp_path: Path, recorder: 
                                                       whole: Whole, at_s: float) -> None:
     """It is bridged, also where a stall was in it: the lag of the cycles behind tells of it."""
     messages = [m for m in whole.messages if not at_s <= _time_s(m) < at_s + 0.3]
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, np.arange(201))
     vehicles_m, objects_m = _worst_m(log, whole.log)
     # A cubic between states that are T apart misses a change of acceleration a by a T^2 / 32 at
@@ -122,7 +126,7 @@ def test_five_seconds_of_everything_are_missing(tmp_path: Path, recorder: Any,
     """The longest piece becomes the scenario; one line says so, and timing.json agrees."""
     messages = [m for m in whole.messages if not 3.0 <= _time_s(m) < 8.0]
     folder = recorder.ours(tmp_path / 'bag', messages)
-    log = read_run_log(folder)
+    log = read_trajectories(folder)
     # At 8 s the human is where it should be at 8.2 s.
     np.testing.assert_array_equal(log.ks, np.arange(82, 201))
     assert any(notice.startswith('2 scenario steps at the start are left out')
@@ -150,7 +154,7 @@ def test_gaps_longer_than_the_limit_are_never_bridged(tmp_path: Path, recorder: 
     counts = []
     for length_s in (LONGEST_GAP_S - 0.02, LONGEST_GAP_S + 0.22):
         messages = [m for m in whole.messages if not 12.005 <= _time_s(m) < 12.005 + length_s]
-        counts.append(len(read_run_log(recorder.ours(
+        counts.append(len(read_trajectories(recorder.ours(
             tmp_path / f'{length_s:.2f}', messages)).ks))
     assert counts == [201, 121]
 
@@ -159,7 +163,7 @@ def test_documents_that_come_late(tmp_path: Path, recorder: Any, whole: Whole) -
     """Discovered after ten seconds: the run is theirs from its first step on."""
     late = [(*m[:2], m[2] + 10_000_000_000, m[3]) if m[0].startswith('/scenario/') else m
             for m in whole.messages]
-    log = read_run_log(recorder.ours(tmp_path / 'bag', sorted(late, key=lambda m: m[2])))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', sorted(late, key=lambda m: m[2])))
     np.testing.assert_array_equal(log.ks, np.arange(201))
     assert max(_worst_m(log, whole.log)) < 1e-9 and log.notices == ()
 
@@ -169,7 +173,7 @@ def test_a_recording_that_begins_in_the_middle_of_a_stall(tmp_path: Path, record
     """From the lag of the first cycle follows where on its own time a human is."""
     messages = [m for m in whole.messages
                 if _time_s(m) > 8.0 or m[0].startswith('/scenario/')]
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     assert log.ks[0] == 82 and log.ks[-1] == 200
     assert max(_worst_m(log, whole.log)) < 1e-6
     assert 'the recording begins at scenario step 80 of a run that began at 0' in log.notices
@@ -183,7 +187,7 @@ def test_the_states_of_a_run_whose_game_is_missing_are_not_those_of_the_run_befo
     messages += [m for m in recorder.messages(second, epoch=1, offset_ns=1_500_000_000,
                                               log_ns=START_NS + 1_500_000_000)
                  if m[0] != '/scenario/game']
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, np.arange(11))
     assert any('is of another run, whose /scenario/game was not recorded' in notice
                for notice in log.notices)

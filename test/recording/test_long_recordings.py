@@ -10,7 +10,7 @@ from crgame_ros.game.game import AvSpec
 from crgame_ros.recording.progress import PERIOD_S, Progress
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
-from crgame_ros.recording.run_log import read_run_log, run_log_of
+from crgame_ros.recording.run_trajectories import read_trajectories, trajectories_of
 from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
@@ -39,11 +39,11 @@ def test_what_differs_in_its_numbers_alone_is_decoded_once(
         return decode(reader, message)
 
     monkeypatch.setattr(BagReader, 'decode', counted)
-    log = read_run_log(folder)
+    log = read_trajectories(folder)
     timing_report(folder, log=log)
     assert len(messages) == 3 + 61 + 601 + 600
     assert len(decoded) < 15
-    whole = run_log_of(result)
+    whole = trajectories_of(result)
     np.testing.assert_array_equal(log.vehicle_states[:, :, :3], whole.vehicle_states[:, :, :3])
     np.testing.assert_array_equal(log.object_poses, whole.object_poses)
     np.testing.assert_array_equal(read_cycles(folder).rows, recorder.rows)
@@ -61,9 +61,9 @@ def test_messages_of_another_layout_among_the_others(tmp_path: Path, recorder: A
             samples.store.serialize_cdr(message, type_name, little_endian=False)))
     for index in states[75:78]:
         messages[index] = (*messages[index][:3], messages[index][3][:-40])
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.vehicle_states[:, :, :3],
-                                  run_log_of(result).vehicle_states[:, :, :3])
+                                  trajectories_of(result).vehicle_states[:, :, :3])
     assert log.notices == ('3 messages of /vehicles/state are not of this run: left out',)
 
 
@@ -72,7 +72,7 @@ def test_progress_is_told_where_it_takes_long(tmp_path: Path, recorder: Any,
     """From nothing to all, for states and for cycles; said after two seconds, not before."""
     folder = recorder.ours(tmp_path / 'bag', recorder.messages(result))
     shares: list[float] = []
-    read_run_log(folder, progress=shares.append)
+    read_trajectories(folder, progress=shares.append)
     assert len(shares) >= 3 and 0.0 <= min(shares) < 0.01 and max(shares) <= 1.0
     now_s, said = [0.0], list[str]()
     progress = Progress(said.append, 'reading bag', lambda: now_s[0])

@@ -12,7 +12,7 @@ from crgame_ros.cli import main
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.run_log import read_run_log, run_log_of
+from crgame_ros.recording.run_trajectories import read_trajectories, trajectories_of
 from crgame_ros.simulation.offline import observed_run, OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
@@ -47,7 +47,7 @@ def test_one_code_for_runs_logs_and_recordings(
     expected = _flat(criticality.as_dict())
     assert len(expected) > 30
     bag = recorder.ours(tmp_path / 'bag', recorder.messages(result))
-    for log in (run_log_of(result), read_run_log(bag)):
+    for log in (trajectories_of(result), read_trajectories(bag)):
         found = _flat(measure_log(log).as_dict())
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
 

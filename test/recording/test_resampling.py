@@ -16,7 +16,7 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.conversion import convert
 from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.resampling import resample
-from crgame_ros.recording.run_log import run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories, trajectories_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.time_controller import TimeController
@@ -58,7 +58,7 @@ def disagreement(positions: NDArray[np.float64], speeds: NDArray[np.float64]) ->
     return float(np.abs(moved - 0.5 * (speeds[1:] + speeds[:-1])).max())
 
 
-def of_log(log: RunLog, column: int = 0) -> float:
+def of_log(log: RunTrajectories, column: int = 0) -> float:
     """Compare the rear axle's positions and speeds of a vehicle."""
     states = log.vehicle_states[:, column]
     return disagreement(states[:, :2], states[:, 3])
@@ -78,7 +78,7 @@ def test_a_stall_of_110_ms_leaves_no_trace_in_the_export(tmp_path: Path) -> None
     stalled = drive(intervals_through({150: 110}, 300))
     raw = stalled.states_of('hv0')[::10]
     assert disagreement(raw[:, :2], raw[:, 3]) > 9.0
-    log = run_log_of(stalled)
+    log = trajectories_of(stalled)
     assert log.notices == ()
     assert len(log.ks) == 31
     assert of_log(log) < 0.02
@@ -90,12 +90,12 @@ def test_a_stall_of_110_ms_leaves_no_trace_in_the_export(tmp_path: Path) -> None
 
 def test_the_motion_is_the_one_without_the_stall(tmp_path: Path) -> None:
     """With a pedal held still the car is where it would have been, but for longer steps' error."""
-    smooth = run_log_of(drive(None)).vehicle_states[:, 0]
+    smooth = trajectories_of(drive(None)).vehicle_states[:, 0]
     stalled = drive(intervals_through({150: 110}, 300))
     assert np.array_equal(smooth, drive(None).states_of('hv0')[::10])
     raw = stalled.states_of('hv0')[::10]
     assert np.hypot(*(raw - smooth)[:, :2].T).max() > 1.0
-    found = run_log_of(stalled).vehicle_states[:, 0]
+    found = trajectories_of(stalled).vehicle_states[:, 0]
     assert np.hypot(*(found - smooth)[:, :2].T).max() < 0.02
     np.testing.assert_allclose(found[:, 3], smooth[:, 3], atol=0.02)
 
@@ -105,21 +105,21 @@ def test_any_stalls(seed: int) -> None:
     """Stalls of 20 to 240 ms, now and then one while the last is being caught up."""
     random = np.random.default_rng(seed)
     stalls = {int(n): int(random.integers(20, 240)) for n in random.integers(60, 290, 9)}
-    log = run_log_of(drive(intervals_through(stalls, 300)))
+    log = trajectories_of(drive(intervals_through(stalls, 300)))
     assert len(log.ks) >= 30
     assert of_log(log) < AGREES
 
 
 def test_a_reset_drops_nothing_of_the_motion() -> None:
     """400 ms exceed the threshold: the schedule moves, and the sum of the intervals stays n dt."""
-    log = run_log_of(drive(intervals_through({150: 400}, 300)))
+    log = trajectories_of(drive(intervals_through({150: 400}, 300)))
     assert len(log.ks) == 31
     assert of_log(log) < AGREES
 
 
 def test_what_the_paper_drops_is_missing_at_the_end() -> None:
     """`clip: drop` loses 150 of 200 ms: the last tick or two are before what the human drove."""
-    log = run_log_of(drive(intervals_through({150: 200}, 300, clip='drop')))
+    log = trajectories_of(drive(intervals_through({150: 200}, 300, clip='drop')))
     assert of_log(log) < AGREES
     assert log.ks[-1] == 28
     assert len(log.object_poses) == len(log.ks)
@@ -135,7 +135,7 @@ def test_conversion_resamples_by_the_recorded_intervals(tmp_path: Path, recorder
     assert report.notices == ()
     assert of_file(report.path, report.obstacle_ids['hv0']) < AGREES
     (tmp_path / 'export').mkdir()
-    write_scenario(run_log_of(result), tmp_path / 'export')
+    write_scenario(trajectories_of(result), tmp_path / 'export')
     exported, _ = XMLFileReader(str(next((tmp_path / 'export').glob('*.xml')))).open()
     converted, _ = XMLFileReader(str(report.path)).open()
     number = report.obstacle_ids['hv0']
@@ -175,7 +175,7 @@ def test_an_av_that_somebody_took_over_moves_by_its_own_intervals() -> None:
                          drivers={'av0': ReplayDriver(held)}, check_drivability=False)
     raw = result.states_of('av0')[::10]
     assert disagreement(raw[:, :2], raw[:, 3]) > 5.0
-    log = run_log_of(result)
+    log = trajectories_of(result)
     assert of_log(log, 1) < AGREES
     assert np.array_equal(log.vehicle_states[:11, 1], raw[:11])
 

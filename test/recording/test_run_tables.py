@@ -15,7 +15,7 @@ from crgame_ros.analysis.tables import run_tables
 from crgame_ros.analysis.tables import states as states_table
 from crgame_ros.analysis.tables import writer as table_writer
 from crgame_ros.analysis.tables.run_tables import TABLES, write_tables
-from crgame_ros.analysis.tables.tabulated_run import run_name, TabulatedRun
+from crgame_ros.analysis.tables.table_run import run_name, TableRun
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import FiredEvent
@@ -212,7 +212,7 @@ def test_the_same_recording_gives_the_same_bytes(recorded: Recorded, tmp_path: P
 def test_offline_run_and_recording_have_the_same_tables(
         recorded: Recorded, tmp_path: Path, tables: dict[str, polars.DataFrame]) -> None:
     """Every number up to 1e-9, but for what only a recording has."""
-    write_tables([TabulatedRun('pedestrian:0', run_record_of(recorded.result))], tmp_path,
+    write_tables([TableRun('pedestrian:0', run_record_of(recorded.result))], tmp_path,
                  'parquet')
     for name in ('states', 'pairs', 'crossings', 'events', 'vehicles'):
         here, there = polars.read_parquet(tmp_path / f'{name}.parquet'), tables[name]
@@ -248,7 +248,7 @@ def test_plans_are_compared_with_what_was_driven(recorded: Recorded, tmp_path: P
     plans = [_plan(result, 5, 0.3, own[5]), _plan(result, 6, 0.0, own[6]),
              _plan(result, 7, 2.0, own[7]), _plan(result, last - 15, 0.0, None),
              RecordedPlan('av0', 900_000_000, 9, 0.2, None, 'has no points', None)]
-    run = TabulatedRun('a', run_record_of(result), None, lambda: plans)
+    run = TableRun('a', run_record_of(result), None, lambda: plans)
     write_tables([run], tmp_path, 'parquet')
     table = polars.read_parquet(tmp_path / 'plans.parquet')
     assert table['number'].to_list() == [0, 1, 2, 3, 4]
@@ -321,7 +321,7 @@ def test_numbers_beyond_all_bounds_give_a_line(recorded: Recorded, tmp_path: Pat
     """JSON has no largest number; a column has."""
     record = replace(run_record_of(recorded.result), fired=(FiredEvent('x', n, k, 'trigger'),))
     with pytest.raises(InputError, match='out of all bounds'):
-        write_tables([TabulatedRun('a', record)], tmp_path, 'parquet')
+        write_tables([TableRun('a', record)], tmp_path, 'parquet')
     assert list(tmp_path.iterdir()) == []
 
 
@@ -345,7 +345,7 @@ def test_runs_are_named_by_their_folders(tmp_path: Path) -> None:
     assert run_name(tmp_path / 'A' / 'trial.mcap') == 'trial'
 
 
-def _stretched(result: OfflineResult, times: int) -> TabulatedRun:
+def _stretched(result: OfflineResult, times: int) -> TableRun:
     """Let a run go on and on: the same motion as often, one after the other."""
     record = run_record_of(result)
     log = record.log
@@ -353,7 +353,7 @@ def _stretched(result: OfflineResult, times: int) -> TabulatedRun:
         log, ks=np.arange(len(log.ks) * times),
         **{name: np.tile(getattr(log, name), (times, 1, 1)) for name in (
             'vehicle_states', 'published_states', 'object_poses', 'object_velocities')})
-    return TabulatedRun('a', replace(record, log=longer), scored=False)
+    return TableRun('a', replace(record, log=longer), scored=False)
 
 
 @pytest.mark.exhaustive

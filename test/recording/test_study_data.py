@@ -17,7 +17,7 @@ from crgame_ros import __version__
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.cli import main
 from crgame_ros.recording.run_folder import FINISHED_MARK
-from crgame_ros.recording.run_log import read_run_log
+from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.study.data.bids_folder import escaped
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
 from crgame_ros.vehicle.state import StateColumn
@@ -70,7 +70,7 @@ def test_a_trial_that_counts_is_one_row(studied: Studied) -> None:
 
 def test_measures_are_those_of_the_recording(studied: Studied) -> None:
     for row in table(studied.folder, 'trials').iter_rows(named=True):
-        log = read_run_log(studied.folder / row['recording'] / 'bag')
+        log = read_trajectories(studied.folder / row['recording'] / 'bag')
         states = log.vehicle_states[:, 0]
         assert row['mean_speed_m_per_s'] == pytest.approx(
             float(states[:, StateColumn.SPEED].mean()), rel=1e-12)

@@ -8,7 +8,7 @@ import re
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.simulation.offline import run_offline
@@ -110,5 +110,5 @@ def test_it_is_driven_and_exported(project_root: Path, tmp_path: Path) -> None:
     assert result.planners['av0'].accepted_ratio == 1.0
     assert result.states_of('av0')[-1, 0] > 20.0
     path = tmp_path / 'driven.xml'
-    write_scenario(run_log_of(result), path)
+    write_scenario(trajectories_of(result), path)
     assert 'commonRoadVersion="2020a"' in path.read_text(encoding='utf-8')

@@ -9,7 +9,7 @@ from crgame_ros.game.game import Game, LaneletSpawn
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
@@ -96,7 +96,7 @@ def test_exported_cut_in_stays_on_the_road_driven_again(game: Game, tmp_path: Pa
     """
     first = run(game, 'reactive', 0)
     path = tmp_path / 'driven.xml'
-    write_scenario(run_log_of(first), path)
+    write_scenario(trajectories_of(first), path)
     again = effective_game(RunRequest(scenario=path, driver='idle', duration_s=10.0))
     setup = with_planners(build_setup(again), ('reactive',))
     result = run_offline(setup)

@@ -10,7 +10,7 @@ from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from engine_games_support import (
@@ -87,7 +87,7 @@ def test_export_is_read_back(name: str, tmp_path: Path) -> None:
     A slot of traffic that is used again is another obstacle each time.
     """
     result = played(name)
-    exported = write_scenario(run_log_of(result), tmp_path)
+    exported = write_scenario(trajectories_of(result), tmp_path)
     scenario, _ = CommonRoadFileReader(str(tmp_path / f'{exported.benchmark_id}.xml')).open()
     there = np.isfinite(result.object_poses[..., 0])
     lives = there[0].sum() + (there[1:] & ~there[:-1]).sum()

@@ -8,7 +8,7 @@ from commonroad.common.file_reader import CommonRoadFileReader
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.turns import Turns
 from crgame_ros.simulation.offline import OfflineResult, run_offline
@@ -146,7 +146,7 @@ def test_run_shows_records_and_exports_it(tmp_path: Path) -> None:
     turned = np.flatnonzero(lights)
     # Once, and until the end.
     assert set(lights) == {0.0, 2.0} and np.ptp(turned) == len(turned) - 1
-    write_scenario(run_log_of(result), tmp_path / 'run.xml')
+    write_scenario(trajectories_of(result), tmp_path / 'run.xml')
     scenario, _ = CommonRoadFileReader(tmp_path / 'run.xml').open()
     series = [obstacle.signal_series for obstacle in scenario.dynamic_obstacles
               if obstacle.signal_series and any(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from crgame_ros.game.game import Game, TrafficSpec
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
@@ -37,7 +37,7 @@ def test_traffic_runs_alone(shared_scenarios: Path, tmp_path: Path) -> None:
     way = np.diff(result.object_poses[:, agents, :2], axis=0)
     # On green some go at least 20 of the 80 m that 6 s at 13 m/s are.
     assert np.nanmax(np.nansum(np.hypot(way[..., 0], way[..., 1]), axis=0)) > 20.0
-    exported = write_scenario(run_log_of(result), tmp_path)
+    exported = write_scenario(trajectories_of(result), tmp_path)
     written = load_scenario(tmp_path / f'{exported.benchmark_id}.xml')
     there = np.isfinite(result.object_poses[:, agents, 0]).any(axis=0).sum()
     assert len(written.scenario.dynamic_obstacles) >= there > 20

@@ -19,7 +19,7 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision,
     time_to_collision_accelerating,
 )
-from crgame_ros.analysis.criticality.crossed_ways import EncroachmentDetector, WayCrossed
+from crgame_ros.analysis.criticality.encroachment import EncroachmentDetector, WayCrossed
 from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL

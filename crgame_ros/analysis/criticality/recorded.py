@@ -7,18 +7,18 @@ from collections.abc import Callable
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.simulation.observer import documented_run
 
 
-def measure_log(log: RunLog, thresholds: Thresholds = USUAL,
+def measure_log(log: RunTrajectories, thresholds: Thresholds = USUAL,
                 progress: Callable[[float], object] = lambda _: None,
                 on_tick: Callable[[Criticality], object] = lambda _: None) -> Criticality:
     """
     Measure every scenario step of a run.
 
-    :param log: of a recording (`read_run_log`) or of an offline run (`run_log_of`).
+    :param log: of a recording (`read_trajectories`) or of an offline run (`run_log_of`).
     :param progress: is told how much has been measured, from 0 to 1.
     :param on_tick: is given the observer after each step, to take what it found there.
     :raises InputError: if the scenario in it cannot be used.

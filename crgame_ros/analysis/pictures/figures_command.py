@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.errors import InputError
 
 if TYPE_CHECKING:  # A command that draws nothing starts without matplotlib.
-    from crgame_ros.analysis.pictures.pictured_run import PicturedRun
+    from crgame_ros.analysis.pictures.figure_run import FigureRun
     from matplotlib.figure import Figure
 
 DESCRIPTION = """\
@@ -68,15 +68,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def figures(values: argparse.Namespace) -> int:
     """Draw what was asked for, and print the files with what they show."""
+    from crgame_ros.analysis.pictures.figure_run import FigureRun
     from crgame_ros.analysis.pictures.figure_style import FORMATS
-    from crgame_ros.analysis.pictures.pictured_run import PicturedRun
     wanted = _listed('--figures', values.figures, FIGURES) if values.figures is not None \
         else (() if values.video else FIGURES)
     formats = _listed('--format', values.format, FORMATS)
     times_s = None if values.at is None else _times(values.at)
     _check(values)
     say = partial(print, file=sys.stderr, flush=True)
-    runs = [PicturedRun(path, label, values.epoch, say) for path, label in zip(
+    runs = [FigureRun(path, label, values.epoch, say) for path, label in zip(
         values.runs, values.label or [None] * len(values.runs), strict=True)]
     folder = values.out or runs[0].folder / FOLDER
     for number, run in enumerate(runs):
@@ -136,7 +136,7 @@ def _times(text: str) -> list[float]:
     return times
 
 
-def _frames(run: 'PicturedRun', values: argparse.Namespace, times_s: list[float] | None
+def _frames(run: 'FigureRun', values: argparse.Namespace, times_s: list[float] | None
             ) -> Iterator[tuple[str, 'Figure', str]]:
     """Yield the figures of frames with their names and what they show."""
     from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
@@ -161,7 +161,7 @@ def _frames(run: 'PicturedRun', values: argparse.Namespace, times_s: list[float]
                f'{run.label} around {moment.time_s:.1f} s: {moment.why}')
 
 
-def _profiles(run: 'PicturedRun', values: argparse.Namespace) -> 'Figure':
+def _profiles(run: 'FigureRun', values: argparse.Namespace) -> 'Figure':
     from crgame_ros.analysis.pictures.profiles_figure import (
         ALL_PROFILES,
         profiles_figure,
@@ -171,7 +171,7 @@ def _profiles(run: 'PicturedRun', values: argparse.Namespace) -> 'Figure':
                            ALL_PROFILES if values.more else USUAL_PROFILES, values.columns)
 
 
-def _timing(runs: Sequence['PicturedRun'], folder: Path, wanted: Sequence[str],
+def _timing(runs: Sequence['FigureRun'], folder: Path, wanted: Sequence[str],
             formats: Sequence[str], columns: int, say: Callable[[str], object] | None) -> None:
     """
     Draw the timing and write the table of all runs.
@@ -211,7 +211,7 @@ def _write(figure: 'Figure', place: Path, formats: Sequence[str], caption: str) 
         print(f'{path}: {caption}', flush=True)
 
 
-def _video(run: 'PicturedRun', path: Path, say: Callable[[str], object]) -> None:
+def _video(run: 'FigureRun', path: Path, say: Callable[[str], object]) -> None:
     from crgame_ros.analysis.pictures.run_video import video_path, write_video
     from crgame_ros.recording.export import prepare_folder
     from crgame_ros.recording.progress import Progress
@@ -222,7 +222,7 @@ def _video(run: 'PicturedRun', path: Path, say: Callable[[str], object]) -> None
     print(f'{written}: {run.label} in real time')
 
 
-def _name(number: int, runs: Sequence['PicturedRun']) -> str:
+def _name(number: int, runs: Sequence['FigureRun']) -> str:
     """Name a run's folder, apart from those of others of the same name."""
     name = runs[number].name
     before = sum(run.name == name for run in runs[:number])

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.recording.recorded_plans import read_plans
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +27,7 @@ class FollowedPlan(NamedTuple):
     poses: NDArray[np.float64]
 
 
-def read_followed_plans(bag: Path, log: RunLog,
+def read_followed_plans(bag: Path, log: RunTrajectories,
                         progress: Callable[[float], object] | None = None
                         ) -> dict[str, tuple[FollowedPlan, ...]]:
     """

@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 from numpy.typing import NDArray
 import shapely
@@ -71,13 +71,13 @@ def footprints(descriptions: Sequence[ObjectDescription], poses: FloatArray
             for i, item in enumerate(descriptions)]
 
 
-def all_poses(log: RunLog, rows: Sequence[int]) -> FloatArray:
+def all_poses(log: RunTrajectories, rows: Sequence[int]) -> FloatArray:
     """Return the poses (R, V + M, 3) of everybody's reference points; NaN where absent."""
     chosen = list(rows)
     return np.concatenate((log.vehicle_states[chosen, :, :3], log.object_poses[chosen]), axis=1)
 
 
-def series_windows(log: RunLog, rows: Sequence[int], vehicles: Sequence[str] = (), *,
+def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence[str] = (), *,
                    standing: bool | None = None, reach: float = REACH,
                    least: float = LEAST_LENGTH,
                    road: Callable[[FrameWindow], tuple[float, float]] | None = None
@@ -125,7 +125,7 @@ def series_windows(log: RunLog, rows: Sequence[int], vehicles: Sequence[str] = (
     return tuple(shown(center, height) for center in centers)
 
 
-def _focus(log: RunLog, vehicles: Sequence[str]) -> int:
+def _focus(log: RunTrajectories, vehicles: Sequence[str]) -> int:
     driven = {item.id: i for i, item in enumerate(log.vehicles)}
     order = [driven[name] for name in vehicles if name in driven]
     order += sorted(driven.values(),

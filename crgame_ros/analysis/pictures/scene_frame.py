@@ -23,7 +23,7 @@ from crgame_ros.analysis.pictures.frame_window import (
 )
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.roads.surface import (
     lanelet_polygons,
     polygons_of,
@@ -206,7 +206,7 @@ class FrameScene:
     :raises InputError: if the scenario in it cannot be used.
     """
 
-    def __init__(self, log: RunLog,
+    def __init__(self, log: RunTrajectories,
                  plans: Mapping[str, Sequence[FollowedPlan]] | None = None) -> None:
         self.log = log
         self.styles = vehicle_styles(log.vehicles)

@@ -20,8 +20,8 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.game.objects import Role
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import folder_name, recording_in
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import read_run_record, RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +79,7 @@ class ReportRun:
         return measure_behaviour(self.record)
 
     @property
-    def log(self) -> RunLog:
+    def log(self) -> RunTrajectories:
         """Return the run on its scenario's grid."""
         return self.record.log
 

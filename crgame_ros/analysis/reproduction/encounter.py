@@ -6,7 +6,7 @@ from functools import cached_property
 
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.geometry.curve import Curve
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.vehicle.state import StateColumn
@@ -29,7 +29,7 @@ class DrivenLane:
     :raises InputError: if the scenario in the log cannot be used.
     """
 
-    def __init__(self, log: RunLog, vehicle: int) -> None:
+    def __init__(self, log: RunTrajectories, vehicle: int) -> None:
         loaded = parse_scenario(log.xml_text, '/scenario/xml')
         roads = RoadNetwork(loaded.scenario.lanelet_network)
         x, y, yaw = log.vehicle_states[0, vehicle, :StateColumn.YAW + 1].tolist()
@@ -113,6 +113,6 @@ class Encounter:
         return worst.value if worst is not None and worst.other == self.human else None
 
 
-def human_states(log: RunLog) -> FloatArray:
+def human_states(log: RunTrajectories) -> FloatArray:
     """Return the states of the humans as they were published (K, H, 8)."""
     return log.published_states[:, :len(log.game.humans)]

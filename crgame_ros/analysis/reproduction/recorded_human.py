@@ -15,7 +15,11 @@ from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.recording.recorded_inputs import inputs_of, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import (
+    read_trajectories,
+    run_log_of,
+    RunTrajectories,
+)
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import Setup
 
@@ -33,7 +37,7 @@ class RecordedHuman:
     """
 
     name: str
-    log: RunLog
+    log: RunTrajectories
     setup_for: Callable[[str], Setup]
     inputs: RecordedInputs | None
     live: Alternative | None = None
@@ -94,7 +98,7 @@ def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
     def setup_for(other: str) -> Setup:
         return effective_setup(RunRequest(driver=f'replay:{bag}', planners=(other,)))
 
-    log = read_run_log(bag)
+    log = read_trajectories(bag)
     return RecordedHuman(name, log, setup_for, None, driven_live(planner, folder, log))
 
 

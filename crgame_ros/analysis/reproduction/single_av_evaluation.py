@@ -18,7 +18,7 @@ from crgame_ros.analysis.reproduction.expectation import (
 )
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
-from crgame_ros.recording.run_log import run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import run_log_of, RunTrajectories
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
@@ -46,7 +46,7 @@ class SameHuman(NamedTuple):
     :param runs: those that repeat them.
     """
 
-    recorded: RunLog
+    recorded: RunTrajectories
     runs: Sequence[Alternative]
 
 
@@ -136,7 +136,7 @@ HUMAN_EXPECTATIONS: tuple[Expectation[SameHuman], ...] = (
                 'the HV applies a consistent set of challenging maneuvers (IV-A)', _same),)
 
 
-def judge_single_av(recorded: RunLog, idm: Alternative, reactive: Alternative,
+def judge_single_av(recorded: RunTrajectories, idm: Alternative, reactive: Alternative,
                     live: Alternative | None = None) -> tuple[Judgement, ...]:
     """
     Look for what must come out of the single-AV experiment.
@@ -165,7 +165,7 @@ class MultiAvRun:
     """
 
     run: Alternative
-    alone: RunLog
+    alone: RunTrajectories
 
     def reactions(self) -> dict[str, float]:
         """Return how far each AV got from where it would be without the human [m]."""
@@ -178,7 +178,7 @@ class MultiAvRun:
             for i, item in enumerate(alone.vehicles)}
 
 
-def run_alone(game: Path, planner: str, duration_s: float) -> RunLog:
+def run_alone(game: Path, planner: str, duration_s: float) -> RunTrajectories:
     """
     Drive the AVs of a game without its humans.
 
@@ -189,7 +189,7 @@ def run_alone(game: Path, planner: str, duration_s: float) -> RunLog:
                                   clock_s=time.perf_counter))
 
 
-def jumps(log: RunLog) -> NDArray[np.float64]:
+def jumps(log: RunTrajectories) -> NDArray[np.float64]:
     """Return by how much each step's length differs from what its speeds say (K - 1, V) [m]."""
     lengths = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[:, :, :2], axis=0), 2, 0))
     speeds = np.abs(log.vehicle_states[:, :, StateColumn.SPEED])

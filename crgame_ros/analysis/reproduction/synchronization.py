@@ -9,7 +9,7 @@ from pathlib import Path
 import time
 from typing import Any
 
-from crgame_ros.analysis.pictures.pictured_run import PicturedRun
+from crgame_ros.analysis.pictures.figure_run import FigureRun
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
 from crgame_ros.analysis.reproduction.expectation import (
@@ -161,7 +161,7 @@ def measure_synchronization(game: Path, planner: str, duration_s: float,
     :raises CrgameError: if a run failed.
     """
     run_live(game, planner, folder / 'proposed', duration_s)
-    proposed = PicturedRun(folder / 'proposed', PROPOSED, None, print).timed
+    proposed = FigureRun(folder / 'proposed', PROPOSED, None, print).timed
     setup = effective_setup(RunRequest(game=game, planners=(planner,)))
     loop = NaiveLoop(setup, folder / 'naive')
     loop.run(duration_s)

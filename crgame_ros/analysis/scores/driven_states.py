@@ -10,7 +10,7 @@ from commonroad.scenario.state import KSState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn
 
@@ -47,7 +47,7 @@ def choose_type(vehicle: VehicleParameters) -> ChosenType:
     return ChosenType(VehicleType(number), least)
 
 
-def driven_states(log: RunLog, vehicle: int, kind: VehicleType) -> list[KSState]:
+def driven_states(log: RunTrajectories, vehicle: int, kind: VehicleType) -> list[KSState]:
     """
     Return a vehicle's states from time step 0 on, as the model KS has them.
 

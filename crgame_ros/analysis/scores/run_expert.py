@@ -7,11 +7,11 @@ from crgame_ros.analysis.scores.nuplan import Expert
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 
 
-def expert_of_run(expert: RunLog, log: RunLog, name: str) -> Expert:
+def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> Expert:
     """
     Take the expert out of a run: its first human, or else its first vehicle.
 

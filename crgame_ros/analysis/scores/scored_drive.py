@@ -11,7 +11,7 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.vehicle.state import StateColumn
@@ -89,7 +89,7 @@ def kind_of_type(type_name: str) -> TrackKind:
         else 'vehicle'
 
 
-def drive_of(log: RunLog, vehicle: int) -> ScoredDrive:
+def drive_of(log: RunTrajectories, vehicle: int) -> ScoredDrive:
     """
     Take one vehicle's drive out of a run.
 

@@ -12,11 +12,11 @@ from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import parse_scenario
 
 
-def score_drives(log: RunLog, *, expert: Expert | None = None,
+def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
                  plans: Mapping[str, PlanRecord] | None = None,
                  put_back: Mapping[str, Sequence[int]] | None = None
                  ) -> tuple[VehicleScores, ...]:
@@ -43,12 +43,13 @@ def score_drives(log: RunLog, *, expert: Expert | None = None,
     return tuple(vehicles)
 
 
-def first_ends(log: RunLog, put_back: Mapping[str, Sequence[int]]) -> dict[str, RunLog]:
+def first_ends(log: RunTrajectories,
+               put_back: Mapping[str, Sequence[int]]) -> dict[str, RunTrajectories]:
     """Return the run of each vehicle that was put back on its lane, up to just before that."""
     return {vehicle: log.until(min(ks)) for vehicle, ks in put_back.items()}
 
 
-def _ended(vehicle_id: str, log: RunLog | None) -> Iterator[str]:
+def _ended(vehicle_id: str, log: RunTrajectories | None) -> Iterator[str]:
     """Say up to when a vehicle was scored that was put back on its lane."""
     if log is not None:
         scheduler = log.game.scheduler
@@ -60,7 +61,7 @@ def _ended(vehicle_id: str, log: RunLog | None) -> Iterator[str]:
 class _Drives:
     """The drives of one run, on the roads of its scenario."""
 
-    def __init__(self, log: RunLog, expert: Expert | None) -> None:
+    def __init__(self, log: RunTrajectories, expert: Expert | None) -> None:
         self._expert = expert
         original = parse_scenario(log.xml_text, '/scenario/xml')
         self._nuplan = NuplanScorer(original)
@@ -68,7 +69,7 @@ class _Drives:
         self._problems = {problem.planning_problem_id: problem
                           for problem in original.planning_problems}
 
-    def score(self, number: int, log: RunLog
+    def score(self, number: int, log: RunTrajectories
               ) -> tuple[NuplanScore | None, tuple[str, ...]]:
         """Score a vehicle by its number over a log; without a score the remark says why."""
         av = log.game.av(log.vehicles[number].id)

@@ -20,8 +20,8 @@ from crgame_ros.analysis.scores.scored_drives import first_ends, score_drives
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import SolutionJudge
 from crgame_ros.analysis.scores.vehicle import VehicleScores
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 
 
 def score_run(record: RunRecord, *, expert: Expert | None = None,
@@ -55,7 +55,7 @@ def _share(progress: Callable[[float], object], number: int, count: int, done: f
     progress((number + done) / count)
 
 
-def _judged(log: RunLog, number: int, drive: VehicleScores, problem_id: int,
+def _judged(log: RunTrajectories, number: int, drive: VehicleScores, problem_id: int,
             scored: ScoredScenario, judge: SolutionJudge,
             progress: Callable[[float], object]) -> VehicleScores:
     """Add what CommonRoad's tools say, and how the vehicle came to its goal."""

@@ -19,7 +19,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.recording.export import export_scenario, ExportedScenario
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import (
     exact_position,
     exact_value,
@@ -72,7 +72,7 @@ class ScoredScenario:
         return cls(loaded, own | loaded.human_problems)
 
     @classmethod
-    def from_run(cls, log: RunLog) -> tuple['ScoredScenario', ExportedScenario]:
+    def from_run(cls, log: RunTrajectories) -> tuple['ScoredScenario', ExportedScenario]:
         """
         Export a run and take its scenario.
 

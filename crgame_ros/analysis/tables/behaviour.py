@@ -10,7 +10,7 @@ from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.part import TablePart
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import TableRows
 
 _PER_VEHICLE = tuple(name for name, measure in MEASURES.items() if measure.per == 'vehicle')
@@ -25,7 +25,7 @@ def _column(name: str, empty: str) -> Column:
                   measure.variant, empty)
 
 
-def _vehicles(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _vehicles(run: TableRun) -> Mapping[str, Sequence[Any]]:
     found = run.behaviour
     return {'driven_s': [each.driven_s for each in found],
             **{f'drive_{name}': [_known(each.values.get(name, math.nan)) for each in found]
@@ -76,7 +76,7 @@ TAKE_OVERS = TableDeclaration(
 BEHAVIOUR_TABLES = REACTIONS, LANE_CHANGES, TAKE_OVERS
 
 
-def write_behaviour(run: TabulatedRun, writers: Mapping[str, TableRows]) -> None:
+def write_behaviour(run: TableRun, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of reactions, lane changes and take-overs."""
     for table, rows in ((REACTIONS, _reactions(run)), (LANE_CHANGES, _lane_changes(run)),
                         (TAKE_OVERS, _take_over_rows(run))):
@@ -86,7 +86,7 @@ def write_behaviour(run: TabulatedRun, writers: Mapping[str, TableRows]) -> None
                                      for column in table.columns})
 
 
-def _reactions(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+def _reactions(run: TableRun) -> Iterable[Mapping[str, Any]]:
     for driver in run.behaviour:
         for each in driver.reactions:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'event': each.event,
@@ -96,7 +96,7 @@ def _reactions(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
                    'reaction_steering': _known(each.reaction.steering_s)}
 
 
-def _lane_changes(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+def _lane_changes(run: TableRun) -> Iterable[Mapping[str, Any]]:
     for driver in run.behaviour:
         for number, change in enumerate(driver.lane_changes):
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'number': number,
@@ -110,7 +110,7 @@ def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, A
             f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
 
 
-def _take_over_rows(run: TabulatedRun) -> Iterable[Mapping[str, Any]]:
+def _take_over_rows(run: TableRun) -> Iterable[Mapping[str, Any]]:
     for driver in run.behaviour:
         for each in driver.take_overs:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'seat_s': each.seat_s,

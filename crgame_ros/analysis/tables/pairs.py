@@ -21,7 +21,7 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import TableRows
 import numpy as np
 import pyarrow as pa
@@ -67,7 +67,7 @@ CROSSINGS = TableDeclaration(
                '0 if it had not', FOOTPRINTS)))
 
 
-def write_criticality(run: TabulatedRun, pairs: TableRows, crossings: TableRows,
+def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
                       progress: Callable[[float], object]) -> None:
     """
     Measure a run, write both tables as it goes on, and note the worst of each vehicle.
@@ -84,7 +84,7 @@ def write_criticality(run: TabulatedRun, pairs: TableRows, crossings: TableRows,
 class _Collected:
     """Keeps rows of pairs until they are worth writing."""
 
-    def __init__(self, run: TabulatedRun, pairs: TableRows, crossings: TableRows) -> None:
+    def __init__(self, run: TableRun, pairs: TableRows, crossings: TableRows) -> None:
         self._run, self._pairs, self._crossings = run, pairs, crossings
         self._ids: pa.Array | None = None
         self._steps: list[tuple[int, int, int]] = []

@@ -16,7 +16,7 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.tabulated_run import PlanTally, TabulatedRun
+from crgame_ros.analysis.tables.table_run import PlanTally, TableRun
 from crgame_ros.game.driven_vehicle import DrivenAv
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.recording.recorded_plans import RecordedPlan
@@ -66,7 +66,7 @@ PLANS = TableDeclaration(
           for name, when, _ in DEVIATIONS)))
 
 
-def plan_rows(run: TabulatedRun) -> Iterator[dict[str, Any]]:
+def plan_rows(run: TableRun) -> Iterator[dict[str, Any]]:
     """
     Yield the rows of a run, in pieces, and count the plans of each AV.
 
@@ -84,12 +84,12 @@ def plan_rows(run: TabulatedRun) -> Iterator[dict[str, Any]]:
         yield _columns(run, rows)
 
 
-def _columns(run: TabulatedRun, rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _columns(run: TableRun, rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {'run': run.id, **{name: [row.get(name) for row in rows]
                               for name in PLANS.schema.names if name != 'run'}}
 
 
-def _row(run: TabulatedRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, Any]:
+def _row(run: TableRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, Any]:
     scheduler = run.record.log.game.scheduler
     row: dict[str, Any] = {
         'av': found.av, 'number': tally.answers, 'k': found.k, 'latency_s': found.latency_s,
@@ -108,7 +108,7 @@ def _row(run: TabulatedRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally)
     return row | {'passes_check': refusal is None if known else None, 'refusal': refusal}
 
 
-def _planned(run: TabulatedRun, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
+def _planned(run: TableRun, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
     """Return what is said of a plan's states."""
     assert found.plan is not None
     log, states = run.record.log, found.plan.states.copy()

@@ -24,7 +24,7 @@ from crgame_ros.analysis.tables.plans import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs import RUN_PARTS, RUNS
 from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.states import state_rows, STATES
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.tasks import EVENT_PARTS, EVENTS, TASK_TABLES, write_tasks
 from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS, VEHICLES
 from crgame_ros.analysis.tables.writer import (
@@ -144,7 +144,7 @@ TABLES: tuple[TableDeclaration, ...] = (
     RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES)
 
 
-def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
+def write_tables(runs: Iterable[TableRun], out: Path, file_format: Format,
                  progress: Callable[[str, float], object] = lambda _what, _share: None,
                  ) -> dict[str, int]:
     """
@@ -165,7 +165,7 @@ def write_tables(runs: Iterable[TabulatedRun], out: Path, file_format: Format,
         return {name: writer.rows for name, writer in folder.writers.items()}
 
 
-def tables_of(runs: Iterable[TabulatedRun]) -> dict[str, pa.Table]:
+def tables_of(runs: Iterable[TableRun]) -> dict[str, pa.Table]:
     """
     Return the tables of runs, by name; memory is that of all of them.
 
@@ -178,7 +178,7 @@ def tables_of(runs: Iterable[TabulatedRun]) -> dict[str, pa.Table]:
     return {name: each.table for name, each in kept.items()}
 
 
-def _add_run(run: TabulatedRun, writers: Mapping[str, TableRows],
+def _add_run(run: TableRun, writers: Mapping[str, TableRows],
              progress: Callable[[str, float], object]) -> None:
     """Add the rows of a run to all tables."""
     try:
@@ -189,7 +189,7 @@ def _add_run(run: TabulatedRun, writers: Mapping[str, TableRows],
                          'the recording is damaged; record again') from error
 
 
-def _add_rows(run: TabulatedRun, writers: Mapping[str, TableRows],
+def _add_rows(run: TableRun, writers: Mapping[str, TableRows],
               progress: Callable[[str, float], object]) -> None:
     """Fill tables one after the other; vehicles and runs come last, for they sum it up."""
     for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):

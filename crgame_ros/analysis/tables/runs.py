@@ -9,7 +9,7 @@ from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.part import declare, TablePart
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.game.objects import Role
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'
@@ -36,7 +36,7 @@ COUNTS = {'cycles': 'cycles that were recorded', 'gaps': 'cycles that were lost'
           'resets': 'drift resets', 'catch_up_steps': 'cycles more than a step late'}
 
 
-def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _identity(run: TableRun) -> Mapping[str, Sequence[Any]]:
     log = run.record.log
     game, scheduler = log.game, log.game.scheduler
     planners = {av.id: av.planner for av in game.avs}
@@ -56,7 +56,7 @@ def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
                                *run.remarks))]}
 
 
-def _timing(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _timing(run: TableRun) -> Mapping[str, Sequence[Any]]:
     timing = run.timing
     found: dict[str, Sequence[Any]] = {} if timing is None else {
         **{name: [timing[key] * factor] for key, (name, _, factor, _) in TIMING.items()},

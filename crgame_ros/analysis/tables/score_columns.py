@@ -11,7 +11,7 @@ from crgame_ros.analysis.scores.run import scores_of
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER, TEXT
 from crgame_ros.analysis.tables.part import TablePart
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 
 NOT_SCORED = 'the run was not scored'
 
@@ -50,7 +50,7 @@ def _declared(column: _ScoreColumn) -> Column:
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
 
-def score_vehicles(run: TabulatedRun, *, drives_only: bool = False,
+def score_vehicles(run: TableRun, *, drives_only: bool = False,
                    progress: Callable[[float], object] = lambda _: None) -> None:
     """
     Score a run, for the table of vehicles; why it cannot be scored is for the table of runs.
@@ -65,7 +65,7 @@ def score_vehicles(run: TabulatedRun, *, drives_only: bool = False,
         run.remarks.append(f'no scores: {found.refusal}')
 
 
-def _scores(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _scores(run: TableRun) -> Mapping[str, Sequence[Any]]:
     found = [run.scores.get(item.id) for item in run.record.log.vehicles]
     values = [{} if each is None else each.values() for each in found]
     return {

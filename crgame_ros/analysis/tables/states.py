@@ -15,7 +15,7 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import PIECE_ROWS
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
@@ -82,7 +82,7 @@ STATES = TableDeclaration(
                CENTER, IN_LANE, OFF_ROAD)))
 
 
-def state_rows(run: TabulatedRun, progress: Callable[[float], object] = lambda _: None,
+def state_rows(run: TableRun, progress: Callable[[float], object] = lambda _: None,
                ) -> Iterator[dict[str, Any]]:
     """
     Yield the rows of a run, in pieces: by time step, driven vehicles first.
@@ -104,7 +104,7 @@ def state_rows(run: TabulatedRun, progress: Callable[[float], object] = lambda _
 class _StateRows:
     """Makes rows of some consecutive steps of a run."""
 
-    def __init__(self, run: TabulatedRun) -> None:
+    def __init__(self, run: TableRun) -> None:
         self._run, log = run, run.record.log
         self._vehicles = len(log.vehicles)
         self._rear_to_center = np.array([item.rear_to_center for item in log.vehicles])

@@ -12,7 +12,7 @@ from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.pairs import FOOTPRINTS, measure_column
 from crgame_ros.analysis.tables.part import declare, TablePart
 from crgame_ros.analysis.tables.score_columns import VEHICLE_SCORES
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
@@ -30,7 +30,7 @@ COUNTS = {
     'steps_without_plan': 'simulation steps without a plan to follow'}
 
 
-def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _identity(run: TableRun) -> Mapping[str, Sequence[Any]]:
     vehicles, driven = run.record.log.vehicles, run.driven
     return {
         'run': [run.id] * len(vehicles), 'id': [item.id for item in vehicles],
@@ -46,7 +46,7 @@ def _identity(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
                              for item in driven]}
 
 
-def _drive(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _drive(run: TableRun) -> Mapping[str, Sequence[Any]]:
     states = run.record.log.vehicle_states
     speeds, accelerations = (states[..., column] for column in (
         StateColumn.SPEED, StateColumn.ACCELERATION))
@@ -56,7 +56,7 @@ def _drive(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
             'min_acceleration': accelerations.min(axis=0)}
 
 
-def _criticality(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _criticality(run: TableRun) -> Mapping[str, Sequence[Any]]:
     found = [run.criticality.get(item.id) for item in run.record.log.vehicles]
     columns: dict[str, list[Any]] = {}
     for name in MEASURES:
@@ -86,7 +86,7 @@ def _worst_columns() -> list[Column]:
     return columns
 
 
-def _planning(run: TabulatedRun) -> Mapping[str, Sequence[Any]]:
+def _planning(run: TableRun) -> Mapping[str, Sequence[Any]]:
     ids = [item.id for item in run.record.log.vehicles]
     planners = {} if run.outcome is None else run.outcome['planners']
     tallies = [run.tallies.get(name) for name in ids]

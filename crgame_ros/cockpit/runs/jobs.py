@@ -18,8 +18,8 @@ from crgame_ros.analysis.scores.run import scores_of
 from crgame_ros.cockpit.job_loop import serve_jobs
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.export import write_text
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import read_run_record
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
 import numpy as np
 
@@ -105,7 +105,7 @@ def _score_values(found: NuplanScore | None) -> dict[str, Any]:
          'definition': MEASURES[name].definition} for name, value, weight in parts]}
 
 
-def _motion(log: RunLog, number: int) -> dict[str, Any]:
+def _motion(log: RunTrajectories, number: int) -> dict[str, Any]:
     """Return how far and how fast a vehicle came [m, m/s]."""
     states = log.vehicle_states[:, number]
     states = states[np.isfinite(states[:, 0])]

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
-from crgame_ros.study.data.measured_run import MeasuredRun
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.trials_table import PARTICIPANT, utc, WALL
 from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
@@ -46,7 +46,7 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
 
 
 def event_rows(record: ParticipantRecord,
-               runs: Mapping[str, MeasuredRun]) -> list[dict[str, Any]]:
+               runs: Mapping[str, RunTables]) -> list[dict[str, Any]]:
     """
     Return everything that happened in a participant's session.
 
@@ -101,7 +101,7 @@ def _kind(kind: str, item: SessionItem | None) -> str:
     return f'{what}_{kind}'
 
 
-def _run_rows(attempt: TrialAttempt, run: MeasuredRun,
+def _run_rows(attempt: TrialAttempt, run: RunTables,
               record: ParticipantRecord) -> Iterator[dict[str, Any]]:
     start_s = drive_start_s(attempt)
     folder = None if attempt.folder is None else attempt.folder.relative_to(

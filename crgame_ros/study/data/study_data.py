@@ -20,9 +20,9 @@ from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
 from crgame_ros.study.data.answers_table import answer_rows, ANSWERS
 from crgame_ros.study.data.asked_questions import AskedQuestions, trials_by_number
 from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.measured_run import MeasuredRun, MeasuredRuns
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.participants_table import ParticipantsTable
+from crgame_ros.study.data.run_tables import RunTables, RunTablesCache
 from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
 from crgame_ros.study.data.study_row_table import table_of_rows
 from crgame_ros.study.data.trials_table import TrialsTable
@@ -83,7 +83,7 @@ class CountedTrial:
 
     record: ParticipantRecord
     attempt: TrialAttempt
-    run: MeasuredRun | None
+    run: RunTables | None
     row: dict[str, Any]
 
 
@@ -137,10 +137,10 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
     records = folder.participants()
     people = ParticipantsTable(folder.study, asked)
     data = StudyData(folder, asked, TrialsTable(folder, asked), people, records)
-    runs = MeasuredRuns(folder.data / KEPT)
+    runs = RunTablesCache(folder.data / KEPT)
     events: list[dict[str, Any]] = []
     for record in records:
-        measured: dict[str, MeasuredRun] = {}
+        measured: dict[str, RunTables] = {}
         for item, attempt in record.counted.items():
             run, problem = _run(folder, record, attempt, runs, say, progress)
             if run is not None:
@@ -166,8 +166,8 @@ def _answers(data: StudyData) -> Iterator[dict[str, Any]]:
 
 
 def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttempt,
-         runs: MeasuredRuns, say: Callable[[str], object],
-         progress: Callable[[str, float], object]) -> tuple[MeasuredRun | None, str]:
+         runs: RunTablesCache, say: Callable[[str], object],
+         progress: Callable[[str, float], object]) -> tuple[RunTables | None, str]:
     """Measure a trial's run; or say why it cannot be."""
     if attempt.folder is None:
         return None, 'the journal names no recording'

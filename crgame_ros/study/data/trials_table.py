@@ -20,8 +20,8 @@ from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import InputError
 from crgame_ros.study.data.asked_questions import AskedQuestions
 from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.measured_run import MeasuredRun
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
+from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.study_row_table import flag_column, unlike, with_unit
 from crgame_ros.study.data.timing_quality import timing_faults
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -162,7 +162,7 @@ class TrialsTable:
             'trials', 'a trial that counts', ('participant', 'trial'),
             (*_FIRST, *self.factors.values(), *fixed, *_apart(answers, taken)))
 
-    def row(self, record: ParticipantRecord, attempt: TrialAttempt, run: MeasuredRun | None,
+    def row(self, record: ParticipantRecord, attempt: TrialAttempt, run: RunTables | None,
             problem: str) -> dict[str, Any]:
         """
         Return the row of a trial.
@@ -200,7 +200,7 @@ class TrialsTable:
                 row[name] = self._folder.relative(found[0]) if found else None
         return row
 
-    def _measured(self, attempt: TrialAttempt, run: MeasuredRun) -> dict[str, Any]:
+    def _measured(self, attempt: TrialAttempt, run: RunTables) -> dict[str, Any]:
         summary = run.summary
         humans = list(summary['humans'])
         seat = attempt.trial.condition.settings.seat

@@ -13,7 +13,7 @@ from crgame_ros.analysis.report.driving_section import task_section
 from crgame_ros.analysis.report.run import measured_run
 from crgame_ros.analysis.run_measures import measure_run
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.analysis.tables.tabulated_run import TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.driver.source import ScriptedDriver
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, PoseSpawn
 from crgame_ros.game.task_documents import PageTimes, TaskEntry
@@ -173,7 +173,7 @@ def test_measures_report_and_tables_tell_of_tasks(record: RunRecord) -> None:
     assert section is not None
     for words in ('ISO 17488', 'Requests to take over', 'radio', '0.62'):
         assert words in section.html
-    tables = tables_of([TabulatedRun('run', told, scored=False)])
+    tables = tables_of([TableRun('run', told, scored=False)])
     responses = tables['detection_responses'].to_pylist()
     assert [row['outcome'] for row in responses] == [
         'hit', 'unrequested', 'hit', 'missed', 'premature', 'hit', 'unseen', 'missed', 'hit',

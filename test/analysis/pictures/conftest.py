@@ -9,8 +9,8 @@ from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import run_record_of, RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
@@ -50,9 +50,9 @@ def cut_in_scene(cut_in: RunRecord) -> FrameScene:
 
 
 @pytest.fixture
-def straight(cut_in: RunRecord) -> Callable[..., RunLog]:
+def straight(cut_in: RunRecord) -> Callable[..., RunTrajectories]:
     """Return a function that lets human and AV of the cut-in game drive as is said."""
-    def make(human_x: list[float], human_speed: list[float], av_x: float) -> RunLog:
+    def make(human_x: list[float], human_speed: list[float], av_x: float) -> RunTrajectories:
         states = np.zeros((len(human_x), 2, 8))
         y = cut_in.log.vehicle_states[0, 1, StateColumn.Y]
         states[:, :, StateColumn.Y] = y

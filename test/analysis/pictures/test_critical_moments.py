@@ -7,19 +7,19 @@ from collections.abc import Callable
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 import pytest
 
-Make = Callable[..., RunLog]
+Make = Callable[..., RunTrajectories]
 
 
-def _record(log: RunLog, *fired: FiredEvent) -> RunRecord:
+def _record(log: RunTrajectories, *fired: FiredEvent) -> RunRecord:
     return RunRecord(log, np.empty(0, dtype=np.int64), np.empty((0, 2, 4)), fired)
 
 
-def _approach(straight: Make, steps: int, after: int) -> tuple[RunLog, float]:
+def _approach(straight: Make, steps: int, after: int) -> tuple[RunTrajectories, float]:
     """Let the human drive at 10 m/s for some steps of 0.1 s and then stand, 40 m behind the AV."""
     times_s = 0.1 * np.arange(steps + after)
     x = 300.0 + 10.0 * np.minimum(times_s, 0.1 * steps)

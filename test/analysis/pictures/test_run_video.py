@@ -10,14 +10,14 @@ from crgame_ros.analysis.pictures import run_video
 from crgame_ros.analysis.pictures.run_video import write_video
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.errors import InputError
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 import pytest
 
 
-def _short(record: RunRecord, rows: int) -> RunLog:
+def _short(record: RunRecord, rows: int) -> RunTrajectories:
     log = record.log
     return replace(log, ks=log.ks[:rows], vehicle_states=log.vehicle_states[:rows],
                    object_poses=log.object_poses[:rows],

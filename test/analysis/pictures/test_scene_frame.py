@@ -15,8 +15,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.run_log import RunLog
 from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Polygon
@@ -33,7 +33,7 @@ def _in_map(points: FloatArray, window: FrameWindow) -> FloatArray:
     return np.column_stack((there.real + window.x, there.imag + window.y))
 
 
-def _expected(log: RunLog, row: int) -> dict[str, FloatArray]:
+def _expected(log: RunTrajectories, row: int) -> dict[str, FloatArray]:
     """Return the outlines of all who are there, from the log."""
     found = {}
     for i, item in enumerate(log.vehicles):
@@ -57,7 +57,7 @@ def _drawn(axes: Axes, kind: str) -> dict[str, FloatArray]:
 @pytest.mark.parametrize('name', ['two_avs', 'parked_cars'])
 def test_footprints_are_the_placed_outlines(name: str, request: pytest.FixtureRequest) -> None:
     """Of everybody in the window, in data coordinates; every driven vehicle is within."""
-    log: RunLog = request.getfixturevalue(name).log
+    log: RunTrajectories = request.getfixturevalue(name).log
     scene = FrameScene(log)
     ks = log.ks[[5, 12, 19]].tolist()
     figure = frames_figure(scene, ks)

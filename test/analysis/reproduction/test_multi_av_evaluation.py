@@ -12,7 +12,7 @@ from crgame_ros.analysis.reproduction.single_av_evaluation import (
     run_alone,
 )
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.run_log import RunLog
+from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 import pytest
 
@@ -58,7 +58,7 @@ def test_jump_and_gap_are_found(idm: MultiAvRun, moved: float) -> None:
     """A state 6 cm ahead of the others, or none, is no time line."""
     states = idm.run.log.vehicle_states.copy()
     states[40, 2, :2] += moved
-    log: RunLog = replace(idm.run.log, vehicle_states=states)
+    log: RunTrajectories = replace(idm.run.log, vehicle_states=states)
     run = replace(idm, run=replace(idm.run, log=log))
     assert 'one time line without a jump' in _unmet(run)
 

@@ -98,7 +98,7 @@ def _is_ip(text: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Opening:
+class Exposure:
     """
     What the command line says of who may come.
 

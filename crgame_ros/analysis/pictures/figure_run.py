@@ -21,7 +21,7 @@ from crgame_ros.recording.run_record import read_run_record, RunRecord
 from crgame_ros.recording.timing_report import timing_report
 
 
-class PicturedRun:
+class FigureRun:
     """
     A recording to make figures of.
 

@@ -13,7 +13,7 @@ from crgame_ros.errors import InputError
 
 
 @contextmanager
-def held(domain: str, namespace: str) -> Iterator[None]:
+def hold_namespace(domain: str, namespace: str) -> Iterator[None]:
     """
     Hold a place while a graph runs there; the kernel lets go of it with the process.
 

@@ -8,7 +8,7 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.spawning import CAR, LARGE_CAR, TRUCK
-from crgame_ros.traffic.tightness import tight_lanes
+from crgame_ros.traffic.tight_lanes import find_tight_lanes
 from judge.motion import off_road
 from judge.roads import JudgedRoads
 import numpy as np
@@ -36,7 +36,7 @@ def test_a_bend_is_too_tight_where_the_swept_width_is_more_than_the_lane(
     # 4.5 m of a lane of 3.5 m, at 25 m 3.2 m; a car of 4.5 m takes 2.5 m at 9 m and
     # more than the lane has at 3 m.
     graph = bend(radius)
-    for_cars, for_trucks = tight_lanes(graph, CAR, CAR, TRUCK)
+    for_cars, for_trucks = find_tight_lanes(graph, CAR, CAR, TRUCK)
     assert for_trucks[1] == truck
     assert for_cars[1] == car
     assert not for_cars[0]
@@ -46,7 +46,7 @@ def test_a_straight_lane_that_only_large_cars_are_tried_in_is_wide_enough() -> N
     # 2.45 m: less room beside a car of 1.9 m than asked for without a trial, more beside 1.8 m.
     graph = LaneGraph(RoadNetwork(support.roads(support.lane_strip(
         1, [(0.0, 0.0), (80.0, 0.0)], width=2.45)).lanelet_network))
-    for_cars, _ = tight_lanes(graph, CAR, LARGE_CAR, TRUCK)
+    for_cars, _ = find_tight_lanes(graph, CAR, LARGE_CAR, TRUCK)
     assert not for_cars.any()
 
 

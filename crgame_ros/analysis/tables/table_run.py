@@ -37,7 +37,7 @@ class PlanTally:
 
 
 @dataclass
-class TabulatedRun:
+class TableRun:
     """
     A run to tabulate.
 
@@ -107,7 +107,7 @@ def run_name(path: Path) -> str:
 
 def tabulated_runs(paths: Sequence[Path], epoch: int | None,
                    progress: Callable[[str, float], object],
-                   scored: bool = True) -> Iterator[TabulatedRun]:
+                   scored: bool = True) -> Iterator[TableRun]:
     """
     Read runs one after the other.
 
@@ -144,7 +144,7 @@ def own_id(name: str, taken: Iterable[str]) -> str:
 
 
 def _read(path: Path, bag: Path, epoch: int | None,
-          progress: Callable[[str, float], object]) -> TabulatedRun:
+          progress: Callable[[str, float], object]) -> TableRun:
     record = read_run_record(bag, epoch, partial(progress, f'reading {path}'))
     game = record.log.game
     try:
@@ -156,6 +156,6 @@ def _read(path: Path, bag: Path, epoch: int | None,
         # Of a recording without cycles there is motion, but no timing.
         timing = None
         progress(f'no timing of {path}: {error}', 1.0)
-    return TabulatedRun(
+    return TableRun(
         f'{run_name(path)}:{game.epoch}', record, timing,
         partial(read_plans, bag, game.epoch, partial(progress, f'reading the plans of {path}')))

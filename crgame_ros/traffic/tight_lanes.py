@@ -48,8 +48,8 @@ AROUND, WITHIN = 4.0, 6.0
 ASIDE = 0.6
 
 
-def tight_lanes(graph: LaneGraph, car: Shape, large_car: Shape,
-                truck: Shape) -> NDArray[np.bool_]:
+def find_tight_lanes(graph: LaneGraph, car: Shape, large_car: Shape,
+                     truck: Shape) -> NDArray[np.bool_]:
     """
     Return the lanes (2, L) on which cars and long vehicles (2) leave the road, as agents drive.
 

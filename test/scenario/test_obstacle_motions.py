@@ -8,8 +8,8 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.scenario.courses import ObstacleCourses
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.prediction import LanePrediction, recorded_future
 import numpy as np
@@ -35,12 +35,12 @@ def obstacles(loaded: LoadedScenario) -> ScenarioObstacles:
     return found
 
 
-def poses(courses: ObstacleCourses, column: int, ks: range) -> NDArray[np.float64]:
+def poses(courses: ObstacleMotions, column: int, ks: range) -> NDArray[np.float64]:
     """Stack an object's poses."""
     return np.array([courses.states_at(k).poses[column] for k in ks])
 
 
-def assert_velocities_lead_on(courses: ObstacleCourses, column: int, ks: range) -> None:
+def assert_velocities_lead_on(courses: ObstacleMotions, column: int, ks: range) -> None:
     """Check that a velocity leads to the pose at the next time step."""
     for k in ks:
         now, following = courses.states_at(k), courses.states_at(k + 1)
@@ -67,7 +67,7 @@ def test_held_obstacle_stands_at_its_first_pose(loaded: LoadedScenario,
 def test_released_obstacle_plays_its_recording_shifted(loaded: LoadedScenario,
                                                        obstacles: ScenarioObstacles) -> None:
     """The same bits, 83 time steps later, and gone after its end; nobody else is changed."""
-    courses, plain = ObstacleCourses(obstacles), ScenarioObstacles(loaded)
+    courses, plain = ObstacleMotions(obstacles), ScenarioObstacles(loaded)
     assert courses.is_held(WALKER) and not courses.is_held(LEADER)
     courses.release(WALKER, 83)
     assert courses.changed == [WALKER] and not courses.is_held(WALKER)
@@ -79,12 +79,12 @@ def test_released_obstacle_plays_its_recording_shifted(loaded: LoadedScenario,
     assert np.isnan(courses.states_at(384).poses[WALKER]).all()
     assert not courses.is_present(WALKER, 384)
     # The obstacles of the scenario belong to every run.
-    assert ObstacleCourses(obstacles).is_held(WALKER)
+    assert ObstacleMotions(obstacles).is_held(WALKER)
 
 
 def test_braking_obstacle_follows_the_closed_form(obstacles: ScenarioObstacles) -> None:
     """12.5 m/s, 4 m/s^2: s = v t - a t^2 / 2 up to 19.53 m after 3.125 s, then it stands."""
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     start = obstacles.states_at(40).poses[LEADER]
     courses.brake(LEADER, 40, 4.0, 0.0)
     time = np.minimum(DT * np.arange(60), 12.5 / 4.0)
@@ -101,7 +101,7 @@ def test_braking_obstacle_follows_the_closed_form(obstacles: ScenarioObstacles) 
 
 def test_braking_to_a_speed_keeps_it_to_the_end_of_the_path(obstacles: ScenarioObstacles) -> None:
     """To 5 m/s at 2 m/s^2; the recorded path ends at x = 510 m, and the car with it."""
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     courses.brake(LEADER, 100, 2.0, 5.0)
     speeds = [float(np.hypot(*courses.states_at(k).velocities[LEADER, :2]))
               for k in range(100, 160)]
@@ -116,12 +116,12 @@ def test_braking_to_a_speed_keeps_it_to_the_end_of_the_path(obstacles: ScenarioO
 def test_obstacle_never_speeds_up_and_stops_beyond_its_path(
         obstacles: ScenarioObstacles) -> None:
     """A final speed above the present one changes nothing; a short path is gone straight on."""
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     courses.brake(LEADER, 10, 4.0, 30.0)
     np.testing.assert_allclose(poses(courses, LEADER, range(10, 50)),
                                [obstacles.states_at(k).poses[LEADER] for k in range(10, 50)],
                                atol=1e-3)
-    short = ObstacleCourses(obstacles)
+    short = ObstacleMotions(obstacles)
     short.brake(LEADER, 299, 4.0, 0.0)
     end = obstacles.states_at(299).poses[LEADER]
     np.testing.assert_allclose(short.states_at(400).poses[LEADER],
@@ -130,7 +130,7 @@ def test_obstacle_never_speeds_up_and_stops_beyond_its_path(
 
 def test_released_obstacle_brakes_on_its_new_course(obstacles: ScenarioObstacles) -> None:
     """Two events about one object: the pedestrian walks, then halts on the way, then again."""
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     courses.release(WALKER, 50)
     courses.brake(WALKER, 60, 1.4, 0.7)
     courses.brake(WALKER, 70, 1.4, 0.0)
@@ -144,14 +144,14 @@ def test_released_obstacle_brakes_on_its_new_course(obstacles: ScenarioObstacles
 
 def test_put_obstacle_stands(obstacles: ScenarioObstacles) -> None:
     """From then on, for good, with its heading wrapped."""
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     courses.put(PUT, (3.0, -2.0, 4.0))
     for k in (12, 5000):
         assert courses.states_at(k).poses[PUT] == pytest.approx((3.0, -2.0, 4.0 - math.tau))
         assert courses.states_at(k).velocities[PUT].tolist() == [0.0, 0.0, 0.0]
 
 
-def predicted(loaded: LoadedScenario, obstacles: ScenarioObstacles, courses: ObstacleCourses,
+def predicted(loaded: LoadedScenario, obstacles: ScenarioObstacles, courses: ObstacleMotions,
               k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Predict 3 s of what events have changed."""
     prediction = LanePrediction(obstacles, RoadNetwork(loaded.scenario.lanelet_network))
@@ -165,7 +165,7 @@ def test_prediction_of_changed_obstacles(loaded: LoadedScenario,
 
     Nothing of what the events will still do is known.
     """
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     standing, _ = predicted(loaded, obstacles, courses, 30)
     np.testing.assert_array_equal(standing[:, WALKER],
                                   np.tile(standing[0, WALKER], (31, 1)))
@@ -205,7 +205,7 @@ def test_prediction_on_a_bend_follows_the_lane(loaded: LoadedScenario) -> None:
 
 def test_recorded_future_knows_what_has_happened(obstacles: ScenarioObstacles) -> None:
     """`prediction: recorded` gives the true course as far as events have come."""
-    courses = ObstacleCourses(obstacles)
+    courses = ObstacleMotions(obstacles)
     courses.release(WALKER, 20)
     found, _ = recorded_future(courses, 30, 30)
     np.testing.assert_array_equal(found[:, WALKER], obstacles.track(WALKER)[0][10:41])

@@ -10,7 +10,11 @@ from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.game import AvSpec
 from crgame_ros.recording.run_cycles import read_cycles, replay_inputs
-from crgame_ros.recording.run_log import read_run_log, run_log_of, RunLog
+from crgame_ros.recording.run_trajectories import (
+    read_trajectories,
+    RunTrajectories,
+    trajectories_of,
+)
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 import numpy as np
 import pytest
@@ -23,7 +27,7 @@ PARKED, TRAFFIC, CUT_IN = ('ZAM_ParkedCars-1_1_T-1.xml', 'ZAM_Traffic-1_1_T-1.xm
 ROUNDING = 1e-12
 
 
-def assert_same_run(read: RunLog, expected: RunLog) -> None:
+def assert_same_run(read: RunTrajectories, expected: RunTrajectories) -> None:
     """Compare what the messages can hold; velocities of driven vehicles are rounded."""
     assert read.descriptions == expected.descriptions
     assert read.xml_text == expected.xml_text
@@ -39,7 +43,7 @@ def assert_same_run(read: RunLog, expected: RunLog) -> None:
 def test_offline_run_is_sampled_at_the_ticks(drive: Drive) -> None:
     """N = 10: states 0, 10, 20, …; the objects are those of the scenario at each k."""
     result = drive(PARKED, avs=(AvSpec('av0', 'constant-velocity'),))
-    log = run_log_of(result)
+    log = trajectories_of(result)
     np.testing.assert_array_equal(log.ks, np.arange(11))
     np.testing.assert_array_equal(log.vehicle_states, result.vehicle_states[::10])
     assert [item.id for item in log.vehicles] == ['hv0', 'av0']
@@ -60,10 +64,10 @@ def test_recording_holds_the_run(tmp_path: Path, recorder: Any, drive: Drive, ki
     messages = recorder.messages(result, offset_ns=7_000_000_123)
     folder = recorder.ours(tmp_path / 'bag', messages) if kind == 'ours' else recorder.rosbag2(
         tmp_path / 'bag', messages, StoragePlugin[kind.upper()])
-    log = read_run_log(folder)
+    log = read_trajectories(folder)
     assert log.notices == ()
     assert log.game.scheduler.clock_offset_ns == 7_000_000_123
-    assert_same_run(log, run_log_of(result))
+    assert_same_run(log, trajectories_of(result))
 
 
 def test_joints_are_taken_by_name(tmp_path: Path, recorder: Any, samples: Any,
@@ -79,7 +83,8 @@ def test_joints_are_taken_by_name(tmp_path: Path, recorder: Any, samples: Any,
                 int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec),
                 message.joint_names[::-1], point.positions[::-1], point.velocities[::-1],
                 point.accelerations[::-1]))
-    assert_same_run(read_run_log(recorder.ours(tmp_path / 'bag', messages)), run_log_of(result))
+    assert_same_run(read_trajectories(recorder.ours(tmp_path / 'bag', messages)),
+                    trajectories_of(result))
 
 
 def test_each_run_of_a_recording_can_be_chosen(tmp_path: Path, recorder: Any,
@@ -91,13 +96,13 @@ def test_each_run_of_a_recording_can_be_chosen(tmp_path: Path, recorder: Any,
     messages += recorder.messages(second, epoch=1, offset_ns=5_000_000_000,
                                   log_ns=start + 5_000_000_000)
     folder = recorder.ours(tmp_path / 'bag', messages)
-    assert_same_run(read_run_log(folder, 0), run_log_of(first))
-    assert_same_run(read_run_log(folder, 1), run_log_of(second))
-    assert_same_run(read_run_log(folder), run_log_of(second))
+    assert_same_run(read_trajectories(folder, 0), trajectories_of(first))
+    assert_same_run(read_trajectories(folder, 1), trajectories_of(second))
+    assert_same_run(read_trajectories(folder), trajectories_of(second))
     np.testing.assert_array_equal(read_cycles(folder, 0).column('n'), np.arange(1, 101))
     np.testing.assert_array_equal(replay_inputs(folder).commands['hv0'],
                                   second.commands[1:, 0])
-    for read in (read_run_log, read_cycles):
+    for read in (read_trajectories, read_cycles):
         with pytest.raises(InputError, match='epoch 2 in it; it has 0, 1'):
             read(folder, 2)
 
@@ -113,7 +118,7 @@ def test_simulation_that_was_restarted(tmp_path: Path, recorder: Any, drive: Dri
             *message[:3], recorder.messages(second, offset_ns=0)[2][3].replace(
                 b'"real_time_factor": 1.0', b'"real_time_factor": 1.5')))
     folder = recorder.ours(tmp_path / 'bag', messages)
-    assert_same_run(read_run_log(folder), run_log_of(second))
+    assert_same_run(read_trajectories(folder), trajectories_of(second))
     np.testing.assert_array_equal(replay_inputs(folder).commands['hv0'], second.commands[1:, 0])
 
 
@@ -142,7 +147,7 @@ def test_missing_steps(tmp_path: Path, recorder: Any, drive: Drive, topic: str, 
     result = drive(PARKED)
     stamps = {k * 100_000_000 + 1_700_000_000_001_000_000 for k in lost}
     messages = [m for m in recorder.messages(result) if m[0] != topic or m[2] not in stamps]
-    log = read_run_log(recorder.ours(tmp_path / 'bag', messages))
+    log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, ks)
     # Parked objects stand still; between states 20 ms apart a vehicle that brakes or steers anew
     # every 10 ms, with up to 8 m/s^2, is within 8 * 0.01^2 m.
@@ -159,7 +164,8 @@ def test_states_between_the_ticks_may_be_lost(tmp_path: Path, recorder: Any, dri
     result = drive(CUT_IN, duration_s=0.3)
     messages = [m for m in recorder.messages(result)
                 if m[0] != '/vehicles/state' or (m[2] - 1_000_000) % 100_000_000 == 0]
-    assert_same_run(read_run_log(recorder.ours(tmp_path / 'bag', messages)), run_log_of(result))
+    assert_same_run(read_trajectories(recorder.ours(tmp_path / 'bag', messages)),
+                    trajectories_of(result))
 
 
 def test_recording_that_was_cut_off(tmp_path: Path, recorder: Any, drive: Drive) -> None:
@@ -169,8 +175,8 @@ def test_recording_that_was_cut_off(tmp_path: Path, recorder: Any, drive: Drive)
     (folder / 'metadata.yaml').unlink()
     file = folder / 'bag_0.mcap'
     file.write_bytes(file.read_bytes()[:-20_000])
-    log = read_run_log(folder)
-    whole = run_log_of(result)
+    log = read_trajectories(folder)
+    whole = trajectories_of(result)
     assert 2 < len(log.ks) < 11
     np.testing.assert_array_equal(log.vehicle_states[:, :, :3],
                                   whole.vehicle_states[:len(log.ks), :, :3])
@@ -191,7 +197,7 @@ def test_recording_that_lacks_a_topic(tmp_path: Path, recorder: Any, drive: Driv
     messages = [m for m in recorder.messages(drive(TRAFFIC, duration_s=0.1)) if m[0] != missing]
     folder = recorder.ours(tmp_path / 'bag', messages)
     with pytest.raises(InputError) as caught:
-        read_run_log(folder)
+        read_trajectories(folder)
     assert message in str(caught.value) and str(folder) in str(caught.value)
     assert caught.value.remedy
 
@@ -216,7 +222,7 @@ def test_recordings_that_do_not_fit_together(tmp_path: Path, recorder: Any, samp
     for number, (text, change) in enumerate(cases.items()):
         folder = recorder.ours(tmp_path / str(number), [change(m) for m in messages])
         with pytest.raises(InputError, match=text):
-            read_run_log(folder)
+            read_trajectories(folder)
 
 
 def test_recorded_human_is_reproduced_to_the_last_bit(tmp_path: Path, recorder: Any,

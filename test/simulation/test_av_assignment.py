@@ -14,9 +14,9 @@ from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.export import write_scenario
-from crgame_ros.recording.run_log import run_log_of
+from crgame_ros.recording.run_trajectories import trajectories_of
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.simulation.cast import cast_avs
+from crgame_ros.simulation.av_assignment import assign_avs
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from lxml import etree
@@ -49,8 +49,8 @@ def test_hundreds_of_alternatives_are_counted() -> None:
     problem = loaded.planning_problems[0]
     many = [PlanningProblem(number, problem.initial_state, problem.goal)
             for number in range(1000, 1500)]
-    parts, (notice,) = cast_avs(Game(game.scenario, humans=HUMAN),
-                                replace(loaded, planning_problems=tuple(many)))
+    parts, (notice,) = assign_avs(Game(game.scenario, humans=HUMAN),
+                                  replace(loaded, planning_problems=tuple(many)))
     assert len(parts) == 1 and len(notice) < 480
     assert 'problems 1000, 1001, 1002' in notice and 'and 491 more' in notice
     assert '--problem' in notice
@@ -84,7 +84,7 @@ def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
     """Run, XML, run, XML, run: hv0 plays back to 0.1 mm, av0 drives its own problem, alike."""
     first = run_offline(build_setup(load_game(scenarios_directory() / 'cut_in.yaml')),
                         duration_s=8.0)
-    log = run_log_of(first)
+    log = trajectories_of(first)
     exported = write_scenario(log, tmp_path / 'first.xml')
     human = f'o{exported.obstacle_ids["hv0"]}'
     centers = log.vehicle_states[:, 0, :2] + 1.4227 * np.column_stack(
@@ -101,14 +101,14 @@ def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
         # The AV sees the same human, with four decimals and speeds as differences of positions.
         drift = result.states_of('av0')[:, :2] - first.states_of('av0')[:791, :2]
         assert np.abs(drift).max() < 0.5
-        write_scenario(run_log_of(result), tmp_path / 'second.xml')
+        write_scenario(trajectories_of(result), tmp_path / 'second.xml')
     assert math.dist(result.states_of('av0')[-1, :2], first.states_of('av0')[0, :2]) > 80.0
 
 
 def test_who_was_human_is_told_in_the_file(tmp_path: Path) -> None:
     """In the source, which the schema leaves free, for the last run only."""
     game = load_game(scenarios_directory() / 'cut_in.yaml')
-    exported = write_scenario(run_log_of(run_offline(build_setup(game), duration_s=0.3)),
+    exported = write_scenario(trajectories_of(run_offline(build_setup(game), duration_s=0.3)),
                               tmp_path / 'run.xml')
     source = etree.fromstring(exported.xml_text.encode()).get('source')
     assert source.endswith(
@@ -117,7 +117,8 @@ def test_who_was_human_is_told_in_the_file(tmp_path: Path) -> None:
     asked = build_setup(effective_game(RunRequest(scenario=tmp_path / 'run.xml', driver='idle')))
     assert asked.vehicle_ids == ('hv0', 'av0')
     assert f'o{exported.obstacle_ids["hv0"]}' in asked.obstacles.ids
-    again = write_scenario(run_log_of(run_offline(asked, duration_s=0.2)), tmp_path / 'again.xml')
+    again = write_scenario(trajectories_of(run_offline(asked, duration_s=0.2)),
+                           tmp_path / 'again.xml')
     told = etree.fromstring(again.xml_text.encode()).get('source')
     # Two humans by now: who drove, and who played back.
     assert told.count('(humans: ') == 1 and told.count('driven in crgame_ros') == 2

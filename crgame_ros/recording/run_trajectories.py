@@ -20,7 +20,9 @@ from crgame_ros.messages.world_messages import (
     TICK_STATES_TOPIC,
     VEHICLES_TOPIC,
 )
-from crgame_ros.recording.bridging import (
+from crgame_ros.recording.epochs import Epoch, read_epoch
+from crgame_ros.recording.exceptions import RunTooShortError
+from crgame_ros.recording.gap_filling import (
     bridge_objects,
     bridged_notice,
     farthest,
@@ -28,8 +30,6 @@ from crgame_ros.recording.bridging import (
     lost_intervals,
     piece_around,
 )
-from crgame_ros.recording.epochs import Epoch, read_epoch
-from crgame_ros.recording.exceptions import RunTooShortError
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.resampling import moved_intervals, resample
 from crgame_ros.recording.run_cycles import cycle_tables, table_of
@@ -46,7 +46,7 @@ IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class RunLog:
+class RunTrajectories:
     """
     A run at K consecutive scenario steps k, in frame map.
 
@@ -89,7 +89,7 @@ class RunLog:
         """Descriptions of the M other objects."""
         return self.descriptions[self.vehicle_states.shape[1]:]
 
-    def until(self, k: int) -> 'RunLog':
+    def until(self, k: int) -> 'RunTrajectories':
         """Return the run up to a scenario step, the step itself included; without its cycles."""
         count = int(np.searchsorted(self.ks, k, side='right'))
         return replace(
@@ -100,14 +100,14 @@ class RunLog:
             commands=None if self.commands is None else self.commands[:count])
 
 
-def read_run_log(path: Path, epoch: int | None = None,
-                 progress: Callable[[float], object] | None = None) -> RunLog:
+def read_trajectories(path: Path, epoch: int | None = None,
+                      progress: Callable[[float], object] | None = None) -> RunTrajectories:
     """
     Read a run from a recording: ours or of `ros2 bag record`, finished or cut off.
 
     What a busy recorder missed is bridged by what other topics hold and by the states around it,
-    as far as `bridging` allows; a notice tells each. Where more is missing, the run is its longest
-    piece, for the pieces could only be joined by inventing motion.
+    as far as `gap_filling` allows; a notice names each gap. Where more is missing, the run is its
+    longest piece, for the pieces could only be joined by inventing motion.
 
     :param epoch: which run, where a recording holds several; None for the last.
     :param progress: is told how much of the recording has been read, from 0 to 1 for states, then
@@ -143,9 +143,10 @@ def read_run_log(path: Path, epoch: int | None = None,
                             3 * len(objects)) if objects else np.empty((len(ticks), 2, 0))
     others = others.reshape(len(ticks), 2, len(objects), 3)
     published = _published(recorded[VEHICLES_TOPIC], ticks, vehicle_states)
-    return RunLog(run.xml_text, run.game, run.descriptions, _ks(scheduler, ticks), vehicle_states,
-                  published, others[:, 0], others[:, 1], tuple(map(one_line, notices)), table,
-                  None if table is None else _commands(table, vehicles, ticks))
+    return RunTrajectories(
+        run.xml_text, run.game, run.descriptions, _ks(scheduler, ticks), vehicle_states, published,
+        others[:, 0], others[:, 1], tuple(map(one_line, notices)), table,
+        None if table is None else _commands(table, vehicles, ticks))
 
 
 def _commands(table: CycleTable, vehicles: Sequence[str], ticks: IntArray) -> FloatArray:
@@ -298,7 +299,7 @@ def _ks(scheduler: ScenarioScheduler, ticks: IntArray) -> NDArray[np.int64]:
     return scheduler.k0 + ticks // scheduler.steps_per_tick
 
 
-def run_log_of(result: OfflineResult) -> RunLog:
+def run_log_of(result: OfflineResult) -> RunTrajectories:
     """Return the log of an offline run."""
     setup = result.setup
     scheduler = setup.scheduler
@@ -309,7 +310,7 @@ def run_log_of(result: OfflineResult) -> RunLog:
     ks = _ks(scheduler, ticks)
     game = parse_game_document(
         game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
-    return RunLog(
+    return RunTrajectories(
         setup.loaded.xml_text, game, setup.descriptions, ks, states, result.vehicle_states[ticks],
         result.object_poses[:len(ks)].reshape(len(ks), -1, 3),
         result.object_velocities[:len(ks)].reshape(len(ks), -1, 3), tuple(map(one_line, notices)),

@@ -29,7 +29,7 @@ NAMED = 8
 OWN: Final = 'own'
 
 
-def cast_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
+def assign_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
     """
     Return each AV of a game its planning problem.
 
@@ -138,7 +138,7 @@ def adapt_game(game: Game, loaded: LoadedScenario, *, seed: int, planner: str = 
     :param traffic: None is none, OWN the game's.
     :raises InputError: if the scenario has no planning problems for the game's AVs.
     """
-    specs = [spec for spec, _ in cast_avs(game, loaded)[0]]
+    specs = [spec for spec, _ in assign_avs(game, loaded)[0]]
     if planner != OWN:
         specs = [replace(spec, planner=planner, options=dict(options or {})) for spec in specs]
     if not isinstance(perception, str):

@@ -14,7 +14,7 @@ from typing import Any
 
 from crgame_ros.analysis.behaviour.task_events import task_events
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.analysis.tables.tabulated_run import tabulated_runs, TabulatedRun
+from crgame_ros.analysis.tables.table_run import TableRun, tabulated_runs
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.run_folder import bags_of
@@ -26,7 +26,7 @@ _PIECE = 1 << 20
 
 
 @dataclass(frozen=True)
-class MeasuredRun:
+class RunTables:
     """
     A run whose tables are kept.
 
@@ -52,7 +52,7 @@ class MeasuredRun:
         return {}
 
 
-class MeasuredRuns:
+class RunTablesCache:
     """
     Measures runs, and keeps what came out.
 
@@ -64,7 +64,7 @@ class MeasuredRuns:
         self._used: set[str] = set()
 
     def measured(self, run: Path, name: str,
-                 progress: Callable[[str, float], object]) -> MeasuredRun:
+                 progress: Callable[[str, float], object]) -> RunTables:
         """
         Return a run's tables; they are computed if nobody has before.
 
@@ -77,7 +77,7 @@ class MeasuredRuns:
         folder = self._folder / key
         if not (folder / SUMMARY).exists():
             self._measure(run, name, folder, progress)
-        return MeasuredRun(key, folder, json.loads((folder / SUMMARY).read_text('utf-8')))
+        return RunTables(key, folder, json.loads((folder / SUMMARY).read_text('utf-8')))
 
     def forget_others(self) -> None:
         """Remove what no run of the study has asked for, and what a killed process left."""
@@ -107,7 +107,7 @@ class MeasuredRuns:
             shutil.rmtree(part, ignore_errors=True)
 
 
-def _summary(run: TabulatedRun) -> dict[str, Any]:
+def _summary(run: TableRun) -> dict[str, Any]:
     game = run.record.log.game
     return {
         'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,

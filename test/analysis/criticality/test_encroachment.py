@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """WayCrossed ways: the time between one leaving and the other entering the conflict area."""
 
-from crgame_ros.analysis.criticality.crossed_ways import EncroachmentDetector, WayCrossed
+from crgame_ros.analysis.criticality.encroachment import EncroachmentDetector, WayCrossed
 from crgame_ros.geometry.outline import placed
 import numpy as np
 from numpy.typing import NDArray

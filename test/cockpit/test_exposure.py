@@ -19,9 +19,9 @@ from aiohttp import ClientSession, CookieJar, Fingerprint, ServerFingerprintMism
 from cockpit_support import cockpit, get, HOST, in_loop, next_text, PumpBackend, wait_until
 from crgame_ros.cockpit import doorkeeper
 from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.exposure import Exposure, fingerprint, make_certificate, tls_context
 from crgame_ros.cockpit.invitations import Invitations
 from crgame_ros.cockpit.machine_addresses import reachable_addresses
-from crgame_ros.cockpit.opening import fingerprint, make_certificate, Opening, tls_context
 from crgame_ros.cockpit.rights import Rights
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import InputError
@@ -33,7 +33,7 @@ openssl = pytest.mark.skipif(shutil.which('openssl') is None, reason='openssl is
 @asynccontextmanager
 async def opened(folder: Path) -> AsyncIterator[tuple[PumpBackend, Access, list[str]]]:
     """Listen as --open-cockpit does, for one seat; give what was printed."""
-    opening = Opening(HOST, 0, links=True, private=folder)
+    opening = Exposure(HOST, 0, links=True, private=folder)
     access, backend = opening.access(), PumpBackend()
     runner, port = await listen(create_app(backend, access, None), HOST, 0)
     try:
@@ -170,7 +170,7 @@ def test_a_certificate_is_made_once_or_given(tmp_path: Path) -> None:
     told = subprocess.run(['openssl', 'x509', '-noout', '-ext', 'subjectAltName', '-in',
                            str(pair[0])], capture_output=True, text=True, check=True).stdout
     assert 'IP Address:192.0.2.7' in told and 'DNS:lab-pc' in told
-    given = Opening('0.0.0.0', 0, certificate=pair[0], key=pair[1])
+    given = Exposure('0.0.0.0', 0, certificate=pair[0], key=pair[1])
     assert given.access().url.startswith('https://')
     (tmp_path / 'other').mkdir()
     other = make_certificate(tmp_path / 'other', ['lab-pc'])
@@ -184,15 +184,15 @@ def test_without_openssl_one_line_says_what_to_do(tmp_path: Path,
     monkeypatch.setenv('PATH', str(tmp_path))
     with pytest.raises(Exception, match='install openssl, or give a certificate with '
                        '--certificate and --key'):
-        Opening(HOST, 0, links=True, private=tmp_path).access()
+        Exposure(HOST, 0, links=True, private=tmp_path).access()
 
 
 def test_a_token_on_this_machine_too() -> None:
-    opening = Opening(HOST, 8000, token=True)
+    opening = Exposure(HOST, 8000, token=True)
     access = opening.access()
     line, = opening.lines(access, [])
     assert line == f'the cockpit is at http://{HOST}:8000/?token={access.token}'
-    assert Opening(HOST, 8000).access().token is None
+    assert Exposure(HOST, 8000).access().token is None
 
 
 def test_all_addresses_are_those_that_others_can_open() -> None:

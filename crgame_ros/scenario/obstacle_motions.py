@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 _ABSENT = np.full(3, np.nan)
 
 
-class ObjectCourse(ABC):
+class ObstacleMotion(ABC):
     """Where one obstacle is from the time step on at which an event changed its course."""
 
     @abstractmethod
@@ -29,7 +29,7 @@ class ObjectCourse(ABC):
         return self.state_at(k)[0][None, :]
 
 
-class Released(ObjectCourse):
+class Released(ObstacleMotion):
     """
     A recorded course, begun at another time.
 
@@ -53,7 +53,7 @@ class Released(ObjectCourse):
         return self._poses[k - self._k:]
 
 
-class Braking(ObjectCourse):
+class Braking(ObstacleMotion):
     """
     Slows down along a path and keeps the speed that it reaches.
 
@@ -113,7 +113,7 @@ class Braking(ObjectCourse):
         return path
 
 
-class Standing(ObjectCourse):
+class Standing(ObstacleMotion):
     """
     Stands for good.
 
@@ -129,7 +129,7 @@ class Standing(ObjectCourse):
         return self._pose, self._velocity
 
 
-class ObstacleCourses:
+class ObstacleMotions:
     """
     The obstacles of a scenario in one run, in which events change some of them.
 
@@ -138,7 +138,7 @@ class ObstacleCourses:
 
     def __init__(self, obstacles: ScenarioObstacles) -> None:
         self._obstacles = obstacles
-        self._courses: dict[int, ObjectCourse] = {}
+        self._courses: dict[int, ObstacleMotion] = {}
 
     @property
     def changed(self) -> list[int]:
