@@ -16,8 +16,8 @@ from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,
-    run_log_of,
     RunTrajectories,
+    trajectories_of,
 )
 from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.contacts import contacts_of
@@ -91,7 +91,7 @@ def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency
     result = _drive_inputs(setup, latency_steps, inputs) if traces is None \
         else _drive_trajectory(setup, latency_steps, traces)
     return _compare(
-        planner, run_log_of(result), recorded,
+        planner, trajectories_of(result), recorded,
         {av: record.accepted_ratio for av, record in result.planners.items()},
         [item.as_dict() for item in contacts_of(result)], result)
 

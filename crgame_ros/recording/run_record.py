@@ -25,8 +25,8 @@ from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,
-    run_log_of,
     RunTrajectories,
+    trajectories_of,
 )
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
@@ -285,5 +285,5 @@ def record_of_log(path: Path, log: RunTrajectories) -> RunRecord:
 def run_record_of(result: OfflineResult) -> RunRecord:
     """Return the record of an offline run."""
     commands = np.concatenate((result.commands, result.av_commands), axis=1)[1:]
-    return RunRecord(run_log_of(result), np.arange(1, len(result.commands)), commands,
+    return RunRecord(trajectories_of(result), np.arange(1, len(result.commands)), commands,
                      result.fired, tasks=result.tasks)

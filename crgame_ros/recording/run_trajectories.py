@@ -299,7 +299,7 @@ def _ks(scheduler: ScenarioScheduler, ticks: IntArray) -> NDArray[np.int64]:
     return scheduler.k0 + ticks // scheduler.steps_per_tick
 
 
-def run_log_of(result: OfflineResult) -> RunTrajectories:
+def trajectories_of(result: OfflineResult) -> RunTrajectories:
     """Return the log of an offline run."""
     setup = result.setup
     scheduler = setup.scheduler

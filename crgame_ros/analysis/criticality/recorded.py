@@ -18,7 +18,7 @@ def measure_log(log: RunTrajectories, thresholds: Thresholds = USUAL,
     """
     Measure every scenario step of a run.
 
-    :param log: of a recording (`read_trajectories`) or of an offline run (`run_log_of`).
+    :param log: of a recording (`read_trajectories`) or of an offline run (`trajectories_of`).
     :param progress: is told how much has been measured, from 0 to 1.
     :param on_tick: is given the observer after each step, to take what it found there.
     :raises InputError: if the scenario in it cannot be used.

@@ -17,8 +17,8 @@ from crgame_ros.recording.recorded_inputs import inputs_of, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.recording.run_trajectories import (
     read_trajectories,
-    run_log_of,
     RunTrajectories,
+    trajectories_of,
 )
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import Setup
@@ -67,7 +67,7 @@ def record_offline(game: Path, planner: str, duration_s: float | None = None) ->
         return effective_setup(RunRequest(game=game, planners=(name,)))
 
     result = run_offline(setup_for(planner), duration_s=duration_s, clock_s=time.perf_counter)
-    return RecordedHuman(game.stem, run_log_of(result), setup_for, inputs_of(result))
+    return RecordedHuman(game.stem, trajectories_of(result), setup_for, inputs_of(result))
 
 
 def record_live(game: Path, planner: str, folder: Path,

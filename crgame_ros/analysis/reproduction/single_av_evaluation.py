@@ -18,7 +18,7 @@ from crgame_ros.analysis.reproduction.expectation import (
 )
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
-from crgame_ros.recording.run_trajectories import run_log_of, RunTrajectories
+from crgame_ros.recording.run_trajectories import RunTrajectories, trajectories_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
@@ -185,8 +185,8 @@ def run_alone(game: Path, planner: str, duration_s: float) -> RunTrajectories:
     :raises InputError: if game or planner cannot be used.
     """
     setup = build_setup(replace(effective_game(RunRequest(game=game)), humans=()))
-    return run_log_of(run_offline(with_planners(setup, (planner,)), duration_s=duration_s,
-                                  clock_s=time.perf_counter))
+    return trajectories_of(run_offline(with_planners(setup, (planner,)), duration_s=duration_s,
+                                       clock_s=time.perf_counter))
 
 
 def jumps(log: RunTrajectories) -> NDArray[np.float64]:
