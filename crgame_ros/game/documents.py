@@ -3,8 +3,8 @@
 """
 The run described as JSON text: `/scenario/game` and `/scenario/objects`.
 
-Written by the simulation, read by planners, monitor, recorder and conversion, so that nobody
-needs the game's files, nor the engine.
+The simulation writes them; planners, monitor, recorder and conversion read them, and so need
+neither the game's files nor the engine.
 """
 
 from collections.abc import Sequence
@@ -37,24 +37,24 @@ OBJECTS_TOPIC = '/scenario/objects'
 EVENTS_TOPIC = '/scenario/events'
 SIGNALS_TOPIC = '/scenario/signals'
 SEATS_TOPIC = '/seats'
-# Of a stamp of ROS [ns].
+# Upper limit of a ROS stamp [ns].
 LARGEST_NUMBER = 2**31 * 10**9
-# What reading a text that somebody else wrote can raise: huge numbers and deep nesting included.
+# The errors of reading an untrusted text, including those of huge numbers and deep nesting.
 MALFORMED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
 
 
 @dataclass(frozen=True)
 class GameDocument:
     """
-    What others need of `/scenario/game`.
+    The content of `/scenario/game` that other programs need.
 
     :param epoch: counts resets.
     :param benchmark_id: of the scenario.
-    :param title: one line for people.
+    :param title: one displayed line.
     :param scenario_sha256: of the text on `/scenario/xml`.
     :param scheduler: time grids with the clock offset.
     :param seed: of everything random.
-    :param duration_s: simulated time until the run ends; None if nobody says [s]
+    :param duration_s: simulated time until the run ends; None without a limit [s]
     :param real_time_factor: simulated seconds per wall second at the start.
     :param humans: the humans' vehicles.
     :param avs: the AVs.
@@ -62,13 +62,13 @@ class GameDocument:
     :param timing: of the time controller.
     :param traffic: vehicles that react; None for none.
     :param occupancy: file of the map of permanent obstacles; None for none.
-    :param environment: light and air; None in recordings that know nothing of them.
+    :param environment: light and air; None in older recordings without them.
     :param events: the game's events.
-    :param event_entries: the same, as pages are told.
-    :param file: text of the game file; empty where there is none.
-    :param sound: on or none: whether pages may sound and gamepads rumble.
-    :param tasks: what drivers are asked to do besides driving.
-    :param language: of what drivers read.
+    :param event_entries: the same, in the form for pages.
+    :param file: text of the game file; empty without one.
+    :param sound: on or none: whether pages may play sound and gamepads rumble.
+    :param tasks: the drivers' tasks besides driving.
+    :param language: of the texts for drivers.
     """
 
     epoch: int
@@ -95,15 +95,15 @@ class GameDocument:
 
     @property
     def vehicles(self) -> tuple[DrivenVehicle, ...]:
-        """All driven vehicles, in the order of `/vehicles/state`."""
+        """Return all driven vehicles, in the order of `/vehicles/state`."""
         return (*self.humans, *self.avs)
 
     def human(self, vehicle_id: str) -> DrivenHuman | None:
-        """Return a human's vehicle, None if it takes no part."""
+        """Return a human's vehicle, None if it is not in the game."""
         return next((item for item in self.humans if item.id == vehicle_id), None)
 
     def av(self, vehicle_id: str) -> DrivenAv | None:
-        """Return an AV, None if it takes no part."""
+        """Return an AV, None if it is not in the game."""
         return next((item for item in self.avs if item.id == vehicle_id), None)
 
 
@@ -159,7 +159,7 @@ def parse_game_document(text: str) -> GameDocument:
 
 
 def objects_document(descriptions: Sequence[ObjectDescription]) -> str:
-    """Write what can appear (fields as in the contract, `/scenario/objects`)."""
+    """Return the possible objects as JSON (fields as in the contract, `/scenario/objects`)."""
     return json.dumps([
         {'id': item.id, 'type': item.type, 'role': item.role.value, 'shape': asdict(item.shape),
          'reference_point': item.reference_point, 'rear_to_center': item.rear_to_center}
@@ -191,7 +191,7 @@ def parse_signals_document(text: str) -> tuple[int, dict[str, str]]:
     Read `/scenario/signals`.
 
     :return: the scenario step k, and the state of each traffic light by its id.
-    :raises InputError: if it is something else.
+    :raises InputError: if it is malformed.
     """
     try:
         content = json.loads(text)
@@ -207,7 +207,7 @@ def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
     Read `/seats`.
 
     :return: source and driver of each seat, by vehicle.
-    :raises InputError: if it is not what the contract says.
+    :raises InputError: if it does not follow the contract.
     """
     try:
         seats = {name: {'source': entry['source'], 'driver': entry['driver']}
@@ -222,7 +222,7 @@ def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
 
 
 def events_document(epoch: int, fired: Sequence[FiredEvent]) -> str:
-    """Write what has taken effect in a run so far (fields as in the contract)."""
+    """Return the events of a run so far as JSON (fields as in the contract)."""
     return json.dumps({'epoch': epoch, 'fired': [asdict(event) for event in fired]})
 
 
@@ -230,7 +230,7 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
     """
     Read `/scenario/events`.
 
-    :return: the epoch, and what took effect in it, in order.
+    :return: the epoch, and the events that took effect in it, in order.
     :raises InputError: if it is not what `events_document` writes.
     """
     try:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The driven vehicles of a run, as `/scenario/game` describes them."""
+"""The driven vehicles of a run, as in `/scenario/game`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from crgame_ros.schema.reading import read
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 
-# Parameters of a vehicle that are no numbers.
+# Parameters of a vehicle that are not numbers.
 TEXTS = ('name', 'steering_ratio', 'powertrain')
 VEHICLE_ID = re.compile(r'(hv|av)\d{1,3}')
 
@@ -22,11 +22,11 @@ VEHICLE_ID = re.compile(r'(hv|av)\d{1,3}')
 @dataclass(frozen=True)
 class DrivenVehicle:
     """
-    What humans and AVs have in common.
+    The common fields of humans' vehicles and AVs.
 
     :param id: hv0, av0, …
     :param vehicle: its parameters.
-    :param state: in which it begins the run, of the rear axle, in frame map.
+    :param state: initial state of the rear axle, in frame map.
     """
 
     id: str  # noqa: A003
@@ -39,8 +39,8 @@ class DrivenHuman(DrivenVehicle):
     """
     A human's vehicle.
 
-    :param driver: where its command comes from, as in a game file.
-    :param timeline: text of the timeline that it plays, empty where it plays none.
+    :param driver: source of its commands, as in a game file.
+    :param timeline: text of the timeline that it plays, empty without one.
     :param dynamics: name and options of the model that moves it; None is that of CRG 2-4.
     """
 
@@ -72,7 +72,7 @@ def read_human(entry: Mapping[str, Any]) -> DrivenHuman:
     """
     Read an entry of `humans`.
 
-    :raises InputError: or one of `MALFORMED`, if it is something else.
+    :raises InputError: or one of `MALFORMED`, if it is malformed.
     """
     return DrivenHuman(**_common(entry), driver=str(entry['driver']),
                        timeline=str(entry.get('timeline') or ''), dynamics=entry.get('dynamics'))
@@ -82,7 +82,7 @@ def read_av(entry: Mapping[str, Any]) -> DrivenAv:
     """
     Read an entry of `avs`.
 
-    :raises InputError: or one of `MALFORMED`, if it is something else.
+    :raises InputError: or one of `MALFORMED`, if it is malformed.
     """
     perception = entry.get('perception')
     return DrivenAv(
@@ -100,7 +100,7 @@ def _common(entry: Mapping[str, Any]) -> dict[str, Any]:
     state = _finite(entry['state'])
     if len(state) != STATE_WIDTH:
         raise ValueError(f'{name} has no state of {STATE_WIDTH} numbers')
-    # JSON has no infinity: null is a limit that is none.
+    # JSON has no infinity: null means no limit.
     parameters: dict[str, Any] = {
         str(key): str(value) if key in TEXTS else math.inf if value is None else float(value)
         for key, value in entry['vehicle'].items()}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading and writing the events of a game file and of `/scenario/game`."""
+"""Reads and writes the events of a game file and of `/scenario/game`."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ _COMMON = ('name', 'label', 'kind', 'when')
 
 
 def document_entry(event: EventSpec) -> dict[str, Any]:
-    """Return an event as `/scenario/game` has it: name, label, kind, when and its parameters."""
+    """Return an event's entry of `/scenario/game`: name, label, kind, when and its parameters."""
     entry = write(event)
     parameters = entry.pop(event.kind)
     return {'name': None, 'label': None, 'kind': event.kind, 'when': None} | entry | parameters
@@ -21,9 +21,9 @@ def document_entry(event: EventSpec) -> dict[str, Any]:
 
 def parse_document_entries(entries: Any, where: str) -> tuple[EventSpec, ...]:
     """
-    Read what `document_entry` writes.
+    Read the entries that `document_entry` writes.
 
-    :raises InputError: if it is something else.
+    :raises InputError: if they are malformed.
     """
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise InputError('"events" is no list of events', where)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The events of a game: what an experimenter triggers, or a condition (FS, external triggers)."""
+"""The events of a game, triggered by an experimenter or a condition (FS, external triggers)."""
 
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
@@ -11,7 +11,7 @@ from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Advice, Keyed, Listed, Named, Parts, Within, Wording
 
 MAX_EVENTS = 100
-# Names every agent of traffic.
+# Stands for every agent of traffic.
 ALL_AGENTS = 'all'
 _SEE = 'see docs/games.md for the keys'
 Metres = Annotated[float, Within(0.0, above=True)]
@@ -21,7 +21,7 @@ PutType = Literal['constructionZone', 'parkedVehicle', 'roadBoundary', 'unknown'
 @dataclass(frozen=True)
 class Release:
     """
-    Let a recorded obstacle go, which stands at its first pose until then.
+    Release a recorded obstacle, which stands at its first pose until then.
 
     :param object: obstacle id.
     """
@@ -34,7 +34,7 @@ class Release:
 @dataclass(frozen=True)
 class Brake:
     """
-    Slow a recorded obstacle down along its own path, to a speed that it then keeps.
+    Slow down a recorded obstacle along its own path, to a speed that it then keeps.
 
     :param object: obstacle id.
     :param deceleration: [m/s^2]
@@ -51,14 +51,14 @@ class Brake:
 @dataclass(frozen=True)
 class PutObstacle:
     """
-    Put a static obstacle, a rectangle.
+    Place a static, rectangular obstacle.
 
     :param x: of its centre [m]
     :param y: of its centre [m]
     :param yaw: [rad]
     :param length: [m]
     :param width: [m]
-    :param type: CommonRoad's name of what it is.
+    :param type: CommonRoad's obstacle type.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -77,7 +77,7 @@ class SpeedLimit:
     Set the speed limit.
 
     :param speed: [m/s]
-    :param lanelets: ids of lanelets; all where none is named.
+    :param lanelets: ids of lanelets; all if empty.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -121,10 +121,10 @@ class PlannerSwap:
 @dataclass(frozen=True)
 class PlannerRun:
     """
-    Stop an AV's planner, or let it go on: while stopped it is asked for no plan.
+    Stop or restart an AV's planner: a stopped planner gets no requests.
 
     :param av: its id.
-    :param run: whether it runs from then on.
+    :param run: whether it runs afterwards.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -136,18 +136,18 @@ class PlannerRun:
 @dataclass(frozen=True)
 class TrafficChange:
     """
-    Let one agent of traffic, or all of them, drive otherwise; None leaves things as they are.
+    Change the driving of one agent of traffic, or of all; None leaves a value unchanged.
 
-    :param agent: id of the agent, or `all`: whoever comes later included.
-    :param speed_factor: desired speed over speed limit; of all, its mean.
-    :param desired_speed: whatever the limit, instead [m/s]
-    :param options: of the car-following model, besides those that it has.
+    :param agent: id of the agent, or `all`, which includes later agents.
+    :param speed_factor: desired speed over speed limit; for all, its mean.
+    :param desired_speed: desired speed instead, independent of the limit [m/s]
+    :param options: of the car-following model, in addition to its present ones.
     :param politeness: weight of others' loss when changing lanes for speed (MOBIL).
     :param lane_changes: whether it changes lanes.
-    :param reaction_time: after which it does what it has decided [s]
-    :param imperfection: random share of its greatest acceleration by which it fails to do so.
+    :param reaction_time: delay between its decision and the execution [s]
+    :param imperfection: random deviation, as a share of its greatest acceleration.
     :param red_runner: whether it ignores traffic lights.
-    :param late_yielder: whether it sees late that it has to yield.
+    :param late_yielder: whether it notices late that it has to yield.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -164,7 +164,7 @@ class TrafficChange:
     late_yielder: bool | None = None
 
     def check(self) -> None:
-        """Refuse to change nothing, and one thing twice."""
+        """Refuse an event without changes, and two changes of one thing."""
         if self == TrafficChange(self.agent):
             raise InputError('changes nothing', '', 'give what is to change, such as speed_factor')
         if self.speed_factor is not None and self.desired_speed is not None:
@@ -175,7 +175,7 @@ class TrafficChange:
 @dataclass(frozen=True)
 class AtTime:
     """
-    From a time on.
+    A condition that holds from a time on.
 
     :param time: since the start of the run [s]
     """
@@ -186,7 +186,7 @@ class AtTime:
 @dataclass(frozen=True)
 class AtStep:
     """
-    From a scenario time step on: how a recorded run's events are repeated.
+    A condition that holds from a scenario time step on, to repeat a recorded run's events.
 
     :param step: scenario time step k.
     """
@@ -197,7 +197,7 @@ class AtStep:
 @dataclass(frozen=True)
 class Near:
     """
-    While the centre of a vehicle or object is within a circle.
+    A condition that holds while the centre of a vehicle or object is within a circle.
 
     :param vehicle: its id.
     :param x: of the circle's centre [m]
@@ -214,10 +214,10 @@ class Near:
 @dataclass(frozen=True)
 class Between:
     """
-    While the centres of two vehicles or objects are near each other.
+    A condition that holds while the centres of two vehicles or objects are near each other.
 
     :param between: their two ids.
-    :param distance: that they are at most apart [m]
+    :param distance: maximum distance between them [m]
     """
 
     between: Annotated[tuple[str, str], Parts(('id', 'id')),
@@ -230,12 +230,12 @@ class Between:
             raise InputError(f'"between" is {short(self.between)}', '', 'name two ids')
 
 
-# What agents of traffic do otherwise from then on.
+# Orders that change the agents of traffic.
 TrafficOrder = SpeedLimit | TrafficChange
 Action = Release | Brake | PutObstacle | TrafficOrder | PlanDisplay | PlannerSwap | PlannerRun
 Condition = AtTime | AtStep | Near | Between
 
-# The key of each action in a game file, which is its kind everywhere else.
+# The key of each action in a game file, used as its kind elsewhere.
 ACTIONS: dict[str, type[Action]] = {
     'release': Release, 'brake': Brake, 'obstacle': PutObstacle, 'speed_limit': SpeedLimit,
     'traffic': TrafficChange, 'plan_display': PlanDisplay, 'planner': PlannerSwap,
@@ -247,9 +247,9 @@ class EventSpec:
     """
     One event of a game; it takes effect at most once in a run.
 
-    :param name: by which it is triggered.
-    :param action: what it does.
-    :param label: text for people; without it the name.
+    :param name: the name to trigger it by.
+    :param action: its action.
+    :param label: displayed text; by default the name.
     :param when: condition under which it fires by itself; None leaves it to triggers.
     """
 
@@ -262,18 +262,18 @@ class EventSpec:
     when: Condition | None = None
 
     def __post_init__(self) -> None:
-        """Let the name be the label where there is none."""
+        """Set the name as the default label."""
         if not self.label:
             object.__setattr__(self, 'label', self.name)
 
     @property
     def kind(self) -> str:
-        """Key of its action."""
+        """Return the key of its action."""
         return next(key for key, kind in ACTIONS.items() if type(self.action) is kind)
 
     @property
     def object_id(self) -> str | None:
-        """Id of the obstacle that it changes or puts; None if it leaves all as they are."""
+        """Return the id of the obstacle that it changes or places; None for other events."""
         if isinstance(self.action, Release | Brake):
             return f'o{self.action.object}'
         return f'e_{self.name}' if isinstance(self.action, PutObstacle) else None
@@ -293,9 +293,9 @@ class FiredEvent:
     """
     An event that took effect.
 
-    :param name: of the event; `contact of hv0 with av0` where a contact stopped a vehicle, and
-        `put back hv0` where its driver had it put back on its lane.
-    :param n: simulation step; of an event of the game a tick of the scenario.
+    :param name: of the event; `contact of hv0 with av0` if a contact stopped a vehicle, and
+        `put back hv0` if its driver had it put back on its lane.
+    :param n: simulation step; for an event of the game a tick of the scenario.
     :param k: scenario time step.
     :param by: what made it fire.
     """
@@ -307,22 +307,22 @@ class FiredEvent:
 
     @classmethod
     def contact(cls, vehicle_id: str, other_id: str, n: int, k: int) -> 'FiredEvent':
-        """Return that a vehicle was stopped where it touched somebody."""
+        """Return the event of a contact that stopped a vehicle."""
         return cls(f'{_CONTACT}{vehicle_id}{_WITH}{other_id}', n, k, 'contact')
 
     @classmethod
     def put_back(cls, vehicle_id: str, n: int, k: int) -> 'FiredEvent':
-        """Return that a vehicle stands on its lane at n, and was elsewhere before."""
+        """Return the event of a vehicle that was put back on its lane at n."""
         return cls(f'{PUT_BACK} {vehicle_id}', n, k, 'driver')
 
     @property
     def vehicle(self) -> str | None:
-        """Name the vehicle that was put back; None of any other event."""
+        """Return the vehicle that was put back; None for any other event."""
         return self.name.removeprefix(f'{PUT_BACK} ') if self.by == 'driver' else None
 
     @property
     def touching(self) -> tuple[str, str] | None:
-        """Name the vehicle that a contact stopped, and whom it touched; None of other events."""
+        """Return the vehicle that a contact stopped and the one it touched; None otherwise."""
         if self.by != 'contact':
             return None
         vehicle, _, other = self.name.removeprefix(_CONTACT).partition(_WITH)
@@ -330,5 +330,5 @@ class FiredEvent:
 
     @property
     def is_of_game(self) -> bool:
-        """Whether the game has an event of this name."""
+        """Return whether the game has an event of this name."""
         return self.by in ('trigger', 'condition')

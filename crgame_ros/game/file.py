@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading game files: YAML in, a checked `Game` or one clear error out."""
+"""Reads game files: YAML to a checked `Game`, or one clear error."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
     """
     Check the content of a game file.
 
-    :param values: what YAML gave.
+    :param values: the parsed YAML.
     :param where: file name for messages.
     :param base: directory against which its file names are resolved.
     """
@@ -35,7 +35,7 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
 
 def dump_game(game: Game) -> str:
     """
-    Write a game file that gives the same game from anywhere: its file names are absolute.
+    Return a game file that gives the same game from any folder: its file names are absolute.
 
     :return: YAML text.
     """

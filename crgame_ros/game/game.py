@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The game file: who takes part in a scenario, driven by what, under which rules."""
+"""The game file: the participants of a scenario, their drivers and the rules."""
 
 from dataclasses import dataclass, field
 import math
@@ -28,18 +28,18 @@ from crgame_ros.schema.marks import (
 from crgame_ros.vehicle.parameters import DEFAULT_VEHICLE
 
 Light = Literal['day', 'dusk']
-# On a clear day [m].
+# Visibility on a clear day [m].
 CLEAR_M = 30_000.0
 
 
 @dataclass(frozen=True)
 class EnvironmentSpec:
     """
-    Light and air, as people see the world; no sensor of an AV knows of them.
+    Light and air in the displayed world; they do not affect the sensors of AVs.
 
-    :param light: day or dusk; None takes what the scenario says, else day.
+    :param light: day or dusk; None takes the scenario's, else day.
     :param visibility: meteorological visibility, at which 5 % of a contrast is left (Koschmieder)
-        [m]; None takes what the scenario says, else 30 km.
+        [m]; None takes the scenario's, else 30 km.
     """
 
     FORM: ClassVar[Form] = Form('see docs/games.md for the keys')
@@ -56,14 +56,14 @@ Speed = Annotated[float, Within(-100.0, 100.0)]
 
 
 class DriverName(Named):
-    """Where a human's command comes from; what stands behind the colon may be a file."""
+    """The source of a human's commands; the part after the colon may be a file."""
 
     def resolved(self, name: str, base: Path) -> str:
-        """Leave the name: a driver's file is found when it is opened."""
+        """Return the name unchanged: a driver's file is resolved when it is opened."""
         return name
 
     def written(self, name: str, base: Path) -> str:
-        """Make the file's name absolute; a device's name is none."""
+        """Return the name with an absolute file name; a device's name is not a file."""
         kind, colon, argument = name.partition(':')
         if not colon or kind == 'evdev':
             return name
@@ -88,7 +88,7 @@ class ModelSpec:
 @dataclass(frozen=True)
 class TrackerSpec:
     """
-    What steers a tracked AV along its plan (FS II-C1).
+    The controller that steers a tracked AV along its plan (FS II-C1).
 
     :param model: the tracking controller.
     :param pose: whether it steers by the true pose or by the estimated one.
@@ -97,7 +97,7 @@ class TrackerSpec:
     FORM: ClassVar[Form] = Form('name a tracker', short='name', rest='model')
 
     model: ModelSpec = ModelSpec('lqr')
-    # YAML reads a bare true as a truth value.
+    # YAML reads a bare true as a boolean.
     pose: Annotated[Literal['true', 'estimated'], Meaning(True, 'true')] = 'true'
 
 
@@ -141,10 +141,10 @@ class HumanSpec:
     One human's vehicle.
 
     :param id: hv0, hv1, …
-    :param driver: where its command comes from: auto, cockpit, idle, evdev[:NAME], keys:FILE,
-        joy:FILE, joy, policy:FILE.py:load, replay:BAG.
+    :param driver: source of its commands: auto, cockpit, idle, evdev[:NAME], keys:FILE, joy:FILE,
+        joy, policy:FILE.py:load, replay:BAG.
     :param vehicle: name of the vehicle parameters.
-    :param spawn: where it starts; None places it beside or behind the first AV, where it can.
+    :param spawn: where it starts; None places it beside or behind the first AV, where possible.
     :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
 
@@ -174,8 +174,8 @@ class AvSpec:
     :param tracker: the controller of a tracked AV.
     :param dynamics: the vehicle model of a tracked AV (FS 2).
     :param perception: how it perceives the world; None is perfectly.
-    :param lights: whether its planner is told of others' indicators and horn; None is as the
-        planner's class says.
+    :param lights: whether its planner receives others' indicators and horn; None takes the default
+        of the planner's class.
     """
 
     FORM: ClassVar[Form] = _SEE
@@ -201,10 +201,10 @@ class AvSpec:
 @dataclass(frozen=True)
 class PredictionSpec:
     """
-    What a planner is told about the future of others.
+    The predictions of others that a planner receives.
 
-    :param mode: `constant` (nobody's future is known), `recorded` (recorded obstacles' true
-        future), `plans` (other AVs' current plans); the last two leak.
+    :param mode: `constant` (no knowledge of the future), `recorded` (recorded obstacles' true
+        future), `plans` (other AVs' current plans); the last two leak the future.
     :param horizon: H_pred [s].
     """
 
@@ -217,13 +217,13 @@ class PredictionSpec:
 @dataclass(frozen=True)
 class DrivabilitySpec:
     """
-    Which checks run, and whether a human's violation ends the run (CRG III-D).
+    The checks of drivability, and whether a human's violation ends the run (CRG III-D).
 
-    :param collision: whether contacts are looked for.
+    :param collision: whether contacts are checked.
     :param road: whether vehicles have to stay on the road.
     :param stop: whether a human's violation ends the run.
-    :param contact: what a contact does to a vehicle that a person drives: `through` lets it
-        drive on through what it touches; `stop` lets it stand at once, and only drive away.
+    :param contact: effect of a contact on a vehicle with a human driver: with `through` it drives
+        on through the other; with `stop` it stops immediately and can only drive away.
     """
 
     FORM: ClassVar[Form] = _SEE
@@ -241,16 +241,17 @@ class TimingSpec:
 
     :param rate: simulation rate [Hz]; the step becomes Delta t_c / N exactly (CRG 14).
     :param pacing: wait for the wall-clock schedule.
-    :param frame_skipping: obey the supervisor's orders to suppress messages for people.
+    :param frame_skipping: obey the supervisor's orders to suppress display messages.
     :param drift_reset: re-anchor the schedule when the lag exceeds `reset_threshold`.
     :param measured_interval: integrate humans over the measured, clipped interval (CRG 13).
-    :param clip: `carry` brings what the clip cuts off into later steps, `drop` is the paper.
+    :param clip: `carry` moves the clipped time into later steps, `drop` discards it as in the
+        paper.
     :param dt_min: Delta t_min [s].
     :param dt_max: Delta t_max [s].
     :param skip_threshold: lag above which frames are skipped [s].
     :param reset_threshold: lag above which the schedule is re-anchored [s].
     :param warm_up_steps: steps without reset at the start.
-    :param max_catch_up_steps: late steps in a row after which orders are served all the same.
+    :param max_catch_up_steps: late steps in a row after which orders are processed anyway.
     :param realign: `time` follows the request's stamp, `nearest` is CRG 16.
     :param sample: `interpolate` between plan states, `floor` is CRG 15.
     """
@@ -273,7 +274,7 @@ class TimingSpec:
     sample: Literal['interpolate', 'floor'] = 'interpolate'
 
     def check(self) -> None:
-        """Refuse bounds that are crossed."""
+        """Refuse bounds in the wrong order."""
         if self.dt_min > self.dt_max:
             raise InputError('"dt_min" is larger than "dt_max"')
 
@@ -281,26 +282,26 @@ class TimingSpec:
 @dataclass(frozen=True)
 class Game:
     """
-    A game as its file says it, before the scenario is loaded.
+    The content of a game file, before the scenario is loaded.
 
-    :param title: one line for people.
+    :param title: one displayed line.
     :param scenario: path of the CommonRoad file.
     :param humans: the humans' vehicles.
     :param avs: the AVs; None makes one of each planning problem.
-    :param duration: simulated seconds until the run ends; infinite if nobody says.
+    :param duration: simulated seconds until the run ends; infinite by default.
     :param seed: seed of everything random.
-    :param prediction: what planners are told of others' future.
+    :param prediction: the predictions of others that planners receive.
     :param drivability: which checks run.
     :param timing: the time controller.
     :param base: directory against which file names inside the game are resolved.
-    :param events: what triggers and conditions bring about.
+    :param events: actions that triggers and conditions start.
     :param objects: objects of the game's own (FS II-A3).
     :param traffic: vehicles that react (FS III); None for none.
     :param occupancy: map of permanent obstacles (FS II-A2).
-    :param sound: whether pages may sound and gamepads rumble; `none` for a study without.
-    :param environment: light and air, as people see the world.
-    :param tasks: what drivers are asked to answer or to do besides driving.
-    :param language: of what drivers read while they drive, where the page's address names none.
+    :param sound: whether pages may play sound and gamepads rumble; `none` for a study without.
+    :param environment: light and air in the displayed world.
+    :param tasks: tasks that drivers answer or do besides driving.
+    :param language: of the texts for drivers during the drive, if the page's address names none.
     """
 
     FORM: ClassVar[Form] = Form(
@@ -321,21 +322,21 @@ class Game:
     objects: Annotated[ObjectList, LeftOut()] = ()
     traffic: TrafficSpec | None = None
     occupancy: Annotated[Path, Advice('name the YAML file of a map')] | None = None
-    # YAML reads a bare on as a truth value.
+    # YAML reads a bare on as a boolean.
     sound: Annotated[Literal['on', 'none'], Meaning(True, 'on'), LeftOut()] = 'on'
     environment: EnvironmentSpec | None = None
     tasks: Annotated[TaskList, LeftOut()] = ()
     language: Annotated[Literal['en', 'de'], LeftOut()] = 'en'
 
     def _repr_html_(self) -> str:
-        """Show it in a notebook as its file says it."""
+        """Return the game file as HTML for notebooks."""
         from html import escape
 
         from crgame_ros.game.file import dump_game
         return f'<pre>{escape(dump_game(self))}</pre>'
 
     def check(self) -> None:
-        """Refuse more vehicles than anybody can follow."""
+        """Refuse more than `MAX_VEHICLES` vehicles."""
         count = len(self.humans) + len(self.avs or ())
         if count > MAX_VEHICLES:
             raise InputError(f'{count} humans and AVs', '', f'have {MAX_VEHICLES} at most')

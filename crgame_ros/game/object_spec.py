@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The objects that a game adds to its scenario (FS II-A3), and what each type is like."""
+"""The objects that a game adds to its scenario (FS II-A3), and the defaults of their types."""
 
 from collections.abc import Mapping, Sequence
 import csv
@@ -40,7 +40,7 @@ def read_trajectory(name: str, base: Path, where: str) -> tuple[TrajectoryRow, .
     Read a CSV file with the columns t,x,y or t,x,y,yaw.
 
     :param name: of the file, relative to `base`, in which it must be.
-    :param where: for messages that are about the name.
+    :param where: for messages about the name.
     :raises InputError: naming the file, the line and the remedy.
     """
     try:
@@ -87,11 +87,11 @@ def _as_number(text: str) -> float | str:
 def checked_trajectory(rows: Any, where: str,
                        places: Sequence[str] = ()) -> tuple[TrajectoryRow, ...]:
     """
-    Check the rows of a trajectory; where none has a yaw it is the direction of motion.
+    Check the rows of a trajectory; without yaws, use the direction of motion.
 
     :param rows: lists of t [s], x [m], y [m] and perhaps yaw [rad].
     :param where: for messages.
-    :param places: where each row stands, if not in a list.
+    :param places: position of each row for messages, if not in a list.
     :raises InputError: naming the row and the remedy.
     """
     if not isinstance(rows, list | tuple) or not 2 <= len(rows) <= MAX_ROWS:
@@ -127,7 +127,7 @@ def _check_step(before: tuple[float, ...], row: tuple[float, ...], place: str) -
 
 
 def _with_headings(rows: Sequence[tuple[float, ...]]) -> tuple[TrajectoryRow, ...]:
-    """Fill in missing headings: where it goes next, and at rest where it went last."""
+    """Fill in missing headings by the next motion, and at rest by the last motion."""
     if len(rows[0]) == 4:
         return tuple((row[0], row[1], row[2], row[3]) for row in rows)
     headings: list[float | None] = []
@@ -150,16 +150,16 @@ STATIC_TYPES = ('unknown', 'parkedVehicle', 'constructionZone', 'roadBoundary', 
 @dataclass(frozen=True)
 class MoverType:
     """
-    How things of one type look and move, unless a game says otherwise.
+    The default shape and motion of one type of object.
 
     :param shape: around the centre.
     :param speed: [m/s]
-    :param acceleration: that it likes to have at most; of a particle the hardest, in any
+    :param acceleration: largest comfortable one; for a particle the largest possible, in any
         direction [m/s^2]
     :param deceleration: comfortable [m/s^2]
-    :param hardest: deceleration [m/s^2]
-    :param headway: time gap behind what is ahead, the T of the IDM; of a particle the time gap in
-        the traffic that it accepts to cross [s]
+    :param hardest: largest deceleration [m/s^2]
+    :param headway: time headway to the leader, the T of the IDM; for a particle the time gap in
+        traffic that it accepts for crossing [s]
     :param distance: gap at standstill, the s0 of the IDM [m]
     :param wheelbase: [m]
     :param steering: largest angle [rad]
@@ -181,7 +181,7 @@ class MoverType:
 
     @property
     def sharpest(self) -> float:
-        """Largest curvature of the rear axle's path, tan(steering) / wheelbase [1/m]."""
+        """Return the largest curvature of the rear axle's path, tan(steering)/wheelbase [1/m]."""
         return 0.0 if self.wheelbase == 0.0 else math.tan(self.steering) / self.wheelbase
 
 
@@ -231,42 +231,43 @@ class Rows(Special):
         return checked_trajectory(given, f'{where}: {key}')
 
     def json_schema(self) -> dict[str, Any]:
-        """Describe both."""
+        """Return the JSON Schema of both forms."""
         row = {'type': 'array', 'items': {'type': 'number'}, 'minItems': 3, 'maxItems': 4}
         return {'anyOf': [{'type': 'string'}, {'type': 'array', 'items': row, 'minItems': 2,
                                                'maxItems': MAX_ROWS}]}
 
     def __str__(self) -> str:
-        """Return what is wanted."""
+        """Return the expected form."""
         return 'a CSV file, or a list of rows [t, x, y, yaw]'
 
 
 @dataclass(frozen=True)
 class ObjectSpec:
     """
-    One object of a game; what is None is taken from its type (`MOVER_TYPES`).
+    One object of a game; None values are taken from its type (`MOVER_TYPES`).
 
-    Exactly one of `at`, `path`, `lanelet` and `trajectory` says where it is.
+    Exactly one of `at`, `path`, `lanelet` and `trajectory` gives its position.
 
-    :param id: unique name, b0, b1, … by default; hv0, av0, o0, t0 and e_… are others'.
+    :param id: unique name, b0, b1, … by default; hv0, av0, o0, t0 and e_… are reserved.
     :param kind: movement model: static, particle (goes in any direction), bicycle (kinematic:
         everything on wheels).
-    :param type: CommonRoad's name of what it is; the first of its kind by default, a car with
+    :param type: CommonRoad's obstacle type; the first of its kind by default, a car with
         `lanelet`.
-    :param size: length and width of its rectangle [m]; without size and radius that of its type.
+    :param size: length and width of its rectangle [m]; by default, without radius, those of its
+        type.
     :param at: pose of its centre [m, m, rad]
     :param path: way-points of its centre [m]
     :param trajectory: predetermined states t [s], x [m], y [m], yaw [rad], see below.
-    :param lanelet: where it starts; it goes on along the straightest successors, 5 km at most.
+    :param lanelet: its first lanelet; it continues along the straightest successors, 5 km at most.
     :param s: station of its centre on that lanelet [m]
-    :param speeds: that it wants at each way-point, linear in between [m/s]
-    :param start: time since the start of the run at which it sets off [s]; until then it stands at
-        its beginning, and one that starts at 0 moves at its speed already.
-    :param end: what it does at its end; it stays by default at that of a path alone.
-    :param reactive: whether it minds others.
+    :param speeds: desired speed at each way-point, linear in between [m/s]
+    :param start: time since the start of the run at which it starts to move [s]; until then it
+        stands at its beginning. An object that starts at 0 moves at its speed from the beginning.
+    :param end: its behaviour at its end; by default it stays only at the end of a path.
+    :param reactive: whether it reacts to others.
     :param radius: of its circle, instead of a size [m]
-    :param speed: that it wants, instead of speeds [m/s]
-    :param acceleration: that it likes to have at most; of a particle the most in any direction
+    :param speed: desired speed, instead of speeds [m/s]
+    :param acceleration: largest comfortable one; for a particle the largest in any direction
         [m/s^2]
     :param deceleration: comfortable [m/s^2]
     :param headway: T of the IDM, or the time gap that a particle accepts [s]
@@ -305,7 +306,7 @@ class ObjectSpec:
     distance: Annotated[float, Within(0.0, 50.0, above=True), _DRIVEN] | None = None
 
     def __post_init__(self) -> None:
-        """Give it what its kind and place mean, where it does not say."""
+        """Set the defaults that follow from its kind and position."""
         if self.end is None:
             object.__setattr__(self, 'end', 'stay' if self.path or self.at else 'vanish')
         if not self.type:
@@ -313,7 +314,7 @@ class ObjectSpec:
                                else TYPES[self.kind][0])
 
     def check(self) -> None:
-        """Refuse what contradicts itself."""
+        """Refuse contradicting values."""
         if self.size is not None and self.radius is not None:
             raise InputError('has a size and a radius', '', 'leave one out')
         if self.path:
@@ -323,7 +324,7 @@ class ObjectSpec:
 
     @property
     def shape(self) -> Shape:
-        """Footprint around its centre; a static one of unknown size measures 1 m by 1 m."""
+        """Return the footprint around its centre; a static one of unknown size is 1 m by 1 m."""
         if self.radius is not None:
             return Shape.circle(self.radius)
         if self.size is not None:
@@ -335,7 +336,7 @@ class ObjectSpec:
 
     @property
     def mover(self) -> MoverType:
-        """Return what its type is like, with everything that the game says otherwise."""
+        """Return the defaults of its type, overridden by the game."""
         base = MOVER_TYPES[self.type]
         own = {name: getattr(self, name) for name in
                ('speed', 'acceleration', 'deceleration', 'headway', 'distance')}

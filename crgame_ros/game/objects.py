@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What can appear in a run, and where it is at a scenario time step."""
+"""The objects that can appear in a run, and their states at a scenario time step."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 class Role(Enum):
-    """Who moves an object."""
+    """The part of the program that moves an object."""
 
     HUMAN = 'human'
     AUTONOMOUS = 'autonomous'
@@ -34,7 +34,7 @@ class ObjectDescription:
     :param id: name used in joint names: hv0, av0, o<obstacle id> for scenario obstacles, t0 for
         agents of traffic, and the game's own names for its objects (scripted, or static).
     :param type: CommonRoad obstacle type in its XML spelling (car, pedestrian, parkedVehicle…).
-    :param role: who moves it.
+    :param role: what moves it.
     :param shape: footprint around its centre.
     :param rear_to_center: distance from the reference point forward to the centre [m]; the
         reference point is the rear axle of driven vehicles and the centre (0 m) of all others.
@@ -48,14 +48,14 @@ class ObjectDescription:
 
     @property
     def reference_point(self) -> str:
-        """Name the reference point of the object's poses: rear_axle or center."""
+        """Return the reference point of the object's poses: rear_axle or center."""
         return 'rear_axle' if self.role.is_ego else 'center'
 
 
 @dataclass(frozen=True)
 class ObjectStates:
     """
-    Where M objects that are not driven vehicles are at one scenario time step.
+    The states of M objects other than driven vehicles at one scenario time step.
 
     :param poses: (M, 3) centre x [m], y [m], yaw [rad] in frame map; NaN where absent.
     :param velocities: (M, 3) derivatives of the poses [m/s, m/s, rad/s]; NaN where absent.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a game file says of an AV's perception (FS II-B)."""
+"""The perception of an AV in a game file (FS II-B)."""
 
 from dataclasses import dataclass, field
 import math
@@ -26,12 +26,12 @@ Seed = Annotated[int, Within(0, 2**63 - 1)]
 @dataclass(frozen=True)
 class LocalisationSpec:
     """
-    Biased white noise on the true pose, and what the filter is fed with besides (FS II-B1).
+    Biased white noise on the true pose, and the further inputs of the filter (FS II-B1).
 
     The pose is measured at `rate`, as by satellite receiver and compass; speed at `rate` by wheel
     encoders, also in dropouts; changes of speed and heading at each simulation step by an inertial
-    unit. Defaults: a differential receiver with 10 Hz, and inertial sensors of the grade built
-    into cars. The filter knows every noise but no bias.
+    unit. Defaults: a differential receiver with 10 Hz, and inertial sensors of automotive grade.
+    The filter knows every noise but no bias.
 
     :param position_noise: standard deviation of a measured x or y [m]
     :param yaw_noise: of a measured heading [rad]
@@ -42,10 +42,10 @@ class LocalisationSpec:
     :param rate: of measurements [Hz]
     :param acceleration_noise: velocity random walk of the inertial unit [m/s/sqrt(s)]
     :param yaw_rate_noise: angle random walk of the inertial unit [rad/sqrt(s)]
-    :param motion_noise: how far the filter takes the vehicle to move off its kinematic model; not
-        injected [m/sqrt(s)]
-    :param dropout_rate: how often the pose gets lost, as in an urban canyon [1/s]
-    :param dropout_duration: how long it stays lost [s]
+    :param motion_noise: deviation from the kinematic model that the filter assumes; not injected
+        [m/sqrt(s)]
+    :param dropout_rate: frequency of pose dropouts, as in an urban canyon [1/s]
+    :param dropout_duration: their duration [s]
     """
 
     FORM: ClassVar[Form] = Form('give {} for a noisy pose, null for the true one')
@@ -79,12 +79,12 @@ class SensorSpec:
     :param horizon: range [m]
     :param rays: number of rays over the field of view
     :param rate: of scans [Hz]
-    :param latency: from a scan to its objects being known [s]
+    :param latency: from a scan to the output of its objects [s]
     :param range_noise: standard deviation of a ray's range, for display and recording [m]
     :param position_noise: of an object's x or y, once for each scan [m]
     :param yaw_noise: of its heading [rad]
     :param velocity_noise: of each component of its velocity; static objects have none [m/s]
-    :param min_rays: rays that have to reach an object for it to be seen
+    :param min_rays: number of rays that have to hit an object for its detection
     :param options: further constructor arguments of a model of the user's own
     """
 
@@ -122,9 +122,9 @@ class PerceptionSpec:
     """
     An AV's perception.
 
-    :param localisation: None knows the true pose
-    :param sensors: an empty list sees everything, as it is
-    :param memory: how long an object is remembered after the first scan that misses it [s]
+    :param localisation: None gives the true pose
+    :param sensors: an empty list gives the true states of all objects
+    :param memory: how long an object is kept after the first scan that misses it [s]
     :param seed: of all its noise; None takes the game's
     """
 

@@ -11,7 +11,7 @@ NS_PER_S = 1_000_000_000
 
 def replanning_period(time_step_s: float, dt_s: float) -> int:
     """
-    Count the simulation steps in a scenario step, N = max(1, round(Delta t_c / Delta t)) (CRG 14).
+    Return the simulation steps per scenario step, N = max(1, round(Delta t_c / Delta t)) (CRG 14).
 
     :param time_step_s: scenario step Delta t_c [s]
     :param dt_s: requested simulation step [s]
@@ -22,7 +22,7 @@ def replanning_period(time_step_s: float, dt_s: float) -> int:
 @dataclass(frozen=True)
 class ScenarioScheduler:
     """
-    Both time grids, kept as integers so that they never drift apart.
+    Both time grids, as integers so that they never drift apart.
 
     The simulation step is Delta t_c / N exactly, even where the requested rate doesn't divide the
     scenario step; stamps are rounded down to nanoseconds from the exact quotient.
@@ -42,7 +42,7 @@ class ScenarioScheduler:
     def from_rate(
         cls, time_step_s: float, rate_hz: float, k0: int = 0, clock_offset_ns: int = 0,
     ) -> 'ScenarioScheduler':
-        """Choose N for a requested simulation rate [Hz]."""
+        """Build the grids with N for a requested simulation rate [Hz]."""
         time_step_ns = round(time_step_s * NS_PER_S)
         if time_step_ns <= 0:
             raise InputError(f'scenario step {time_step_s} s is not positive', 'timeStepSize')
@@ -51,12 +51,12 @@ class ScenarioScheduler:
 
     @property
     def time_step_s(self) -> float:
-        """Scenario step Delta t_c [s]."""
+        """Return the scenario step Delta t_c [s]."""
         return self.time_step_ns / NS_PER_S
 
     @property
     def dt_s(self) -> float:
-        """Nominal simulation step Delta t [s]."""
+        """Return the nominal simulation step Delta t [s]."""
         return self.time_step_ns / self.steps_per_tick / NS_PER_S
 
     def stamp_ns(self, n: int) -> int:
@@ -86,5 +86,5 @@ class ScenarioScheduler:
         return ticks * self.steps_per_tick if rest == 0 and ticks >= 0 else None
 
     def steps_for(self, duration_s: float) -> int:
-        """Count the simulation steps in a duration [s], rounded to the nearest."""
+        """Return the number of simulation steps in a duration [s], rounded to the nearest."""
         return round(duration_s * NS_PER_S * self.steps_per_tick / self.time_step_ns)

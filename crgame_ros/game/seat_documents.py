@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who sits in which seat, as JSON text: parts of `/seats`, `/seats/order` and `/seats/drivers`."""
+"""The persons in seats as JSON text: parts of `/seats`, `/seats/order` and `/seats/drivers`."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
@@ -20,12 +20,12 @@ MAX_SOURCE_LENGTH = 40
 @dataclass(frozen=True)
 class SeatPerson:
     """
-    Somebody in a seat, by what they said of themselves and nothing else.
+    A person in a seat, described only by their own entries.
 
-    :param id: the same as long as the person's page is the same.
+    :param id: constant for the lifetime of the person's page.
     :param name: as typed.
-    :param device: what the hands are on.
-    :param browser: in which the page is, empty outside a browser.
+    :param device: the input device in use.
+    :param browser: of the page, empty outside a browser.
     :param role: in the experiment.
     """
 
@@ -39,11 +39,11 @@ class SeatPerson:
 @dataclass(frozen=True)
 class SeatOccupant:
     """
-    Who has a seat, or had it last.
+    The present or last occupant of a seat.
 
-    :param person: who.
+    :param person: the occupant.
     :param here: false once the connection to their page has ended.
-    :param ready: whether they have said so at the start.
+    :param ready: whether they have confirmed to be ready at the start.
     """
 
     person: SeatPerson
@@ -54,12 +54,12 @@ class SeatOccupant:
 @dataclass(frozen=True)
 class SeatDemand:
     """
-    What an order says; None is: says nothing of it.
+    The content of an order; None means unchanged.
 
     :param seat: the vehicle.
-    :param source: whose commands it shall obey.
-    :param person: who takes the seat, or how the person in it is described now.
-    :param displaced: id of the person whose place is taken: the order holds for no other.
+    :param source: the source of its commands.
+    :param person: the new occupant, or a new description of the present one.
+    :param displaced: id of the person who is displaced: the order is valid for no other.
     :param left: id of the person whose connection has ended.
     :param ready: whether the person in the seat is ready.
     """
@@ -78,11 +78,11 @@ class DrivingSpell:
     One stretch of steps in which a seat was driven by one source and one person.
 
     :param seat: the vehicle.
-    :param source: whose commands it obeyed.
-    :param driver: the source that the game names.
+    :param source: the source of its commands.
+    :param driver: the driver source named by the game.
     :param person: in a cockpit; None elsewhere, and while the seat was left.
     :param from_n: the first step.
-    :param until_n: the step from which on somebody else drove; None while it lasts.
+    :param until_n: the first step of the next spell; None if it has not ended.
     """
 
     seat: str
@@ -94,7 +94,7 @@ class DrivingSpell:
 
 
 def seat_entry(source: str, driver: str, tenant: SeatOccupant | None) -> dict[str, Any]:
-    """Write what `/seats` says of a seat."""
+    """Return a seat's entry of `/seats`."""
     entry: dict[str, Any] = {'source': source, 'driver': driver}
     if tenant is not None:
         entry.update(person=asdict(tenant.person), here=tenant.here, ready=tenant.ready)
@@ -103,9 +103,9 @@ def seat_entry(source: str, driver: str, tenant: SeatOccupant | None) -> dict[st
 
 def parse_tenants(text: str) -> dict[str, SeatOccupant]:
     """
-    Read who has the seats from `/seats`.
+    Read the occupants of the seats from `/seats`.
 
-    :raises InputError: if it is not what the contract says.
+    :raises InputError: if it does not follow the contract.
     """
     try:
         return {str(name): SeatOccupant(_person(entry['person']), entry['here'] is True,
@@ -116,7 +116,7 @@ def parse_tenants(text: str) -> dict[str, SeatOccupant]:
 
 
 def demand_text(demand: SeatDemand) -> str:
-    """Write an order."""
+    """Return an order as JSON."""
     content = {key: value for key, value in asdict(demand).items() if value is not None}
     return json.dumps(content)
 
@@ -125,7 +125,7 @@ def parse_demand(text: str) -> SeatDemand:
     """
     Read an order.
 
-    :raises InputError: if it is none.
+    :raises InputError: if it is malformed.
     """
     try:
         content = json.loads(text)
@@ -144,7 +144,7 @@ def parse_demand(text: str) -> SeatDemand:
 
 
 def spells_document(epoch: int, spells: Iterable[DrivingSpell]) -> str:
-    """Write `/seats/drivers`."""
+    """Return the text of `/seats/drivers`."""
     return json.dumps({'epoch': epoch, 'drivers': [asdict(item) for item in spells]})
 
 
@@ -152,7 +152,7 @@ def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
     """
     Read `/seats/drivers`.
 
-    :return: the epoch, and who drove in it.
+    :return: the epoch, and its driving spells.
     :raises InputError: if it is not what `spells_document` writes.
     """
     try:
@@ -172,7 +172,7 @@ def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
 
 
 def is_short(text: object, length: int, least: int = 1) -> bool:
-    """Return whether something is a text of one line that can be shown."""
+    """Return whether a value is a printable text of one line."""
     return isinstance(text, str) and least <= len(text) <= length and text.isprintable()
 
 

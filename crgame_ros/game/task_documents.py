@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the simulation and pages tell each other of tasks: log, state and reports."""
+"""The messages about tasks between the simulation and pages: log, state and reports."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -17,11 +17,11 @@ LOG_TOPIC = '/tasks/log'
 STATE_TOPIC = '/tasks/state'
 REPORT_TOPIC = '/tasks/report'
 MAX_NUMBER = 1_000_000
-# No time that a page reports is longer [ms].
+# Longest time in a page's report [ms].
 LONGEST_MS = 600_000.0
 
-# What happens in a task: it begins and ends, a light or a request comes and is seen, somebody
-# answers (to `unrequested` answers there was no stimulus), a stimulus or a request is over.
+# Kinds of task entries: the task begins or ends; a stimulus or request comes, is shown, or is
+# over; the driver answers (`unrequested` answers had no stimulus).
 TaskHappening = Literal['begin', 'end', 'stimulus', 'request', 'shown', 'answer', 'unrequested',
                         'missed', 'over']
 
@@ -29,13 +29,13 @@ TaskHappening = Literal['begin', 'end', 'stimulus', 'request', 'shown', 'answer'
 @dataclass(frozen=True)
 class PageTimes:
     """
-    What a page has measured by its own clock [ms].
+    The times that a page has measured by its own clock [ms].
 
-    :param response_ms: from the picture that first showed the stimulus to the answer, without
-        pauses of the run; None where nothing was answered.
-    :param delay_ms: from the stimulus's onset to that picture, by the page's estimate.
-    :param picture_ms: from that picture to the next: how exactly the page knows the first.
-    :param paused_ms: of pauses between picture and answer, which the response time leaves out.
+    :param response_ms: from the first video frame with the stimulus to the answer, without pauses
+        of the run; None without an answer.
+    :param delay_ms: from the stimulus's onset to that frame, by the page's estimate.
+    :param picture_ms: from that frame to the next: the uncertainty of the first.
+    :param paused_ms: pauses between frame and answer, which the response time leaves out.
     """
 
     response_ms: float | None = None
@@ -50,14 +50,14 @@ NOT_MEASURED = PageTimes()
 @dataclass(frozen=True)
 class TaskEntry:
     """
-    Something that has happened in a task.
+    An entry in the log of a task.
 
     :param n: simulation step.
     :param task: its name.
     :param kind: of task.
     :param seat: the vehicle whose driver it is for.
-    :param what: has happened.
-    :param number: of the stimulus or request, from 1; 0 where it is about none.
+    :param what: kind of entry.
+    :param number: of the stimulus or request, from 1; 0 for entries without one.
     :param by: what made the task begin or end (condition, trigger), a request end (driven, time),
         what an answer is (hit, premature), or why a stimulus was missed (unseen).
     :param times: as the page has measured them.
@@ -95,11 +95,11 @@ class OpenPrompt:
 @dataclass(frozen=True)
 class TaskReport:
     """
-    What a page has shown, or its driver answered.
+    A page's report that it has shown a stimulus or request, or that its driver answered.
 
     :param seat: the vehicle whose driver it is.
     :param task: name of the task.
-    :param number: of the stimulus or request; 0 for an answer to none.
+    :param number: of the stimulus or request; 0 for an answer without one.
     :param what: `shown` or `answer`.
     :param times: as the page has measured them.
     """
@@ -112,7 +112,7 @@ class TaskReport:
 
 
 def log_document(epoch: int, entries: Sequence[TaskEntry]) -> str:
-    """Write `/tasks/log`: what has happened at one step."""
+    """Return the text of `/tasks/log`: the entries of one step."""
     return json.dumps({'epoch': epoch, 'entries': [asdict(entry) for entry in entries]})
 
 
@@ -120,7 +120,7 @@ def parse_log(text: str) -> tuple[int, tuple[TaskEntry, ...]]:
     """
     Read `/tasks/log`.
 
-    :return: the epoch, and what has happened, in order.
+    :return: the epoch, and the entries, in order.
     :raises InputError: if it is not what `log_document` writes.
     """
     try:
@@ -132,7 +132,7 @@ def parse_log(text: str) -> tuple[int, tuple[TaskEntry, ...]]:
 
 
 def state_document(epoch: int, running: Sequence[str], prompts: Sequence[OpenPrompt]) -> str:
-    """Write `/tasks/state`: which tasks run, and what is open now."""
+    """Return the text of `/tasks/state`: the running tasks and the open prompts."""
     return json.dumps({'epoch': epoch, 'running': list(running),
                        'open': [asdict(prompt) for prompt in prompts]})
 
@@ -156,7 +156,7 @@ def parse_state(text: str) -> tuple[int, dict[str, Any]]:
 
 
 def report_text(report: TaskReport) -> str:
-    """Write `/tasks/report`."""
+    """Return the text of `/tasks/report`."""
     return json.dumps(asdict(report))
 
 

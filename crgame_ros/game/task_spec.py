@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tasks of a game: what somebody is asked to answer or to do besides driving."""
+"""The tasks of a game, which drivers answer or do besides driving."""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
@@ -18,15 +18,15 @@ TaskKind = Literal['detection_response', 'take_over', 'secondary_task']
 @dataclass(frozen=True)
 class DetectionResponse:
     """
-    The visual detection response task (ISO 17488): a red light, to be answered by a button.
+    The visual detection response task (ISO 17488): the driver answers a red light by a button.
 
     Each light is a stimulus. The first answer to it counts.
 
-    :param interval: shortest and longest time from one onset to the next, of which every one is
-        equally likely [s]
+    :param interval: shortest and longest time from one onset to the next, drawn uniformly [s]
     :param shown: the light goes out with its answer, at the latest after this time [s]
-    :param earliest: an earlier answer is premature, seconds after the onset [s]
-    :param latest: a later answer answers nothing, and the stimulus is missed [s]
+    :param earliest: an answer earlier than this time after the onset is premature [s]
+    :param latest: an answer later than this time after the onset does not count, and the stimulus
+        is missed [s]
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -38,7 +38,7 @@ class DetectionResponse:
     latest: Annotated[float, Within(0.1, 60.0)] = 2.5
 
     def check(self) -> None:
-        """Refuse two stimuli at one time, and times that are crossed."""
+        """Refuse overlapping stimuli, and times in the wrong order."""
         shortest, longest = self.interval
         if shortest > longest:
             raise InputError('"interval" has its longest time first')
@@ -52,13 +52,13 @@ class DetectionResponse:
 @dataclass(frozen=True)
 class TakeOverPrompt:
     """
-    A request to take over, seen and heard.
+    A visible and audible request to take over.
 
-    :param lead: time from the request to what it is about [s]
-    :param before: name of the event that it is about. The request comes so long before the time
-        of that event; an event without a time is triggered so long after the request.
-    :param shown: so long after the lead the request disappears, unless somebody drives the
-        vehicle before [s]
+    :param lead: time from the request to its event [s]
+    :param before: name of the event that the request announces. The request comes `lead` before
+        the time of that event; an event without a time is triggered `lead` after the request.
+    :param shown: time after the lead at which the request disappears, if no driver takes over
+        before [s]
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -71,9 +71,9 @@ class TakeOverPrompt:
 @dataclass(frozen=True)
 class SecondaryTask:
     """
-    A stretch in which the driver does something else.
+    A period in which the driver does another task.
 
-    :param show: whether the driver reads the label while it lasts.
+    :param show: whether the label is shown to the driver during the task.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -103,12 +103,12 @@ TASKS: dict[TaskKind, type[Task]] = {
 @dataclass(frozen=True)
 class TaskSpec:
     """
-    One task of a game. Its button begins it too, and ends what lasts.
+    One task of a game. Its button also begins it, and ends it if it has a duration.
 
-    :param name: by which it is known in tables.
-    :param task: what is to be done.
-    :param label: what the driver reads, of a take-over request and a secondary task; without it
-        words in the language of the page, or the name.
+    :param name: its name in tables.
+    :param task: the kind of task, with its parameters.
+    :param label: text of a take-over request or a secondary task for the driver; by default words
+        in the language of the page, or the name.
     :param seat: the vehicle whose driver it is for; the first human's by default.
     :param when: condition under which it begins by itself; None leaves it to the button, and a
         take-over request to the time of its event.
@@ -128,13 +128,13 @@ class TaskSpec:
     until: Annotated[TaskCondition | None, LeftOut()] = None
 
     def check(self) -> None:
-        """Refuse an end of what has no length."""
+        """Refuse an end of a task without duration."""
         if isinstance(self.task, TakeOverPrompt) and self.until is not None:
             raise InputError('a take-over request has "until"', '', 'give it "shown"')
 
     @property
     def kind(self) -> TaskKind:
-        """Key of what is to be done."""
+        """Return the key of the kind of task."""
         return next(key for key, kind in TASKS.items() if type(self.task) is kind)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a game file says about traffic."""
+"""The traffic in a game file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,17 +20,17 @@ ReactionTime = Annotated[float, Within(0.0, MAX_REACTION_TIME)]
 @dataclass(frozen=True)
 class TrafficSpec:
     """
-    Traffic of intelligent agents (FS section III); the defaults put nobody on the road.
+    Traffic of intelligent agents (FS section III); the defaults place no agent on the road.
 
     :param recorded: `reactive` turns recorded vehicles that drive on lanes into agents.
-    :param agents: how many are placed on the road at the start.
+    :param agents: number placed on the road at the start.
     :param flow: arrivals at each lane that begins at the edge of the map [vehicles/h]
-    :param capacity: most agents at a time besides the recorded ones; None takes what `agents` and
-        `flow` want, at most 300.
+    :param capacity: maximum number of agents at a time besides the recorded ones; None derives it
+        from `agents` and `flow`, at most 300.
     :param model: car following: acc (FS 3), idm, or a class of your own.
     :param options: of the car-following model.
     :param lane_changes: whether agents change lanes (FS 4).
-    :param cooperative: whether agents make room for one that has to change (Hidas 2005).
+    :param cooperative: whether agents open a gap for an agent that has to change (Hidas 2005).
     :param swerve: whether agents swerve around standing obstacles (M1).
     :param seed: of everything random here; None takes the game's.
     :param speed_factor: mean of desired speed over speed limit.
@@ -38,11 +38,12 @@ class TrafficSpec:
     :param truck_share: share of trucks among agents that were not recorded.
     :param lateral_acceleration: comfortable in curves [m/s^2]
     :param politeness: weight of others' loss when changing lanes for speed (MOBIL).
-    :param reaction_time: after which a driver does what it has decided [s]
-    :param imperfection: random share of its greatest acceleration by which a driver fails to do so
+    :param reaction_time: delay between a driver's decision and its execution [s]
+    :param imperfection: random deviation of a driver, as a share of its greatest acceleration
         (sigma of Krauss 1998).
-    :param red_runners: share of drivers who ignore traffic lights, for tests of AVs.
-    :param late_yielders: share of drivers who see late that they have to yield, for tests of AVs.
+    :param red_runners: share of drivers that ignore traffic lights, for tests of AVs.
+    :param late_yielders: share of drivers that notice late that they have to yield, for tests of
+        AVs.
     """
 
     FORM: ClassVar[Form] = Form('see docs/traffic.md for the keys', short='recorded',

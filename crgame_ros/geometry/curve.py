@@ -14,18 +14,18 @@ FloatArray = NDArray[np.float64]
 
 # Points times segments handled at once, which bounds the memory of a projection.
 _CHUNK = 2_000_000
-# Up to so many points are refined one by one: calls of numpy take longer than their arithmetic.
+# Up to this many points are refined one by one: numpy calls cost more than the arithmetic.
 _FEW = 12
 
 
 class Curve:
     """
-    Points by their arc lengths s, and offsets d to the left; straight beyond both ends.
+    A curve with arc lengths s and lateral offsets d to the left; straight beyond both ends.
 
     Positions are linear between the points, and headings too, so that lines of constant d are
     continuous where the curve bends.
 
-    :param points: (n, 2), n >= 2, no two of them in a row the same [m]
+    :param points: (n, 2), n >= 2, no two successive ones equal [m]
     :param s: (n) their arc lengths, the first 0 [m]
     :param heading: (n) the directions there, unwrapped: no jumps of 2 pi [rad]
     """
@@ -38,7 +38,7 @@ class Curve:
     @classmethod
     def from_polyline(cls, points: FloatArray) -> 'Curve':
         """
-        Make a curve of vertices, at which the heading is between those of the segments.
+        Build a curve from vertices; the heading at a vertex is between those of its segments.
 
         :param points: (n, 2), n >= 2, not all equal; repeated ones are dropped [m]
         """
@@ -50,7 +50,7 @@ class Curve:
 
     @property
     def length(self) -> float:
-        """Length [m]."""
+        """Return the length [m]."""
         return float(self.s[-1])
 
     @cached_property
@@ -71,9 +71,9 @@ class Curve:
     @cached_property
     def _spans(self) -> tuple[list[float], list[tuple[float, ...]], list[float]]:
         """
-        Return the arc lengths, the segments and `_bends` for what counts with numbers.
+        Return the arc lengths, the segments and `_bends` as lists, for scalar code.
 
-        A segment is the x and y where it begins, its direction's, the heading and its slope.
+        A segment holds x and y of its start, x and y of its direction, the heading and its slope.
         """
         slopes = np.diff(self.heading) / np.diff(self.s)
         rows = np.column_stack((self.points[:-1], self.directions, self.heading[:-1], slopes))
@@ -81,7 +81,7 @@ class Curve:
 
     def place(self, s: float) -> tuple[float, float, float, float, float]:
         """
-        Return what `pose_at` does at one arc length [m], and the arc length itself.
+        Return one arc length [m] and the values of `pose_at` there.
 
         :return: s, x [m], y [m], heading [rad] and curvature [1/m]
         """
@@ -137,7 +137,7 @@ class Curve:
         return self._settle(points, self.s[best] + inside[row, best])
 
     def _settle(self, points: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Move s until each point lies on the normal of the interpolated heading, or is best."""
+        """Move s until each point is on the normal of the interpolated heading, or nearest."""
         error = np.full_like(s, np.inf)
         trial = s
         d = np.zeros_like(s)
@@ -159,8 +159,8 @@ class Curve:
 
         :param points: (N, 2); NaN gives NaN [m]
         :param guess: (N) arc lengths [m]
-        :param rounds: of correction.
-        :param exact: ends them earlier when all points are so near to their normals [m]
+        :param rounds: number of corrections.
+        :param exact: stop earlier once all points are this close to their normals [m]
         :return: arc lengths s and offsets d to the left, both (N) [m]
         """
         if len(points) <= _FEW:
@@ -180,7 +180,7 @@ class Curve:
 
     def _refine_few(self, points: list[list[float]], s: list[float], rounds: int,
                     exact: float) -> tuple[FloatArray, FloatArray]:
-        """Do as `refine` does, to the last bit, with numbers."""
+        """Compute the result of `refine`, bit for bit, with scalars."""
         aside, steps, place = [0.0] * len(s), [0.0] * len(s), self.place
         for left in range(rounds, -1, -1):
             near = exact > 0.0
@@ -198,7 +198,7 @@ class Curve:
         return np.array(s), np.array(aside)
 
     def _within(self, s: FloatArray) -> FloatArray:
-        """Return the arc lengths from which points beyond the ends are seen: their own."""
+        """Return the arc lengths unchanged: the curve is straight beyond its ends."""
         return s
 
 

@@ -22,7 +22,7 @@ Primitive: TypeAlias = pycrcc.RectOBB | pycrcc.Circle | pycrcc.Triangle
 def outline(shape: Shape, circle_corners: int = CIRCLE_CORNERS,
             encloses: bool = True) -> NDArray[np.float64]:
     """
-    Return the corners (C, 2) of a shape around its centre, in turn [m].
+    Return the corners (C, 2) of a shape around its centre, in order [m].
 
     :param circle_corners: of the polygon that stands for a circle.
     :param encloses: whether that polygon lies around the circle, or its corners on it.
@@ -63,7 +63,7 @@ def placed_at(corners: NDArray[np.float64], x: float, y: float,
 def half_extents(lengths: NDArray[np.float64], widths: NDArray[np.float64],
                  turn: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """
-    Return half of what rectangles extend along and across a direction, each of the same shape [m].
+    Return the half extents of rectangles along and across a direction, arrays of one shape [m].
 
     :param turn: from that direction to the rectangles' own [rad]
     """
@@ -95,7 +95,7 @@ class Footprint:
 
     def at(self, x: float, y: float, yaw: float) -> list[Primitive]:
         """
-        Place the shape as collision objects, of which any that is hit is a hit.
+        Place the shape as collision objects; the shape is hit if any of them is.
 
         :param x: centre [m]
         :param y: centre [m]
@@ -134,7 +134,7 @@ def triangle_corners(polygons: shapely.Geometry | NDArray[np.object_]) -> NDArra
     :return: (n, 3, 2) corners of the triangles.
     """
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons))
-    # The ring of a triangle is closed: its first corner comes again.
+    # The ring of a triangle is closed: it repeats the first corner.
     return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Polylines in the plane, and the smooth, uniformly sampled path that is made of them."""
+"""Polylines in the plane, and smooth, uniformly sampled paths made of them."""
 
 import math
 
@@ -19,7 +19,7 @@ WIDTHS = (2.5, 4.0, 6.0, 9.0)
 
 class ReferencePath(Curve):
     """
-    A smooth curve, tabulated uniformly over its arc length; it ends at both its ends.
+    A smooth curve, tabulated uniformly over its arc length, without extension beyond its ends.
 
     :param step: distance between samples [m]
     :param points: (N, 2) positions [m]
@@ -95,7 +95,7 @@ class ReferencePath(Curve):
         return index, position - index
 
     def place(self, s: float) -> tuple[float, float, float, float, float]:
-        """Return what `pose_at` does at one arc length [m], and that arc length on the path."""
+        """Return the arc length clipped to the path [m], and the values of `pose_at` there."""
         # Comparisons take a third of the time of `min` and `max`.
         if s < 0.0:
             s = 0.0
@@ -139,7 +139,7 @@ class ReferencePath(Curve):
         return s.reshape(shape), d.reshape(shape)
 
     def _within(self, s: Array) -> Array:
-        """Return arc lengths on the path: points beyond it are seen from its ends."""
+        """Return arc lengths clipped to the path: points beyond it are projected to its ends."""
         return np.minimum(np.maximum(s, 0.0), self.length)
 
     def locate(self, x: float, y: float, guess: float) -> tuple[float, float, float]:

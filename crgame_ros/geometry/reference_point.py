@@ -22,9 +22,9 @@ def ahead(x: float, y: float, yaw: float, distance: float) -> tuple[float, float
 
 def joined(*parts: Array) -> Array:
     """
-    Return numbers as columns (..., n), in half of the time that `numpy.stack` takes.
+    Return arrays as columns (..., n), in half of the time of `numpy.stack`.
 
-    :param parts: of the first one's shape (...), or those that are the same for all of it.
+    :param parts: arrays of the first one's shape (...), or scalars for all of it.
     """
     result = np.empty((*parts[0].shape, len(parts)))
     for column, part in enumerate(parts):
@@ -59,7 +59,7 @@ def beside(poses: Array, d: Array) -> Array:
 
 def seen_from(poses: Array, points: Array) -> tuple[Array, Array]:
     """
-    Return how far points are ahead of poses, and how far to their left.
+    Return the distances of points ahead of poses and to their left.
 
     :param poses: (..., 3 or more) x [m], y [m], yaw [rad]
     :param points: (..., 2) [m]

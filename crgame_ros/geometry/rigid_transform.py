@@ -15,7 +15,7 @@ Pose = tuple[float, float, float]
 @dataclass(frozen=True)
 class RigidTransform:
     """
-    Map poses from simulation to scenario coordinates, p_sc = R p_sim + d (CRG 9).
+    A map of poses from simulation to scenario coordinates, p_sc = R p_sim + d (CRG 9).
 
     :param yaw_offset: Delta psi [rad] (CRG 6), which defines R (CRG 7).
     :param offset_x: first component of d [m] (CRG 8).
@@ -46,7 +46,7 @@ class RigidTransform:
 
     @property
     def is_identity(self) -> bool:
-        """Return whether the transform leaves every pose as it is."""
+        """Return whether the transform leaves every pose unchanged."""
         return self.yaw_offset == 0.0 and self.offset_x == 0.0 and self.offset_y == 0.0
 
     def to_scenario(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ class RigidTransform:
                          wrap_pi_array(poses[..., 2] + self.yaw_offset)), axis=-1)
 
     def turn_to_scenario(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Turn vectors (..., 2), velocities for one, from simulation to scenario coordinates."""
+        """Rotate vectors (..., 2), such as velocities, from simulation to scenario coordinates."""
         cos, sin = math.cos(self.yaw_offset), math.sin(self.yaw_offset)
         x, y = vectors[..., 0], vectors[..., 1]
         return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)

@@ -53,7 +53,7 @@ class Shape:
 
     @property
     def radius(self) -> float:
-        """Radius of the circle around the centre that encloses the shape [m]."""
+        """Return the radius of the circle around the centre that encloses the shape [m]."""
         if self.kind == 'circle':
             return 0.5 * self.length
         if self.kind == 'polygon':

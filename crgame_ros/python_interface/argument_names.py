@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Refusals of what a command line would have said, in the words of Python's arguments."""
+"""Rewrites error messages about command line options to name Python arguments."""
 
 from collections.abc import Iterator
 import contextlib
@@ -13,7 +13,7 @@ _NAMES = {'--planner': 'planner', '--driver': 'driver', '--problem': 'problems',
 
 @contextlib.contextmanager
 def argument_names() -> Iterator[None]:
-    """Name the argument, not the option."""
+    """Rewrite errors to name the argument instead of the option."""
     try:
         yield
     except InputError as error:

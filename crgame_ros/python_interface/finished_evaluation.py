@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluating planners from Python: the plan's cells computed, and their tables."""
+"""Evaluates planners from Python: computes a plan's cells and reads their tables."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ import pyarrow.parquet as pq
 @dataclass(frozen=True)
 class FinishedEvaluation:
     """
-    An evaluation whose cells are computed.
+    An evaluation with computed cells.
 
-    :param folder: of it.
-    :param tally: how many cells there are, and how many failed.
+    :param folder: of the evaluation.
+    :param tally: number of cells, and of failed ones.
     """
 
     folder: Path
@@ -46,14 +46,14 @@ class FinishedEvaluation:
 def evaluate(plan: EvaluationPlan | Mapping[str, Any] | FileName, folder: FileName, *,
              computing: Computing | None = None) -> FinishedEvaluation:
     """
-    Compute the cells of a plan, as `crgame evaluate` does: what is finished stays finished.
+    Compute the cells of a plan, as `crgame evaluate` does; finished cells are kept.
 
-    Workers are processes of their own, so planners are named, not given as classes.
+    Workers are separate processes, so planners are given by name, not as classes.
 
-    :param plan: a plan, its file, or what such a file says (docs/evaluation.md); file names in it
+    :param plan: a plan, its file, or the content of a file (docs/evaluation.md); file names in it
         are resolved against the file's folder, or the present one.
-    :param folder: of the evaluation; an unfinished one goes on.
-    :param computing: where and how; None for this machine's cores.
+    :param folder: of the evaluation; an unfinished one is resumed.
+    :param computing: the computing resources; None for this machine's cores.
     :raises InputError: if plan or folder cannot be used.
     :raises CrgameError: if Dask is missing, or the scheduler is lost.
     """

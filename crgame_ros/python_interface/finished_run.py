@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run that is over, whoever drove it: what happened, and what is measured of it."""
+"""The interface of a finished run, offline or recorded: its data and its measures."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -20,7 +20,7 @@ from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # They take a second to import, and not everybody asks for measures.
+if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
     from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
     from crgame_ros.analysis.report.run import ReportRun
@@ -33,9 +33,9 @@ if TYPE_CHECKING:  # They take a second to import, and not everybody asks for me
 
 class Run(ABC):
     """
-    A run: everything that is measured is measured when somebody asks for it.
+    A run; measures are computed at their first use.
 
-    :ivar name: for people.
+    :ivar name: displayed name.
     """
 
     def __init__(self, name: str) -> None:
@@ -44,52 +44,52 @@ class Run(ABC):
     @property
     @abstractmethod
     def log(self) -> RunTrajectories:
-        """Return how everybody moved, at the scenario's time steps."""
+        """Return the motion of all vehicles and objects, at the scenario's time steps."""
 
     @property
     @abstractmethod
     def record(self) -> RunRecord:
-        """Return the log, and what drivers did, and events."""
+        """Return the log, the drivers' commands and the events."""
 
     @property
     @abstractmethod
     def outcome(self) -> Mapping[str, Any] | None:
-        """Return planners, violations and contacts, as `timing.json` has them; None: not known."""
+        """Return planners, violations and contacts as in `timing.json`; None if unknown."""
 
     @property
     def answers(self) -> 'dict[str, PlanRecord]':
-        """Return what planners answered, by AV, as far as it is known."""
+        """Return the known answers of planners, by AV."""
         from crgame_ros.analysis.scores.plan_record import plans_of_report
         return plans_of_report(self.outcome)
 
     @property
     def contacts(self) -> list[dict[str, Any]] | None:
-        """Return the first contacts, as `timing.json` has them; None where nobody knows."""
+        """Return the first contacts as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['contacts']
 
     @property
     def violations(self) -> list[dict[str, Any]] | None:
-        """Return what was violated, as `timing.json` has it; None where nobody knows."""
+        """Return the violations as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['drivability']['list']
 
     @property
     @abstractmethod
     def notices(self) -> tuple[str, ...]:
-        """Return what is to be known of it, one line each."""
+        """Return notices about the run, one line each."""
 
     @property
     def state_hash(self) -> str | None:
-        """Return the SHA-256 over all states of an offline run; None of a recording."""
+        """Return the SHA-256 over all states of an offline run; None for a recording."""
         return None
 
     @property
     def timing(self) -> Mapping[str, Any] | None:
-        """Return what `timing.json` says; None of an offline run, or without recorded cycles."""
+        """Return the content of `timing.json`; None if offline or without recorded cycles."""
         return None
 
     @property
     def bag(self) -> Path | None:
-        """Name its recording; None of an offline run."""
+        """Return the path of its recording; None for an offline run."""
         return None
 
     @property
@@ -104,7 +104,7 @@ class Run(ABC):
 
     @property
     def duration_s(self) -> float:
-        """Return how long it lasted, on the scenario's time line [s]."""
+        """Return its duration on the scenario's time line [s]."""
         return float((len(self.log.ks) - 1) * self.game.scheduler.time_step_s)
 
     @property
@@ -117,7 +117,7 @@ class Run(ABC):
         """
         Return the rear-axle states (K, 8) of a driven vehicle, columns as in `StateColumn`.
 
-        :raises KeyError: if it takes no part.
+        :raises KeyError: if it is not in the run.
         """
         if vehicle_id not in self.vehicles:
             raise KeyError(vehicle_id)
@@ -129,18 +129,18 @@ class Run(ABC):
 
     @abstractmethod
     def setup_against(self, planner: str) -> Setup:
-        """Return the same game with another planner, to drive its humans again."""
+        """Return the same game with another planner, to replay its humans."""
 
     @abstractmethod
     def recorded_inputs(self) -> RecordedInputs | None:
-        """Return what its humans did; None where the setup names the recording that has it."""
+        """Return its humans' inputs; None if the setup names their recording."""
 
     @abstractmethod
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
 
     def recorded_plans(self) -> 'Callable[[], Iterable[RecordedPlan]] | None':
-        """Return what reads the recorded plans one by one; None where nobody keeps them."""
+        """Return a function that reads the recorded plans one by one; None without plans."""
         return None
 
     @cached_property
@@ -176,10 +176,10 @@ class Run(ABC):
 
     def scores(self, expert: 'Run | None' = None) -> 'dict[str, VehicleScores]':
         """
-        Score who drove, by vehicle (docs/scores.md).
+        Score the driven vehicles (docs/scores.md).
 
         :param expert: run whose first human's progress is the measure.
-        :raises InputError: if nobody drives in it, or it cannot be exported.
+        :raises InputError: if it has no driven vehicle, or cannot be exported.
         """
         from crgame_ros.analysis.scores.run_expert import expert_of_run
         from crgame_ros.analysis.scores.scored_run import score_run
@@ -197,16 +197,16 @@ class Run(ABC):
         return tables_of([self.tabulated(scores)])
 
     def tabulated(self, scores: bool = True) -> 'TableRun':
-        """Return it as tables want it."""
+        """Return the run in the form for tables."""
         from crgame_ros.analysis.tables.table_run import TableRun
         return TableRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
                         self.recorded_plans(), self._offline, scores)
 
     def reported(self, key: str = 'run1') -> 'ReportRun':
         """
-        Return it as reports want it.
+        Return the run in the form for reports.
 
-        :param key: tells it from others of a report.
+        :param key: unique in the report.
         """
         from crgame_ros.analysis.report.run import measured_run
         return replace(measured_run(self.name, self.bag, self.record, self.timing,
@@ -214,7 +214,7 @@ class Run(ABC):
 
     def report(self, path: FileName) -> Path:
         """
-        Write one HTML file that tells of it (docs/report.md).
+        Write the report of the run as one HTML file (docs/report.md).
 
         :raises InputError: if the file cannot be written.
         """
@@ -226,11 +226,11 @@ class Run(ABC):
 
     def save_scenario(self, path: FileName) -> Path:
         """
-        Write it as a CommonRoad scenario; what that cannot express is a warning.
+        Write the run as a CommonRoad scenario; warn about parts that it cannot express.
 
         :param path: file (`*.xml`), or folder for `<benchmark id>.xml`.
         :return: the file.
-        :raises InputError: if it cannot be written, or is no exported run.
+        :raises InputError: if it cannot be written, or an existing file is not an exported run.
         """
         from crgame_ros.recording.export import prepare_folder
         out = as_path(path, 'path')
@@ -241,7 +241,7 @@ class Run(ABC):
 
     @abstractmethod
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
-        """Write the scenario; give its file, and what it does not express."""
+        """Write the scenario; return its file, and the parts that it does not express."""
 
     def __repr__(self) -> str:
         who = ', '.join((*(item.id for item in self.game.humans),
@@ -254,6 +254,6 @@ class Run(ABC):
 
 
 def warn_of(notices: Iterable[str]) -> None:
-    """Let notebooks show remarks."""
+    """Show notices as warnings."""
     for notice in notices:
         warnings.warn(notice, stacklevel=3)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Games, from files or as they are given."""
+"""Reads games from files, or passes them through."""
 
 from os import fspath, PathLike
 from pathlib import Path
@@ -18,9 +18,9 @@ FileName: TypeAlias = str | PathLike[str]
 
 def load_game(path: FileName) -> Game:
     """
-    Read a game file (YAML), or make a game of a CommonRoad scenario (XML) as `--scenario` does.
+    Read a game file (YAML), or build a game from a CommonRoad scenario (XML) as `--scenario` does.
 
-    `dataclasses.replace` changes what a game says.
+    Use `dataclasses.replace` to change a game.
 
     :raises InputError: naming the file, the key and the remedy.
     """
@@ -32,7 +32,7 @@ def load_game(path: FileName) -> Game:
 
 def as_game(game: Game | FileName | None) -> Game:
     """
-    Return a game, or that of a file; None is the cut-in.
+    Return a game, or read one from a file; None is the cut-in.
 
     :raises InputError: as `load_game`.
     """
@@ -46,7 +46,7 @@ def as_path(path: object, where: str) -> Path:
     Return a path.
 
     :param where: name of the argument.
-    :raises InputError: if it is none.
+    :raises InputError: if it is not a path.
     """
     if isinstance(path, str | PathLike) and isinstance(text := fspath(path), str) and text:
         return Path(text).expanduser()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Driving a game as fast as it goes, without ROS."""
+"""Runs a game as fast as possible, without ROS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -38,9 +38,9 @@ from numpy.typing import NDArray
 
 def run_summary(result: OfflineResult, wall_s: float) -> dict[str, Any]:
     """
-    Return what came of a run, as JSON has it.
+    Return the summary of a run in JSON form.
 
-    :param wall_s: how long it took [s]
+    :param wall_s: its wall time [s]
     """
     simulated_s = (len(result.vehicle_states) - 1) * result.setup.scheduler.dt_s
     return {
@@ -70,10 +70,10 @@ def run_summary(result: OfflineResult, wall_s: float) -> dict[str, Any]:
 
 class OfflineRun(Run):
     """
-    A run that was driven on a virtual clock.
+    A run on a virtual clock.
 
     :ivar result: states of every simulation step, commands, events and violations.
-    :ivar wall_s: how long it took [s]
+    :ivar wall_s: its wall time [s]
     """
 
     def __init__(self, name: str, result: OfflineResult, wall_s: float) -> None:
@@ -83,12 +83,12 @@ class OfflineRun(Run):
 
     @cached_property
     def record(self) -> RunRecord:
-        """Return the log, and what drivers did, and events."""
+        """Return the log, the drivers' commands and the events."""
         return run_record_of(self.result)
 
     @property
     def log(self) -> RunTrajectories:
-        """Return how everybody moved, at the scenario's time steps."""
+        """Return the motion of all vehicles and objects, at the scenario's time steps."""
         return self.record.log
 
     @property
@@ -98,26 +98,26 @@ class OfflineRun(Run):
 
     @cached_property
     def outcome(self) -> Mapping[str, Any]:
-        """Return planners, violations and contacts, as `timing.json` has them."""
+        """Return planners, violations and contacts as in `timing.json`."""
         return offline_outcome(self.result)
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Return what is to be known of the game, one line each."""
+        """Return notices about the game, one line each."""
         return self.result.setup.notices
 
     def summary(self) -> dict[str, Any]:
-        """Return what came of it, as `crgame offline` does."""
+        """Return the summary of the run, as `crgame offline` does."""
         return run_summary(self.result, self.wall_s)
 
     def setup_against(self, planner: str) -> Setup:
-        """Return the same game with another planner, and its events when they were."""
+        """Return the same game with another planner and with events at their original times."""
         setup = self.result.setup
         repeated = replace(setup, game=with_recorded_events(setup.game, self.result.fired))
         return with_planners(repeated, (planner,))
 
     def recorded_inputs(self) -> RecordedInputs:
-        """Return what its humans did."""
+        """Return its humans' inputs."""
         return inputs_of(self.result)
 
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
@@ -125,7 +125,7 @@ class OfflineRun(Run):
         return {name: self.result.states_of(name) for name in self.result.setup.vehicle_ids}
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
-        """Write the scenario; give its file, and what it does not express."""
+        """Write the scenario; return its file, and the parts that it does not express."""
         found = write_scenario(self.log, out)
         return scenario_path(out, found.benchmark_id), found.notices
 
@@ -137,7 +137,7 @@ def run(game: Game | FileName | None = None, *,
         latency_steps: int = 0, triggers: Mapping[str, float] | None = None,
         problems: Sequence[int] = ()) -> OfflineRun:
     """
-    Drive a game on a virtual clock, planners in lockstep: equal arguments give equal states.
+    Run a game on a virtual clock, planners in lockstep: equal arguments give equal states.
 
     :param game: the game, its file, or a CommonRoad scenario; None for the cut-in, or, where the
         driver is a recording, for its own game.
@@ -149,11 +149,11 @@ def run(game: Game | FileName | None = None, *,
     :param duration_s: simulated time; None: the game's, else 20 s [s]
     :param rate_hz: simulation rate; None: the game's [Hz]
     :param latency_steps: simulation steps between a request and its plan.
-    :param triggers: events of the game to trigger, and when after the start [s]
-    :param problems: planning problems that become AVs, where the game names no AVs.
-    :raises InputError: if something that was given cannot be used.
+    :param triggers: events of the game to trigger, with times after the start [s]
+    :param problems: planning problems that become AVs, if the game names no AVs.
+    :raises InputError: if an argument cannot be used.
     """
-    # With a recorded driver and no game it is the game of the recording.
+    # With a recorded driver and no game, the recording's game is used.
     repeats = game is None and driver is not None and parse_source(driver).kind == 'replay'
     chosen = None if repeats else as_game(game)
     named = name_planners(planner)
@@ -173,11 +173,11 @@ def run(game: Game | FileName | None = None, *,
 def drive(name: str, setup: Setup, latency_steps: int = 0,
           triggers: Sequence[tuple[str, float]] = ()) -> OfflineRun:
     """
-    Drive a setup, with the recorded inputs of humans whose driver is a recording.
+    Run a setup, with the recorded inputs of humans whose driver is a recording.
 
-    :param name: of the run, for people.
+    :param name: displayed name of the run.
     :param latency_steps: simulation steps between a request and its plan.
-    :param triggers: names of events, and when each is triggered after the start [s]
+    :param triggers: names of events, with their times after the start [s]
     :raises InputError: as `run_offline`; if the latency is negative.
     """
     if latency_steps < 0:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Planners as Python has them: by name, as classes, or as objects."""
+"""Planners given by name, as classes, or as objects."""
 
 from collections.abc import Sequence
 import inspect
@@ -14,10 +14,10 @@ PlannerLike: TypeAlias = str | type[Planner] | Planner
 
 class NamedPlanners(NamedTuple):
     """
-    Planners under names that a game may have.
+    Planners under names for a game.
 
     :param names: one for all AVs, or one for each; empty for those of the game.
-    :param own: what the names stand for, of those that are no names of the registry.
+    :param own: the planners by those names that are not in the registry.
     """
 
     names: tuple[str, ...]
@@ -25,7 +25,7 @@ class NamedPlanners(NamedTuple):
 
     def check_objects(self, avs: int) -> None:
         """
-        Refuse one object for several AVs: what it remembers of one is wrong for another.
+        Refuse one object for several AVs: its state for one is wrong for another.
 
         :param avs: their number.
         """
@@ -34,7 +34,7 @@ class NamedPlanners(NamedTuple):
 
     def check_object(self, name: str, avs: int) -> None:
         """
-        Refuse a planner that is one object for several AVs.
+        Refuse a planner object for several AVs.
 
         :param avs: their number.
         """
@@ -45,9 +45,9 @@ class NamedPlanners(NamedTuple):
 
 def name_planners(planners: PlannerLike | Sequence[PlannerLike] | None) -> NamedPlanners:
     """
-    Name planners: a class `module:Class`, as a game file would; objects likewise.
+    Return names for planners: `module:Class` for a class, as in a game file; likewise for objects.
 
-    :raises InputError: if something is no planner.
+    :raises InputError: if something is not a planner.
     """
     if planners is None:
         return NamedPlanners((), {})

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of runs, as objects of the same kind as offline runs."""
+"""Recorded runs, with the same interface as offline runs."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, partial
@@ -29,7 +29,7 @@ class RecordedRun(Run):
     """
     A run in a recording: ours or of `ros2 bag record`.
 
-    :param name: for people.
+    :param name: displayed name.
     :param bag: the recording.
     :param log: the run in it.
     """
@@ -40,22 +40,22 @@ class RecordedRun(Run):
 
     @property
     def bag(self) -> Path:
-        """Name its recording."""
+        """Return the path of its recording."""
         return self._bag
 
     @property
     def log(self) -> RunTrajectories:
-        """Return how everybody moved, at the scenario's time steps."""
+        """Return the motion of all vehicles and objects, at the scenario's time steps."""
         return self._log
 
     @cached_property
     def record(self) -> RunRecord:
-        """Return the log, and what drivers did, and events."""
+        """Return the log, the drivers' commands and the events."""
         return record_of_log(self._bag, self._log)
 
     @cached_property
     def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
-        """Return what `timing.json` says, or why nothing does."""
+        """Return the content of `timing.json`, or why there is none."""
         try:
             return timing_report(self._bag, self.game.epoch, self._log), ()
         except CrgameError as error:
@@ -63,17 +63,17 @@ class RecordedRun(Run):
 
     @property
     def timing(self) -> Mapping[str, Any] | None:
-        """Return what `timing.json` says; None of a recording without cycles."""
+        """Return the content of `timing.json`; None for a recording without cycles."""
         return self._timed[0]
 
     @property
     def outcome(self) -> Mapping[str, Any] | None:
-        """Return planners, violations and contacts; None of a recording without cycles."""
+        """Return planners, violations and contacts; None for a recording without cycles."""
         return self.timing
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Return what of the run is not in the recording, one line each."""
+        """Return the parts of the run that the recording lacks, one line each."""
         timing, refusal = self._timed
         told = () if timing is None else timing['notices']
         return tuple(dict.fromkeys((*told, *self._log.notices, *refusal)))
@@ -90,18 +90,18 @@ class RecordedRun(Run):
         return effective_setup(RunRequest(driver=f'replay:{self._bag}', planners=(planner,)))
 
     def recorded_inputs(self) -> None:
-        """Give nothing: the setup names the recording."""
+        """Return None: the setup names the recording."""
 
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return recorded_states(self._bag, self.game.epoch)
 
     def recorded_plans(self) -> Callable[[], Iterable[RecordedPlan]]:
-        """Return what reads the recorded plans one by one."""
+        """Return a function that reads the recorded plans one by one."""
         return partial(read_plans, self._bag, self.game.epoch)
 
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
-        """Write the scenario; give its file, and what it does not express."""
+        """Write the scenario; return its file, and the parts that it does not express."""
         found = convert_log(self._log, self._bag, out)
         return found.path, found.notices
 
@@ -121,7 +121,7 @@ def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:
 
 def as_run(run: Run | FileName) -> Run:
     """
-    Return a run, or that in a folder.
+    Return a run unchanged, or read the run in a folder.
 
     :raises InputError: as `read_run`.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The human of a run again, against other planners."""
+"""Replays the human of a run against other planners."""
 
 from collections.abc import Sequence
 import time
@@ -24,7 +24,7 @@ class ReplayedRun(OfflineRun):
     """
     A run of a recorded human against a planner.
 
-    :ivar alternative: it beside the recorded run.
+    :ivar alternative: its comparison with the recorded run.
     """
 
     def __init__(self, name: str, alternative: Alternative, result: 'OfflineResult',
@@ -34,20 +34,20 @@ class ReplayedRun(OfflineRun):
 
     @property
     def human_differs_s(self) -> float | None:
-        """When a human first is elsewhere than in the recorded run; None: never [s]."""
+        """Return when a human first differs from the recorded run [s]; None: never."""
         return self.alternative.human_differs_s
 
     @property
     def others_differ_s(self) -> float | None:
-        """When anybody but the driven vehicles first is; None: never [s]."""
+        """Return when anything but the driven vehicles first differs [s]; None: never."""
         return self.alternative.others_differ_s
 
 
 class Replays(dict[str, ReplayedRun]):
     """
-    Runs by the names of their planners, in the order in which they were asked for.
+    Runs by the names of their planners, in the requested order.
 
-    :ivar recorded: the run whose human drives.
+    :ivar recorded: the run with the human's recorded drive.
     """
 
     def __init__(self, recorded: Run) -> None:
@@ -64,12 +64,12 @@ def replay(run: Run | FileName, planners: PlannerLike | Sequence[PlannerLike], *
            latency_steps: int = 0,
            human: Literal['inputs', 'trajectory'] = 'inputs') -> Replays:
     """
-    Drive the humans of a run again, against one planner after the other, as `crgame replay` does.
+    Replay the humans of a run against one planner after the other, as `crgame replay` does.
 
     :param run: an offline or a recorded run, or the folder of one.
     :param planners: names, classes or objects; each drives all AVs in a run of its own.
     :param latency_steps: simulation steps between a request and its plan.
-    :param human: what of the humans is repeated: what they did, or where they were.
+    :param human: whether the humans' inputs or their trajectories are repeated.
     :raises InputError: if the run has no human and an AV, or a planner cannot be used.
     """
     recorded = as_run(run)
@@ -83,7 +83,7 @@ def replay(run: Run | FileName, planners: PlannerLike | Sequence[PlannerLike], *
     named = name_planners(planners)
     found = Replays(recorded)
     with argument_names(), PLANNERS.giving(named.own):
-        # Every planner is known before the first of them drives.
+        # Check every planner before the first one drives.
         setups = {name: recorded.setup_against(name) for name in named.names}
         for name in setups:
             PLANNERS.find(name)

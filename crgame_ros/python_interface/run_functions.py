@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is made of one run or of several: measures, reports and tables."""
+"""Functions on one or several runs: measures, reports and tables."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -17,11 +17,11 @@ from crgame_ros.python_interface.recorded_runs import as_run
 def measure(run: Run | FileName, *, thresholds: Thresholds = USUAL,
             requests: Collection[str] = ()) -> RunMeasures:
     """
-    Measure how critical a run was and how people drove, as `crgame measure` does.
+    Measure the criticality and the driving of a run, as `crgame measure` does.
 
     :param run: the run, or its folder.
     :param thresholds: beyond which a value is critical.
-    :param requests: names of the events that ask to take over an AV.
+    :param requests: names of the events that request a take-over of an AV.
     :raises InputError: if the run cannot be read, a threshold is not positive, or an event is
         unknown.
     """
@@ -30,7 +30,7 @@ def measure(run: Run | FileName, *, thresholds: Thresholds = USUAL,
 
 def report(runs: Run | FileName | Sequence[Run | FileName], path: FileName) -> Path:
     """
-    Write one HTML file that tells of a run, or of several side by side, as `crgame report` does.
+    Write the report of one or several runs as one HTML file, as `crgame report` does.
 
     :param runs: runs, or their folders.
     :return: the file.
@@ -54,11 +54,11 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
     """
     Write the tables of runs and their data dictionary into a folder, as `crgame export` does.
 
-    :param runs: runs, or their folders; ids in the tables are told apart.
+    :param runs: runs, or their folders; their ids in the tables are made unique.
     :param to: format of the tables, `parquet` or `csv`.
     :param scores: whether vehicles are scored, which takes most of the time.
     :return: the folder.
-    :raises InputError: if a run cannot be read, or the folder not be written.
+    :raises InputError: if a run cannot be read, or the folder is not writable.
     """
     from crgame_ros.analysis.tables.run_tables import write_tables
     from crgame_ros.analysis.tables.table_run import own_id

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run, or a comparison, as a notebook shows it."""
+"""Shows a run, or a comparison, as HTML in a notebook."""
 
 from collections.abc import Iterator, Sequence
 from html import escape
@@ -23,14 +23,14 @@ _HEAD = ('', 'driven by', 'greatest speed [m/s]', 'least TTC [s]', 'least distan
 
 
 def run_html(run: 'Run') -> str:
-    """Show a run: its most critical moment from above, and a row for each driven vehicle."""
+    """Return a run's most critical moment from above, and a row for each driven vehicle."""
     caption = (f'{free(run.name)}: {free(run.game.benchmark_id)}, {number(run.duration_s, 1)} s'
                + (f', states {run.state_hash[:12]}…' if run.state_hash else ''))
     return f'<div>{_picture(run)}{table(caption, _HEAD, _rows(run))}</div>'
 
 
 def replays_html(recorded: Criticality, alternatives: Sequence[Alternative]) -> str:
-    """Show runs of one human against several planners, below the recorded one."""
+    """Return the runs of one human against several planners, below the recorded one."""
     found = [{'planner': 'recorded', 'criticality': recorded.as_dict()},
              *(each.as_dict() for each in alternatives)]
     rows = [tuple(map(escape, row)) for row in replay_rows(found)]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a recording to a CommonRoad scenario file."""
+"""Converts a recording to a CommonRoad scenario file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajecto
 @dataclass(frozen=True)
 class ConversionReport:
     """
-    What became of a recording.
+    The result of a conversion.
 
     :param path: the scenario file.
     :param benchmark_id: its benchmark id.
@@ -25,7 +25,7 @@ class ConversionReport:
     :param time_steps: number of its time steps.
     :param obstacle_ids: CommonRoad ids of the vehicles and objects in it, by their names.
     :param problem_ids: ids of the planning problems, by vehicle.
-    :param notices: what was refused, left out or mended, one line each.
+    :param notices: the refused, omitted or repaired parts, one line each.
     """
 
     path: Path
@@ -40,7 +40,7 @@ class ConversionReport:
 def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
             progress: Callable[[float], object] | None = None) -> ConversionReport:
     """
-    Write the scenario that a recording holds.
+    Write the scenario of a recorded run.
 
     :param bag: a recording of ours or of `ros2 bag record`, finished or cut off.
     :param out: the file (`*.xml`) or the folder for `<benchmark id>.xml`; None puts it beside the
@@ -48,8 +48,8 @@ def convert(bag: Path, out: Path | None = None, epoch: int | None = None,
     :param epoch: which run, where the recording holds several; None for the last that began.
     :param progress: as for `read_trajectories`.
     :raises RunTooShortError: if the run ended before its second scenario step.
-    :raises InputError: if there is no run in it, or another file is in the way.
-    :raises CrgameError: if the schema refuses the result; nothing is written then.
+    :raises InputError: if there is no run in it, or a file that is no export has the name.
+    :raises CrgameError: if the result violates the schema; nothing is written then.
     """
     log = (read_last_run(bag, progress) if epoch is None
            else read_trajectories(bag, epoch, progress))
@@ -71,10 +71,10 @@ def convert_log(log: RunTrajectories, bag: Path, out: Path | None = None) -> Con
 
 def read_last_run(bag: Path, progress: Callable[[float], object] | None = None) -> RunTrajectories:
     """
-    Read the last run of a recording that did begin; a notice names those that did not.
+    Read the last run of a recording that has begun; a notice names those that have not.
 
     :param progress: as for `read_trajectories`.
-    :raises RunTooShortError: if none did.
+    :raises RunTooShortError: if none has.
     :raises InputError: as `read_trajectories`.
     """
     with BagReader(bag, parts=True) as reader:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which run of a recording to read: its documents, and the messages that belong to it."""
+"""Finds one run in a recording: its documents, and the messages that belong to it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,15 +34,14 @@ class Epoch:
     """
     One run of a recording, from one reset to the next.
 
-    Every reset gets a later clock offset, so stamps tell the runs apart; only where a restarted
-    simulation began its clock anew do log times decide.
+    Every reset gets a later clock offset, so stamps distinguish the runs. Only where a restarted
+    simulation began its clock anew, log times decide.
 
     :param game: its game.
     :param xml_text: its scenario.
-    :param descriptions: what could appear in it.
-    :param from_log_ns: messages logged earlier belong to the run before, None where stamps say.
-    :param until_stamp_ns: clock offset of the next run, None where there is none or log times
-        decide.
+    :param descriptions: all vehicles and objects that could appear in it.
+    :param from_log_ns: messages logged earlier belong to the run before, None if stamps decide.
+    :param until_stamp_ns: clock offset of the next run, None without one or if log times decide.
     :param until_log_ns: messages logged from then on belong to the next run, None as above.
     """
 
@@ -63,7 +62,7 @@ class Epoch:
 
 def epoch_numbers(reader: BagReader) -> tuple[int, ...]:
     """
-    Return which epochs a recording holds, in the order in which they were run.
+    Return the epochs of a recording, in the order of the runs.
 
     :raises InputError: if a document is missing.
     """
@@ -100,7 +99,7 @@ def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
 
 
 def _games(texts: Sequence[_Text], reader: BagReader) -> list[tuple[int, GameDocument]]:
-    """Read the games with their log times, but those that are none."""
+    """Read the games with their log times; skip malformed ones."""
     found, refusal = [], None
     for log_ns, text in texts:
         try:
@@ -141,7 +140,7 @@ def _scenario_of(game: GameDocument, texts: Sequence[_Text], reader: BagReader) 
 
 def _objects_of(game: GameDocument, texts: Sequence[_Text], log_ns: int,
                 reader: BagReader) -> tuple[ObjectDescription, ...]:
-    """Choose the list that names the game's vehicles and was logged nearest to the game."""
+    """Return the object list that names the game's vehicles and was logged nearest to the game."""
     vehicles = [item.id for item in game.vehicles]
     for _, text in sorted(texts, key=lambda found: abs(found.log_time_ns - log_ns)):
         try:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What can go wrong while a recording is written."""
+"""Errors of recordings and of runs too short to use."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ from crgame_ros.errors import CrgameError, InputError
 
 class RecordingError(CrgameError):
     """
-    The operating system refused to store a recording.
+    A refusal of the operating system to store a recording.
 
     :param path: the file that could not be written.
-    :param reason: what the operating system said.
-    :param remedy: what the user can do about it.
+    :param reason: the operating system's message.
+    :param remedy: the action for the user.
     """
 
     def __init__(self, path: Path, reason: str, remedy: str) -> None:
@@ -23,4 +23,4 @@ class RecordingError(CrgameError):
 
 
 class RunTooShortError(InputError):
-    """A run that ended before its second scenario step: there is nothing to make of it."""
+    """A run that ended before its second scenario step, too short for any output."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run as a CommonRoad 2020a scenario: what happened, on the grid of its time steps."""
+"""Exports a run as a CommonRoad 2020a scenario, on the grid of its time steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,16 +37,17 @@ _NOBODY = 'nobody'
 
 class ProblemWriter:
     """
-    Writes a problem for each who drove, or was a human in an earlier run and played back.
+    Writes a problem for each driven vehicle, and for each replayed human of an earlier run.
 
-    The schema asks for one at least: where there is neither, those of the scenario stay, and a
-    scenario without any gets one that every state meets. Ids are given at construction.
+    The schema requires at least one. Without driven or replayed vehicles, those of the scenario
+    stay, and a scenario without any gets one whose goal every state meets. Ids are assigned at
+    construction.
 
-    :param lanelets: ids of the lanelets in the file, by their own.
+    :param lanelets: ids of the lanelets in the file, by their ids in the scenario.
     :param ids: the ids of the file.
-    :param notices: told what was changed or left out.
+    :param notices: receives a line for each change or omission.
     :ivar ids: ids in the file, by vehicle or object.
-    :ivar humans: who of these is, or was, a human.
+    :ivar humans: the vehicles among these that are, or were, driven by a human.
     """
 
     def __init__(self, log: RunTrajectories, loaded: LoadedScenario, lanelets: dict[int, int],
@@ -80,7 +81,7 @@ class ProblemWriter:
         """
         Return the problems.
 
-        :param rows: (K, V, 7) of the driven vehicles, as of `ObjectWriter`.
+        :param rows: (K, V, 7) of the driven vehicles, as in `ObjectWriter`.
         :raises InputError: if an AV drove a problem that the scenario does not have.
         """
         parts = []
@@ -118,7 +119,7 @@ class ProblemWriter:
         return [x, y, wrap_pi(yaw), float(velocity @ (math.cos(yaw), math.sin(yaw))), 0.0, 0.0]
 
     def _road_start(self) -> list[float]:
-        """Stand at the beginning of the first lanelet."""
+        """Return the initial state at the beginning of the first lanelet."""
         first, second = self._network.lanelets[0].center_vertices[:2, :2]
         yaw = math.atan2(second[1] - first[1], second[0] - first[0])
         return [float(first[0]), float(first[1]), yaw, 0.0, 0.0, 0.0]
@@ -143,9 +144,9 @@ class ExportedScenario:
     :param benchmark_id: its benchmark id.
     :param xml_text: the content of the file, valid by CommonRoad's schema.
     :param obstacle_ids: CommonRoad ids of the objects and vehicles in it, by their names.
-    :param problem_ids: ids of the planning problems, by vehicle or recorded human; where nobody
-        drove, by `problem` and number.
-    :param notices: what it could not express, one line each.
+    :param problem_ids: ids of the planning problems, by vehicle or recorded human; without
+        either, by `problem` and number.
+    :param notices: the parts that it could not express, one line each.
     """
 
     benchmark_id: str
@@ -159,19 +160,19 @@ def export_scenario(log: RunTrajectories, *, author: str | None = None,
                     affiliation: str | None = None, source: str | None = None,
                     day: date | None = None) -> ExportedScenario:
     """
-    Turn a run into a CommonRoad scenario.
+    Convert a run to a CommonRoad scenario.
 
     Time step 0 is the first step of the log. Humans, AVs and moving objects are dynamic obstacles
     whose states hold the pose of the centre; a vehicle's velocity is that of its rear axle, as in
     CommonRoad's KS model. An object that appears later, or again, is a phantom obstacle from then
-    on, for the schema lets every dynamic obstacle begin at 0. Each driven vehicle has a planning
-    problem: an AV's goal is its own, a human's where the drive ended. Where nobody drives, the
-    problems of the scenario stay as they are.
+    on, because the schema requires every dynamic obstacle to begin at 0. Each driven vehicle has a
+    planning problem: an AV's goal is its own, a human's is the end of the drive. Without driven
+    vehicles, the problems of the scenario stay unchanged.
 
-    :param author: header entries; the original's where None, the source with a remark added.
-    :param day: date of the run; that of the original where None.
+    :param author: header entries; the original's if None, the source with a remark added.
+    :param day: date of the run; that of the original if None.
     :raises InputError: if the run has no step, or its scenario cannot be written.
-    :raises CrgameError: if the schema refuses the result.
+    :raises CrgameError: if the result violates the schema.
     """
     if len(log.ks) < 2:
         raise InputError('the run has no scenario step', 'the run',
@@ -202,7 +203,7 @@ def export_scenario(log: RunTrajectories, *, author: str | None = None,
 
 def write_scenario(log: RunTrajectories, out: Path, **header: Any) -> ExportedScenario:
     """
-    Write a run as a CommonRoad scenario; the file is there whole or not at all.
+    Write a run as a CommonRoad scenario, completely or not at all.
 
     :param out: the file (`*.xml`), or the folder for `<benchmark id>.xml`.
     :param header: keyword arguments of `export_scenario`.
@@ -216,10 +217,10 @@ def write_scenario(log: RunTrajectories, out: Path, **header: Any) -> ExportedSc
 
 def scenario_path(out: Path, benchmark_id: str) -> Path:
     """
-    Choose the file to write; an earlier export may be replaced, nothing else.
+    Return the file to write; only an earlier export may be replaced.
 
     :param out: as for `write_scenario`.
-    :raises InputError: if a file that is no export has that name.
+    :raises InputError: if a file that is not an export has that name.
     """
     path = out if out.suffix == '.xml' else out / f'{benchmark_id}.xml'
     try:
@@ -238,14 +239,14 @@ def scenario_path(out: Path, benchmark_id: str) -> Path:
 
 def prepare_folder(out: Path) -> None:
     """
-    Make the folder of a file that is to be written later, and see that it can be written there.
+    Create the folder of a file that is written later, and check that the folder is writable.
 
     :param out: as for `write_scenario`.
-    :raises InputError: if it can't.
+    :raises InputError: if it is not.
     """
     folder = out.parent if out.suffix == '.xml' else out
     if out.suffix == '.xml' and out.exists():
-        # Now, not after the run.
+        # Refuse a bad path now, not after the run.
         scenario_path(out, '')
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -259,7 +260,7 @@ def prepare_folder(out: Path) -> None:
 
 def write_text(text: str, path: Path) -> None:
     """
-    Write a file that is there whole or not at all.
+    Write a file completely or not at all.
 
     :raises InputError: if it cannot be written.
     """
@@ -277,10 +278,10 @@ def write_bytes(content: bytes, path: Path) -> None:
 
 def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,
             notices: list[str]) -> dict[str, str]:
-    """Return the attributes of the file, as far as they follow from run and original."""
+    """Return the file's header attributes, as far as they follow from the run and the original."""
     original = guard.parse_hardened(log.xml_text, loaded.source)
     found: ScenarioID = loaded.scenario.scenario_id
-    # The same map and configuration with one prediction; `C-` marks several planning problems.
+    # Same map and configuration with one prediction; `C-` marks several planning problems.
     benchmark_id = str(ScenarioID(problems > 1, found.country_id, found.map_name, found.map_id,
                                   found.configuration_id or 1, 'T', 1))
     given = original.get('benchmarkID', '')
@@ -303,9 +304,9 @@ def _is_date(text: str) -> bool:
 
 def _document(header: dict[str, str], network: Sequence[etree._Element], rest: str) -> str:
     """
-    Put the file together.
+    Build the file's text.
 
-    :raises CrgameError: if the schema does not accept it.
+    :raises CrgameError: if it violates the schema.
     """
     attributes = ' '.join(f'{name}={quoteattr(value)}' for name, value in header.items())
     roads = ''.join(etree.tostring(element, encoding='unicode').rstrip() + '\n'

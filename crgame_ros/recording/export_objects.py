@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles and objects of a run as CommonRoad obstacles."""
+"""Writes vehicles and objects of a run as CommonRoad obstacles."""
 
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
@@ -28,26 +28,26 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 _BRAKE, _LIGHTS = (COMMAND_COLUMNS.index(name) for name in ('brake', 'lights'))
-# From this pedal on brake lights shine, as on the cockpit's map.
+# Brake lights are on from this brake pedal position, as on the cockpit's map.
 BRAKE_LIGHTS = 0.02
-# In the order that the schema asks for.
+# In the order of the schema.
 _GROUPS = ('static', 'dynamic', 'phantom', 'environment')
 
 
 def named(name: str) -> str:
-    """Write a comment that says what the next element was called in the run."""
+    """Return an XML comment with the next element's name in the run."""
     return f'<!-- {escape(name).replace("--", "- -")} -->\n'
 
 
 class ObjectWriter:
     """
-    Writes everything that moves or stands.
+    Writes all vehicles and objects.
 
-    Ids are given at construction: those of the original first, so that nothing new takes them.
+    Ids are assigned at construction: those of the original first, so that they stay the same.
 
     :param log: the run.
     :param ids: the ids of the file.
-    :param notices: told what could not be expressed.
+    :param notices: receives a line for each thing that could not be expressed.
     :ivar ids: ids in the file, by name.
     :ivar vehicle_rows: (K, V, 7) x, y, yaw of the centre, speed, acceleration, yaw rate and
         steering angle of the driven vehicles.
@@ -87,11 +87,11 @@ class ObjectWriter:
                 self.vehicle_rows[:, column].tolist(), True, self._signals(column)))
 
     def text(self) -> str:
-        """Return what was written."""
+        """Return the written text."""
         return ''.join(part for group in _GROUPS for part in self._parts[group])
 
     def _signals(self, column: int) -> list[tuple[bool, ...]]:
-        """Return the signals of a vehicle at each step, if somebody drove it or it showed any."""
+        """Return a vehicle's signals at each step, if a driver had it or it showed any."""
         commands = self._log.commands
         if commands is None:
             return []
@@ -127,7 +127,7 @@ class ObjectWriter:
 
     def _write_moving(self, item: ObjectDescription, poses: FloatArray,
                       velocities: FloatArray) -> None:
-        """Write a dynamic obstacle from step 0 on, and phantom obstacles of what comes later."""
+        """Write a dynamic obstacle from step 0 on, and phantom obstacles for later pieces."""
         pieces = list(_pieces(poses))
         if pieces[0] == (0, 1):
             self._notices.append(f'{item.id}: where it was at time step 0 alone is left out')
@@ -170,7 +170,7 @@ def _signed_speeds(poses: FloatArray, velocities: FloatArray) -> FloatArray:
 
 
 def _pieces(poses: FloatArray) -> Iterator[tuple[int, int]]:
-    """Yield first and end of each run of steps at which something is there."""
+    """Yield first and end of each run of steps at which the object is present."""
     present = np.isfinite(poses).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], present, [False])))).tolist()
     yield from zip(edges[::2], edges[1::2], strict=True)

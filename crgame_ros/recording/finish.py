@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Completing a run's recording, and deriving the scenario and the timing report from it."""
+"""Completes a run's recording, and derives the scenario and the timing report from it."""
 
 from collections.abc import Callable
 from functools import partial
@@ -28,9 +28,9 @@ class FinishedRecording(NamedTuple):
     A recording whose scenario and timing report have been written.
 
     :param bag: its folder.
-    :param suffix: of the names of files that are made from it, empty for the first of a run.
+    :param suffix: of the names of derived files, empty for the first recording of a run.
     :param log: the run in it.
-    :param timing: what its timing report says; None where there is none.
+    :param timing: its timing report; None without one.
     """
 
     bag: Path
@@ -42,26 +42,26 @@ class FinishedRecording(NamedTuple):
 def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True,
                finished: Callable[[FinishedRecording], object] = lambda _: None) -> int:
     """
-    Complete the recordings of a run, and write the files that are made from them.
+    Complete the recordings of a run, and write the files derived from them.
 
     :param folder: of the run.
-    :param say: takes one line for people.
-    :param progress: whether to say how far it is, where it takes long.
-    :param finished: is given each recording that could be read, once its files are written.
+    :param say: prints one line.
+    :param progress: whether to report the progress of long work.
+    :param finished: called with each readable recording once its files are written.
     :return: OK, FAILED if something could not be written, EMPTY if nothing was recorded.
     """
     code = OK
     tell = say if progress else _discard
     bags = bags_of(folder)
-    # A recorder that was started again went on in another folder.
+    # A restarted recorder continued in another folder.
     runs = [bag for bag in bags if not any(bag in parts_of(other)[1:] for other in bags)]
     for bag in bags:
         failed = _attempt(partial(recover, bag, Progress(tell, f'finishing {bag}')), say)
-        # Of one that was killed at once there is nothing; what is there is told below.
+        # A recorder killed right after its start leaves nothing; the rest is reported below.
         code |= failed if len(parts_of(bag)) == 1 and bag in runs else OK
     results = []
     for bag in runs:
-        # The first gives the run's files their names, later ones their own.
+        # The first recording's files are named after the run, later ones get a suffix.
         suffix = bag.name.removeprefix(runs[0].name)
         code_of, done = _derive(bag, suffix, say, tell)
         results.append(code_of)
@@ -79,12 +79,12 @@ def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True
 
 
 def _discard(_line: str) -> None:
-    """Take word of progress that nobody reads in time."""
+    """Discard a progress line that is not shown."""
 
 
 def _derive(bag: Path, suffix: str, say: Callable[[str], object],
             tell: Callable[[str], object]) -> tuple[int, FinishedRecording | None]:
-    """Write what is made from one recording: timing report and scenario agree on its steps."""
+    """Write one recording's timing report and scenario, which agree on its steps."""
     folder = bag.parent
     if not _has_cycles(bag):
         say(f'{folder}: {_NOTHING}')
@@ -96,7 +96,7 @@ def _derive(bag: Path, suffix: str, say: Callable[[str], object],
     except RunTooShortError as error:
         say(f'{folder}: {error.what}')
         return EMPTY, None
-    # What cannot be made a scenario still has its timing.
+    # A run that cannot become a scenario still has its timing report.
     log = logs[0] if logs else None
     reports: list[dict[str, Any]] = []
     timing = Progress(tell, f'reading the timing of {bag}')
@@ -115,7 +115,7 @@ def _has_cycles(bag: Path) -> bool:
             cycles = reader.topics.get(CYCLE_TOPIC)
             return cycles is not None and cycles.message_count > 0
     except CrgameError:
-        # It is said when it is converted.
+        # The conversion reports this error.
         return True
 
 
@@ -128,7 +128,7 @@ def _attempt(step: Callable[[], object], say: Callable[[str], object]) -> int:
         say(f'error: {error}')
         return FAILED
     except Exception as error:
-        # One file that cannot be made must not cost the others.
+        # One file that cannot be written must not prevent the others.
         say(f'error: {type(error).__name__}: {error}')
         return FAILED
     return OK

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a busy recorder missed: which scenario steps a recording still tells, and what is told of it.
+Fills the gaps of a busy recorder, and finds the scenario steps that a recording still covers.
 
-Short gaps are bridged by what lies around them, and each is told; longer ones cut the run.
+Short gaps are filled from the states around them and reported; longer ones cut the run.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,23 +19,23 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-# Longer than this nobody is known well enough: at 8 m/s^2 one is 1 m from where one would have
-# been expected, a lane is left after 1.5 s.
+# After longer gaps, positions are too uncertain: at 8 m/s^2 a vehicle is 1 m from its expected
+# position, and a lane is left after 1.5 s.
 LONGEST_GAP_S = 1.0
-# By how much an object may accelerate between two states of it that are joined [m/s^2]; whoever
-# would need more is somebody else of the same name.
+# Largest acceleration of an object between two joined states [m/s^2]; a larger one means another
+# object with the same name.
 _MAX_ACCELERATION = 10.0
 _TOLD = 3
-# dt_eff is a sum of what the rows tell, up to rounding [s].
+# Tolerance for the rounding of sums of dt_eff from the rows [s].
 _ROUNDING_S = 1e-6
 
 
 class Stretch(NamedTuple):
     """
-    Consecutive scenario steps that a recording tells.
+    Consecutive scenario steps that a recording covers.
 
     :param ticks: (K) their steps n.
-    :param notices: what of the run is not among them, and why, one line each.
+    :param notices: the missing parts of the run and the reasons, one line each.
     """
 
     ticks: IntArray
@@ -44,10 +44,10 @@ class Stretch(NamedTuple):
 
 def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioScheduler) -> Stretch:
     """
-    Choose the scenario steps of a run: the longest piece without a gap that cannot be bridged.
+    Return the scenario steps of a run: the longest piece without a gap that cannot be filled.
 
-    :param recorded: by topic the increasing steps n that it holds; of objects only the ticks.
-    :return: no ticks where there are none in common.
+    :param recorded: by topic the increasing steps n that it holds; for objects only the ticks.
+    :return: without ticks if the topics have none in common.
     """
     per_tick, k0 = scheduler.steps_per_tick, scheduler.k0
     pieces: list[tuple[int, int]] = [(0, int(max(ns[-1] for ns in recorded.values())))]
@@ -70,24 +70,24 @@ def longest_stretch(recorded: Mapping[str, IntArray], scheduler: ScenarioSchedul
 
 
 def farthest(scheduler: ScenarioScheduler) -> int:
-    """Return how many steps n two states may be apart that are joined."""
+    """Return the largest distance in steps n between two states that are joined."""
     return scheduler.steps_for(LONGEST_GAP_S) + scheduler.steps_per_tick
 
 
 def _ends(ns: IntArray, scheduler: ScenarioScheduler) -> IntArray:
-    """Find the places in increasing steps behind which there is a gap that nobody bridges."""
+    """Find the indices in increasing steps after which a gap is too long to fill."""
     return np.flatnonzero(np.diff(ns) > farthest(scheduler))
 
 
 def piece_around(ns: IntArray, n: int, scheduler: ScenarioScheduler) -> IntArray:
-    """Return those of increasing steps that no gap parts from step n."""
+    """Return the steps of the piece that contains step n, without a gap."""
     pieces = np.split(ns, _ends(ns, scheduler) + 1)
     return next(piece for piece in pieces if n <= piece[-1])
 
 
 def _describe_gaps(gaps: Sequence[tuple[int, str]], first: int, last: int, last_seen: int,
                    k0: int) -> list[str]:
-    """Return which scenario steps a stretch has, where that are not all."""
+    """Return notices on the scenario steps of a stretch, if some are missing."""
     if gaps:
         texts = [text for _, text in sorted(gaps)]
         more = f' and {len(texts) - _TOLD} times more' if len(texts) > _TOLD else ''
@@ -106,10 +106,10 @@ def _describe_gaps(gaps: Sequence[tuple[int, str]], first: int, last: int, last_
 def bridge_objects(ticks: IntArray, points: Mapping[int, FloatArray], dt_s: float,
                    joints: int) -> FloatArray:
     """
-    Return the points of all objects at ticks, those that were not recorded from those around them.
+    Return the points of all objects at ticks; fill missing ones from those around them.
 
-    Poses are cubic by the velocities at both ends, velocities linear. Whoever is absent, or is
-    not the same any more, at one of both ends is absent in between.
+    Poses are cubic by the velocities at both ends, velocities linear. An object that is absent at
+    one end, or differs between the ends, is absent in between.
 
     :param ticks: (K) steps n, none of them before the first recorded one or after the last.
     :param points: recorded points (3, joints) by step n.
@@ -139,7 +139,7 @@ def _between(first: FloatArray, second: FloatArray, time_s: float,
     found = np.stack((poses, first[1] + share[0] * (second[1] - first[1])))
     fastest = np.maximum(*(np.hypot(row[0::3], row[1::3]) for row in (first[1], second[1])))
     reach = (fastest + 0.5 * _MAX_ACCELERATION * length_s) * length_s
-    # NaN fails it as well.
+    # NaN counts as another object too.
     other = ~(np.hypot(ahead[0::3], ahead[1::3]) <= reach)
     found[:, np.repeat(other, 3)] = np.nan
     return found
@@ -148,7 +148,7 @@ def _between(first: FloatArray, second: FloatArray, time_s: float,
 def bridged_notice(topic: str, ticks: IntArray, recorded: IntArray,
                    scheduler: ScenarioScheduler) -> tuple[str, ...]:
     """
-    Return in one line, or none, which scenario steps a topic does not hold itself.
+    Return at most one line that names the scenario steps missing in a topic.
 
     :param ticks: (K) the run's steps n.
     :param recorded: increasing steps n that the topic holds.
@@ -167,11 +167,11 @@ def bridged_notice(topic: str, ticks: IntArray, recorded: IntArray,
 def lost_intervals(table: CycleTable, timing: TimingSpec, dt_s: float,
                    last_n: int) -> FloatArray | None:
     """
-    Find the intervals of the cycles that were not recorded, from the lag that the others tell.
+    Compute the intervals of the cycles that were not recorded, from the lag of the others.
 
-    The sum of the intervals is ahead of n dt by the lag E_n (CRG 12), less what the clip has cut
-    off and not yet given back: nothing after every interval that was not clipped. So of what is
-    missing between two such cycles the sum is known; each of them gets an equal part.
+    The sum of the intervals is ahead of n dt by the lag E_n (CRG 12), less the part that the clip
+    has cut off and not yet returned. That part is zero after every interval that was not clipped.
+    So the sum of the missing intervals between two such cycles is known; each gets an equal share.
 
     :return: (last_n + 1) intervals [s], nominal after the last cycle; None where intervals do not
         follow the lag, as in a run that was repeated from a recording.

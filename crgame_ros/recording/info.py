@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a recording, for people."""
+"""Describes the contents of a recording."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ _GAME_TYPE = 'std_msgs/msg/String'
 _CYCLE_TOPIC = '/timing/cycle'
 _CYCLE_TYPE = 'std_msgs/msg/Float64MultiArray'
 _GAPS_SHOWN = 5
-# Whole numbers up to here are exact in a float.
+# Integers up to this are exact in a float.
 _LARGEST_N = 2 ** 53
 
 
@@ -46,7 +46,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class CycleInfo:
-    """The recorded cycles: how many, and what is missing between the first and the last."""
+    """The recorded cycles: their number, and the gaps between the first and the last."""
 
     recorded: int
     gaps: tuple[Gap, ...]
@@ -71,8 +71,8 @@ class BagInfo:
     """
     A recording at a glance; times are log times [ns].
 
-    :param cycles: None where `/timing/cycle` was not recorded.
-    :param game: None where `/scenario/game` was not recorded.
+    :param cycles: None if `/timing/cycle` was not recorded.
+    :param game: None if `/scenario/game` was not recorded.
     """
 
     path: Path
@@ -100,7 +100,7 @@ class BagInfo:
 
 def describe(path: Path) -> BagInfo:
     """
-    Look through a recording.
+    Return a summary of a recording.
 
     :param path: as for `BagReader`.
     :raises InputError: if it cannot be read, or its game or cycles are malformed.
@@ -152,7 +152,7 @@ def _read_cycles(reader: BagReader) -> CycleInfo | None:
 
 
 def _cycle_numbers(reader: BagReader) -> Iterator[npt.NDArray[np.int64]]:
-    """Yield arrays of rows (epoch, n), but of messages that somebody else sent."""
+    """Yield arrays of rows (epoch, n), without those of foreign messages."""
     refusal, found = None, False
     for _, _, _, message in reader.readable([_CYCLE_TOPIC]):
         try:
@@ -173,7 +173,7 @@ def _cycle_numbers(reader: BagReader) -> Iterator[npt.NDArray[np.int64]]:
 
 
 def _find_gaps(cycles: npt.NDArray[np.int64]) -> Iterator[Gap]:
-    """Yield what is missing between the first and the last n of each epoch."""
+    """Yield the gaps between the first and the last n of each epoch."""
     for epoch in np.unique(cycles[:, 0]):
         numbers = np.unique(cycles[cycles[:, 0] == epoch, 1])
         for index in np.flatnonzero(np.diff(numbers) > 1):
@@ -181,7 +181,7 @@ def _find_gaps(cycles: npt.NDArray[np.int64]) -> Iterator[Gap]:
 
 
 def format_info(info: BagInfo) -> str:
-    """Write a recording's description as a text of several lines."""
+    """Return the description of a recording as text of several lines."""
     lines = [
         f'recording  {info.path}',
         f'files      {", ".join(file.name for file in info.files)} ({info.storage}, '

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-One MCAP file, finished or cut off anywhere, read without help of its index.
+Reads one MCAP file, finished or cut off anywhere, without its index.
 
-The index at the end of the file is what a killed recorder never wrote. Walking over the records
-from the front costs one seek per chunk and reads both kinds of file in the same way.
+A killed recorder never wrote the index at the end of the file. Walking over the records from the
+front costs one seek per chunk and reads both kinds of file in the same way.
 """
 
 from collections import Counter, defaultdict
@@ -42,12 +42,12 @@ class Extent(NamedTuple):
 
 class McapIndex:
     """
-    The index behind each chunk and the summary at the end, taken up record by record.
+    The index behind each chunk and the summary at the end, collected record by record.
 
-    A chunk has a checksum and these have none, or one of the summary alone. Who skips a chunk
-    because of them trusts them: what is said twice has to agree.
+    A chunk has a checksum, an index has none, and the summary may have one. A reader that skips a
+    chunk trusts them, so entries that the file holds twice have to agree.
 
-    :ivar statistics: of the summary, None where there are none.
+    :ivar statistics: of the summary, None if it has none.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class McapIndex:
 
     def add(self, opcode: int, data: bytes, chunk: int | None) -> None:
         """
-        Take up a record.
+        Add a record.
 
         :param data: its body; of a message index the head is enough.
         :param chunk: offset of the chunk in front of it.
@@ -76,7 +76,7 @@ class McapIndex:
                 entry.chunk_length, entry.message_start_time, entry.message_end_time)
 
     def count_outside(self, channel: int) -> None:
-        """Take up a message outside of chunks: no index names it."""
+        """Count a message outside of chunks, which no index names."""
         self._outside[channel] += 1
 
     def check_summary(self, stream: BinaryIO, footer: int) -> None:
@@ -93,14 +93,14 @@ class McapIndex:
             self._sound = size > 0 and zlib.crc32(stream.read(size)) == found.summary_crc
 
     def channels(self, chunk: int) -> frozenset[int] | None:
-        """Return the channels with a message in a chunk, None where no index names them."""
+        """Return the channels with a message in a chunk, None if no index names them."""
         return frozenset(self._channels[chunk]) if chunk in self._channels else None
 
     def agrees(self, chunks: Mapping[int, Extent]) -> bool:
         """
-        Return whether all that the file says of itself fits together.
+        Return whether the index, the summary and the chunks of the file agree.
 
-        :param chunks: by offset, as each says itself.
+        :param chunks: by offset, as in the chunks' own heads.
         """
         if self._chunks and self._chunks != chunks:
             return False
@@ -118,9 +118,9 @@ _CHUNK = struct.Struct('<QQQII')
 _CHANNEL_ID = struct.Struct('<H')
 _LENGTH = struct.Struct('<Q')
 _RUN_BYTES = 1 << 20
-# ROS counts time in signed 64 bit; what is later is no time of a recorder [ns].
+# ROS counts time in signed 64 bit; later times are not from a recorder [ns].
 _LATEST_NS = 2 ** 63 - 1
-# A chunk unpacked is as large as a few messages; what claims more is damaged [bytes].
+# An unpacked chunk is as large as a few messages; a larger stated size means damage [bytes].
 _LARGEST_CHUNK = 1 << 29
 _DAMAGES = (struct.error, ValueError, RuntimeError, MemoryError, EOFError, EndOfFile,
             OverflowError, zstandard.ZstdError)
@@ -143,7 +143,7 @@ class Segment:
     """
     A chunk, or a run of records outside of chunks, with the range of its log times [ns].
 
-    :param channels: ids of the channels with a message in it, None where no index names them.
+    :param channels: ids of the channels with a message in it, None if no index names them.
     """
 
     offset: int
@@ -156,7 +156,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Tally:
-    """Messages by channel id, and the range of their log times [ns], 0 where there are none."""
+    """Message counts by channel id, and the range of log times [ns], 0 without messages."""
 
     counts: dict[int, int]
     start_ns: int
@@ -165,16 +165,16 @@ class Tally:
 
 class McapFile:
     """
-    What a walk over the records of a file finds; the messages stay in the file.
+    The contents found by a walk over a file's records; the messages stay in the file.
 
     :param path: the file.
-    :ivar complete: whether the file has its closing records, and they are sound.
-    :ivar contradicts: whether what it says of its content doesn't agree; its index is not used.
-    :ivar segments: where the messages are, in file order.
+    :ivar complete: whether the file has its closing records, undamaged.
+    :ivar contradicts: whether its index and its content disagree; the index is then not used.
+    :ivar segments: the positions of the messages, in file order.
     :ivar kept: offset and size of each metadata and attachment record.
-    :ivar useless_bytes: size of what is cut off or damaged, as far as the walk shows.
+    :ivar useless_bytes: size of the cut-off or damaged parts, as far as the walk shows.
     :ivar channels: by id; in a file without summary only after its messages were read.
-    :raises InputError: if it is no MCAP file or cannot be read.
+    :raises InputError: if it is not an MCAP file or cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -187,7 +187,7 @@ class McapFile:
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
         self._index = McapIndex()
-        # Those that the summary doesn't repeat.
+        # Definitions that the summary does not repeat.
         self._defined: tuple[dict[int, Channel], dict[int, Schema]] = ({}, {})
         try:
             self.size = self.path.stat().st_size
@@ -239,7 +239,7 @@ class McapFile:
         self.useless_bytes += self.size - readable
 
     def _use_index(self) -> None:
-        """Take over which channels are in which chunk, where the file agrees with itself."""
+        """Set each chunk's channels from the index, if the file does not contradict itself."""
         chunks = {segment.offset: segment for segment in self.segments if segment.chunked}
         self.contradicts = not self._index.agrees({
             offset: Extent(chunk.size, chunk.start_ns, chunk.end_ns)
@@ -260,10 +260,10 @@ class McapFile:
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(opcode, stream.read(length))
         elif opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX, Opcode.STATISTICS):
-            # One index of each channel in it follows a chunk.
+            # A chunk is followed by one index for each channel in it.
             last = self.segments[-1] if self.segments else None
             chunk = last.offset if last is not None and last.chunked else None
-            # Of its entries, one a message, their number is enough.
+            # The number of its entries (one per message) is enough.
             size = MESSAGE_INDEX_HEAD.size if opcode == Opcode.MESSAGE_INDEX else length
             self._index.add(opcode, stream.read(min(size, length)), chunk)
         elif opcode == Opcode.HEADER:
@@ -301,7 +301,7 @@ class McapFile:
         """Return whether all of a segment can be read."""
         try:
             if self.complete and segment.chunked and self._has_checksum(segment):
-                # What its bytes are was read when they were written: they are the same.
+                # The checksum shows that the bytes are those written, so they need no parsing.
                 self._content(segment)
                 return True
             for _ in self.messages(segment):
@@ -317,9 +317,9 @@ class McapFile:
 
     def tally(self) -> Tally:
         """
-        Count the messages of each channel, by the summary or else by reading them all.
+        Count the messages of each channel, from the summary or else by reading them all.
 
-        What is in which segment, and when, is then as was read.
+        After reading, the channels and times of each segment are known from its messages.
 
         :raises InputError: as `messages`.
         """
@@ -345,11 +345,11 @@ class McapFile:
     def messages(self, segment: Segment,
                  without: Collection[int] = ()) -> Iterator[McapMessage]:
         """
-        Read the messages of a segment in file order, and take up the channels it defines.
+        Read the messages of a segment in file order, and store the channels it defines.
 
-        :param without: ids of channels whose messages are passed over.
-        :raises InputError: if the segment is damaged; nothing of it is yielded then, save where
-            the damage passes the checksum or there is none.
+        :param without: ids of channels whose messages are skipped.
+        :raises InputError: if the segment is damaged; nothing of it is yielded then, unless the
+            damage passes the checksum or there is no checksum.
         """
         try:
             yield from self._messages(self._content(segment), without)
@@ -378,7 +378,7 @@ class McapFile:
     def _messages(self, content: bytes,
                   without: Collection[int]) -> Iterator[McapMessage]:
         position, end = 0, len(content)
-        # Every message of a recording passes here: names are looked up once.
+        # Every message of a recording passes this loop, so names are looked up once.
         head, message, head_size = _RECORD.unpack_from, _MESSAGE.unpack_from, _RECORD.size
         channel_id, plain, data_place = _CHANNEL_ID.unpack_from, int(Opcode.MESSAGE), _MESSAGE.size
         while position < end:

@@ -28,12 +28,12 @@ _DURABILITIES = ('system_default', 'transient_local', 'volatile', 'unknown', 'be
 @dataclass(frozen=True)
 class TopicQos:
     """
-    The quality of service that a topic was offered with, and is to be replayed with.
+    The quality of service of a recorded topic, used for its replay too.
 
     :param depth: length of the publisher's queue (keep last).
-    :param reliability: `reliable` or `best_effort`; what others recorded may also be
+    :param reliability: `reliable` or `best_effort`; recordings of other tools may also have
         `system_default`, `best_available` or `unknown`.
-    :param durability: `volatile` or `transient_local` (latched); else as above.
+    :param durability: `volatile` or `transient_local` (latched); others as above.
     :raises InputError: for any other word.
     """
 
@@ -48,7 +48,7 @@ class TopicQos:
                                  f'use one of {", ".join(known)}')
 
     def to_dict(self) -> dict[str, Any]:
-        """Build the nested form of `offered_qos_profiles`."""
+        """Return the nested form of `offered_qos_profiles`."""
         return {
             'history': 'keep_last', 'depth': self.depth, 'reliability': self.reliability,
             'durability': self.durability, 'deadline': dict(_INFINITE),
@@ -59,7 +59,7 @@ class TopicQos:
 
 @dataclass(frozen=True)
 class BagTopic:
-    """A recorded topic; `qos` has one entry for each publisher whose offer is known."""
+    """A recorded topic; `qos` has one entry for each publisher with known offer."""
 
     name: str
     type_name: str
@@ -70,7 +70,7 @@ class BagTopic:
 
 @dataclass(frozen=True)
 class BagFile:
-    """A file of a recording; times are log times [ns], both 0 where there is no message."""
+    """A file of a recording; times are log times [ns], both 0 without messages."""
 
     name: str
     start_ns: int
@@ -80,7 +80,7 @@ class BagFile:
 
 @dataclass(frozen=True)
 class BagMetadata:
-    """What `metadata.yaml` says of a recording."""
+    """The content of `metadata.yaml`."""
 
     storage: str
     files: tuple[BagFile, ...]
@@ -90,12 +90,12 @@ class BagMetadata:
 
 @functools.lru_cache(maxsize=64)
 def _load(text: str, where: str = '') -> Any:
-    """Read YAML; what is built is shared by all who read the same text: nobody changes it."""
+    """Read YAML; callers share the cached result and must not change it."""
     return parse_yaml(text, where, _REMEDY, _MAX_BYTES)
 
 
 def qos_text(profiles: Iterable[TopicQos]) -> str:
-    """Write QoS profiles as the YAML text that an MCAP channel carries."""
+    """Return QoS profiles as the YAML text of an MCAP channel."""
     return str(yaml.safe_dump([qos.to_dict() for qos in profiles], sort_keys=False))
 
 
@@ -127,9 +127,9 @@ def _named(value: object, names: Sequence[str]) -> str:
 
 def write_metadata(folder: Path, metadata: BagMetadata) -> Path:
     """
-    Write `metadata.yaml` in one step: a reader sees the old file or the whole new one.
+    Write `metadata.yaml` in one step: a reader sees the old file or the complete new one.
 
-    :raises OSError: if the file system refuses; an existing file is then unchanged.
+    :raises OSError: if writing fails; an existing file is then unchanged.
     """
     path = folder / METADATA_FILE
     write_whole(yaml.safe_dump({_ROOT: _to_dict(metadata)}, sort_keys=False).encode(), path)
@@ -138,7 +138,7 @@ def write_metadata(folder: Path, metadata: BagMetadata) -> Path:
 
 def _to_dict(metadata: BagMetadata) -> dict[str, Any]:
     filled = [file for file in metadata.files if file.message_count]
-    # Playing waits for this time: were it earlier than the first message, it would never end.
+    # `ros2 bag play` waits for this time; earlier than the first message, it would never end.
     start_ns = min((file.start_ns for file in filled), default=0)
     end_ns = max((file.end_ns for file in filled), default=0)
     return {

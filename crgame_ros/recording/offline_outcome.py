@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What `timing.json` says besides times, of an offline run: plans, violations and contacts."""
+"""Computes an offline run's entries of `timing.json`: plans, violations and contacts."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ def planner_entries(result: OfflineResult) -> dict[str, dict[str, Any]]:
     """
     Return the entry of each AV's planner.
 
-    It answers after a stated number of steps: there is no latency to measure.
+    A planner answers after a stated number of steps, so there is no latency to measure.
     """
     return {av: _entry(record) for av, record in result.planners.items()}
 
@@ -45,7 +45,7 @@ def _entry(record: PlannerRecord) -> dict[str, Any]:
 
 
 def _violations(result: OfflineResult) -> list[dict[str, Any]]:
-    """List what began to be violated, in order."""
+    """Return the violations by their beginnings, in order."""
     found: list[dict[str, Any]] = []
     lasting: dict[str, set[str]] = {}
     for verdict in result.violations:

@@ -1,21 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Word of work that takes long, now and then."""
+"""Progress messages of long work."""
 
 from collections.abc import Callable
 import time
 
-# Nobody needs word of what takes less [s].
+# Shorter work prints no messages [s].
 PERIOD_S = 2.0
 
 
 class Progress:
     """
-    Says how far a piece of work is, at most once in `PERIOD_S`.
+    Reports the progress of a piece of work, at most once in `PERIOD_S`.
 
-    :param say: takes one line for people.
+    :param say: prints one line.
     :param what: the work, as in `reading bag: 40 %`.
-    :param clock: gives the time [s].
+    :param clock: returns the time [s].
     """
 
     def __init__(self, say: Callable[[str], object], what: str,
@@ -26,7 +26,7 @@ class Progress:
         self._told_s = clock()
 
     def __call__(self, share: float) -> None:
-        """Take in how much is done, 0 to 1."""
+        """Report the share that is done, 0 to 1."""
         now_s = self._clock()
         if now_s - self._told_s >= PERIOD_S:
             self._told_s = now_s

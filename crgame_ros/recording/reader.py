@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading recordings: our own, those of `ros2 bag record`, and what a killed recorder left."""
+"""Reads recordings: our own, those of `ros2 bag record`, and those of killed recorders."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -42,14 +42,14 @@ class BagReader:
     A recording, opened for reading.
 
     :param path: a folder (with `metadata.yaml`, or with a single file), a `.mcap` or `.db3` file.
-    :param parts: read on in the folders in which a recorder that was started again continued.
-    :param progress: is told now and then how much of it has been read, 0 to 1.
+    :param parts: also read the folders in which a restarted recorder continued.
+    :param progress: called at intervals with the share that has been read, 0 to 1.
     :ivar files: the files that hold the messages.
     :ivar storage: `mcap` or `sqlite3`.
-    :ivar topics: what was recorded, by name.
+    :ivar topics: the recorded topics, by name.
     :ivar start_ns: log time of the first message [ns], 0 in an empty recording.
     :ivar end_ns: log time of the last message [ns], 0 in an empty recording.
-    :ivar notices: what is wrong with the recording although it can be read.
+    :ivar notices: damage of the recording that does not prevent reading.
     :raises InputError: if there is no recording or it cannot be read.
     """
 
@@ -81,17 +81,17 @@ class BagReader:
         self.start_ns, self.end_ns = self._storage.start_ns, self._storage.end_ns
         self.notices = self._storage.damages + notices
         self._types = get_typestore(Stores.ROS2_JAZZY)
-        # Messages by topic that cannot be those of a run.
+        # Count by topic of messages that cannot belong to a run.
         self.foreign: Counter[str] = Counter()
 
     @property
     def complete(self) -> bool:
-        """Return whether the recorder finished its work; see `notices` where not."""
+        """Return whether the recorder finished its work; if not, see `notices`."""
         return not self.notices
 
     @property
     def foreign_notices(self) -> tuple[str, ...]:
-        """Tell of the messages so far that cannot be those of a run, one line for each topic."""
+        """Return a line per topic on the messages so far that cannot belong to a run."""
         return tuple(f'{count} messages of {topic} are not of this run: left out'
                      for topic, count in sorted(self.foreign.items()))
 
@@ -103,12 +103,12 @@ class BagReader:
     def messages(self, topics: Collection[str] | None = None, start_ns: int | None = None,
                  end_ns: int | None = None) -> Iterator[BagMessage]:
         """
-        Yield the messages as they were serialised, in the order of their log time.
+        Yield the serialised messages, in order of log time.
 
-        :param topics: only these; names that were not recorded yield nothing, and of the
-            contract's those of another type are left out, counted in `foreign`. None for all.
-        :param start_ns: none that was logged earlier [ns]; None for no limit.
-        :param end_ns: none that was logged then or later [ns]; None for no limit.
+        :param topics: only these; names that were not recorded yield nothing. Messages of another
+            type on a topic of the contract are skipped and counted in `foreign`. None for all.
+        :param start_ns: earliest log time [ns]; None for no limit.
+        :param end_ns: log time before which to stop [ns]; None for no limit.
         :raises InputError: if the recording is damaged inside.
         """
         found = self._storage.messages(None if topics is None else frozenset(topics), start_ns,
@@ -135,9 +135,9 @@ class BagReader:
     def decoded(self, topics: Collection[str] | None = None, start_ns: int | None = None,
                 end_ns: int | None = None) -> Iterator[DecodedMessage]:
         """
-        Yield the messages with their content, in the order of their log time.
+        Yield the decoded messages, in order of log time.
 
-        :param topics: as in `messages`, like the limits.
+        :param topics: as in `messages`, as are the limits.
         :raises InputError: as `messages`, or if a message does not fit its type.
         """
         for message in self.messages(topics, start_ns, end_ns):
@@ -145,10 +145,10 @@ class BagReader:
 
     def readable(self, topics: Collection[str] | None = None) -> Iterator[DecodedMessage]:
         """
-        Yield messages as `decoded` does, but those that do not fit their type.
+        Yield messages as `decoded` does, but skip those that do not fit their type.
 
-        In a recording of a graph in which anybody may speak one such message must not cost the
-        run; they are counted in `foreign`.
+        Any node of a ROS graph may publish, so one such message must not make the run unreadable.
+        They are counted in `foreign`.
 
         :raises InputError: as `messages`.
         """
@@ -160,7 +160,7 @@ class BagReader:
 
     def decode(self, message: BagMessage) -> DecodedMessage:
         """
-        Return a message with its content.
+        Return a decoded message.
 
         :raises InputError: if it does not fit its type.
         """
@@ -170,7 +170,7 @@ class BagReader:
 
     def latched(self, topic: str) -> DecodedMessage | None:
         """
-        Return the last message of a topic, which a late subscriber of a latched one would get.
+        Return the last message of a topic, as a late subscriber to a latched topic gets it.
 
         :raises InputError: as `decoded`.
         """
@@ -187,7 +187,7 @@ class BagReader:
             decode = {BIG_ENDIAN: codec.deserialize_cdr_be,
                       LITTLE_ENDIAN: codec.deserialize_cdr_le}[data[:2]]
             message, end = decode(data[HEADER_BYTES:], 0, codec.cls, self._types)
-            # The middleware may reserve more than a message needs; the rest means nothing.
+            # The middleware may reserve more than a message needs; the rest is ignored.
             if end + HEADER_BYTES > len(data):
                 raise ValueError(f'it needs {end + HEADER_BYTES} bytes and has {len(data)}')
             return message
@@ -196,7 +196,7 @@ class BagReader:
                              'the recording is damaged; record again') from error
 
     def _learn(self, topic: str, type_name: str) -> None:
-        """Take the definition of a type that is none of the standard ones from the recording."""
+        """Register a non-standard type by its definition in the recording."""
         definition = self._storage.definition(type_name)
         if not definition:
             raise InputError(f'{topic} has the type {type_name}, which is not known and which the '
@@ -207,7 +207,7 @@ class BagReader:
                               if name not in self._types.fielddefs})
 
     def close(self) -> None:
-        """Let go of the files."""
+        """Close the files."""
         self._storage.close()
 
     def __enter__(self) -> Self:
@@ -219,7 +219,7 @@ class BagReader:
 
 
 def _files_of(family: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """Find the MCAP files of a recording in several folders, and say which are of no use."""
+    """Find a recording's MCAP files in several folders; also return notices on unusable ones."""
     files: list[Path] = []
     notices: list[str] = []
     refusal: InputError | None = None
@@ -228,7 +228,7 @@ def _files_of(family: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]
             McapFile(file)
             files.append(file)
         except InputError as error:
-            # A recorder that was killed at once has written nothing yet.
+            # A recorder that was killed right after its start has written nothing.
             notices.append(f'{error.what} ({file.parent.name}/{file.name}): left out')
             refusal = error
     if not files:
@@ -238,7 +238,7 @@ def _files_of(family: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]
 
 
 def _listed_files(folder: Path) -> tuple[tuple[Path, ...], str, bool]:
-    """Return the files that the metadata of a folder names, their storage, if compressed."""
+    """Return the files in a folder's metadata, their storage, and whether they are compressed."""
     metadata = read_metadata(folder)
     where = str(folder / METADATA_FILE)
     if metadata.storage not in _SUFFIXES.values():
@@ -255,7 +255,7 @@ def _listed_files(folder: Path) -> tuple[tuple[Path, ...], str, bool]:
 
 
 def _single_file(path: Path) -> Path:
-    """Return the file to read where there is no metadata."""
+    """Return the file to read without metadata."""
     if path.is_file():
         candidates = [path]
     else:

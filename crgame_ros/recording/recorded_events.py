@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The events of a recorded run: which there were, and which took effect when."""
+"""Reads the events of a recorded run, and when they took effect."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class RecordedEvents(NamedTuple):
     The events of a recorded run.
 
     :param known: names of the events of the recorded game.
-    :param fired: what took effect, in order.
+    :param fired: the events that took effect, in order.
     """
 
     known: frozenset[str]
@@ -43,11 +43,11 @@ def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
                     game = parse_game_document(message.data)
                     games[game.epoch] = game
                 else:
-                    # Each message tells everything since the start of its run.
+                    # Each message holds all events since the start of its run.
                     number, events = parse_events_document(message.data)
                     fired[number] = events
             except InputError:
-                # Anybody may have published on these topics.
+                # The message may come from a foreign publisher.
                 continue
     chosen = max(games, default=None) if epoch is None else epoch
     if chosen is None or chosen not in games:

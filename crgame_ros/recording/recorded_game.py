@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The game that a recording carries: to run it again without any other file."""
+"""Reads the game in a recording, to run it again without any other file."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,10 +19,10 @@ from crgame_ros.yaml_text import parse_yaml
 
 class RecordedGame(NamedTuple):
     """
-    A game out of a recording.
+    A game from a recording.
 
-    :param game: every human is driven by the recording, from where it started; its scenario is
-        the recording itself, which no XML reader takes.
+    :param game: the game, with every human driven by the recording from the recorded start; its
+        scenario path is the recording itself, which is not an XML file.
     :param loaded: the recorded scenario.
     """
 
@@ -32,7 +32,7 @@ class RecordedGame(NamedTuple):
 
 def read_game_document(bag: Path) -> GameDocument:
     """
-    Read what a recording says of its game.
+    Read the game document of a recording.
 
     :raises InputError: if a document of the run is missing.
     """
@@ -46,8 +46,8 @@ def read_recorded_game(bag: Path, *, other_planners: bool = False) -> RecordedGa
 
     :param other_planners: whether the user names the planners, so that the recorded ones are not
         needed.
-    :raises InputError: if it is not in the recording, or names code outside this package: what to
-        execute is for people to say, not for a file that came from somewhere.
+    :raises InputError: if it is not in the recording, or names code outside this package: only the
+        user may choose code to execute, not a file of unknown origin.
     """
     with BagReader(bag) as reader:
         run = read_epoch(reader)
@@ -70,7 +70,7 @@ def read_recorded_game(bag: Path, *, other_planners: bool = False) -> RecordedGa
 
 
 def _named_code(game: Game, other_planners: bool) -> list[str]:
-    """List the models that are `module:Class` or `file.py:Class`."""
+    """Return the models of the form `module:Class` or `file.py:Class`."""
     avs = game.avs or ()
     names = [model.name for av in avs for model in (av.tracker.model, av.dynamics)]
     names += [human.dynamics.name for human in game.humans if human.dynamics is not None]

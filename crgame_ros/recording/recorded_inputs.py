@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded human again: the inputs of a recording, for both runners."""
+"""Reads the inputs of recorded humans, to replay them in both runners."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 class RecordedInputs(NamedTuple):
     """
-    What the humans of recordings did, by the cycle in which the recorded run consumed it.
+    The inputs of recorded humans, by the cycle in which the recorded run consumed them.
 
-    :param drivers: by human, and by AV that somebody took over.
-    :param intervals_s: (n) Delta t_eff that reproduce the recorded states to the last bit [s];
-        None without a recording.
+    :param drivers: by human, and by AV that a driver took over.
+    :param intervals_s: (n) Delta t_eff that reproduce the recorded states bit for bit [s]; None
+        without a recording.
     """
 
     drivers: dict[str, ReplayDriver]
@@ -65,8 +65,8 @@ def recorded_inputs(setup: Setup) -> RecordedInputs:
 
 
 def inputs_of(result: OfflineResult) -> RecordedInputs:
-    """Return what the humans of an offline run did, and who took over its AVs."""
-    # Row 0 was consumed by no step.
+    """Return the inputs of an offline run's humans, and of drivers who took over its AVs."""
+    # No step consumed row 0.
     drivers = {human.id: ReplayDriver(result.commands[1:, place])
                for place, human in enumerate(result.setup.humans)}
     drivers.update({av.id: ReplayDriver(result.av_commands[1:, place])
@@ -76,7 +76,7 @@ def inputs_of(result: OfflineResult) -> RecordedInputs:
 
 
 def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:
-    """Refuse a recording whose commands mean nothing in this run."""
+    """Refuse a recording of another scenario or rate than this run's."""
     if recorded.scenario_sha256 != setup.loaded.sha256:
         raise InputError(
             f'was recorded in another scenario ({recorded.benchmark_id}) than '
@@ -90,7 +90,7 @@ def _check_same(setup: Setup, recorded: GameDocument, bag: Path) -> None:
 
 def replay_notices(setup: Setup) -> tuple[str, ...]:
     """
-    Say, one line each, which recorded humans will not take their recorded ways, and why.
+    Return a line for each recorded human who will not drive the recorded path, with the reason.
 
     :raises InputError: if a recording cannot be used, or is of another scenario or rate.
     """
@@ -117,12 +117,12 @@ def replay_notices(setup: Setup) -> tuple[str, ...]:
 def with_recorded_events(game: Game, fired: Sequence[FiredEvent],
                          known: Collection[str] | None = None) -> Game:
     """
-    Let events take effect when they did in a recorded run, and no other one by itself.
+    Return a game whose events take effect when they did in a recorded run, and only then.
 
     :param game: the game to play.
-    :param fired: what took effect in the recorded run.
-    :param known: names of the recorded game's events, others stay as they are; None for all of
-        the game to play.
+    :param fired: the events that took effect in the recorded run.
+    :param known: names of the recorded game's events, others are unchanged; None for all of the
+        game to play.
     """
     steps = {event.name: event.k for event in fired}
     return replace(game, events=tuple(
@@ -133,7 +133,7 @@ def with_recorded_events(game: Game, fired: Sequence[FiredEvent],
 
 def with_replayed_events(setup: Setup) -> Setup:
     """
-    Repeat the recorded events, too, where a human's driver is `replay:BAG`.
+    Return the setup with the recorded events, if a human's driver is `replay:BAG`.
 
     :raises InputError: if the recording cannot be used.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The plans of a recorded run, one after the other, each with the request that it answers."""
+"""Reads the plans of a recorded run one by one, each with the request that it answers."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
@@ -19,24 +19,24 @@ from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.storage import BagMessage
 from crgame_ros.vehicle.state import VehicleState
 
-# Requests that are kept whole until they are answered; they are large, and the engine, too, looks
-# no further back.
+# Number of whole requests kept until they are answered; they are large, and the engine does not
+# look further back either.
 _KEPT = 64
 
 
 class RecordedPlan(NamedTuple):
     """
-    A planner's answer as it was recorded.
+    A recorded answer of a planner.
 
-    :param av: whose.
+    :param av: id of the AV.
     :param stamp_ns: of the request that it answers [ns]
-    :param k: scenario step of that request; None if the stamp is that of no step.
-    :param latency_s: log time between the request, as it was sent last, and this first answer
-        to it; NaN of every further one, and where the request was not recorded [s]
-    :param plan: in the AV's scenario coordinates; None if what came was none.
-    :param fault: why it was none, empty of a plan.
-    :param told: where its planner was told that the AV is, in the same coordinates; None where
-        the request was not recorded.
+    :param k: scenario step of that request; None if the stamp belongs to no step.
+    :param latency_s: log time between the last sending of the request and this first answer to
+        it; NaN for every further answer, and if the request was not recorded [s]
+    :param plan: in the AV's scenario coordinates; None if the answer was malformed.
+    :param fault: why it was malformed, else empty.
+    :param told: the AV's state in the request, in the same coordinates; None if the request was
+        not recorded.
     """
 
     av: str
@@ -49,20 +49,20 @@ class RecordedPlan(NamedTuple):
 
 
 class OpenRequests:
-    """When requests were sent that have not been answered yet."""
+    """The sending times of requests that have not been answered yet."""
 
     def __init__(self) -> None:
         self._asked_ns: dict[tuple[str, int], int] = {}
 
     def sent(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
-        """Note a request; one that was sent again counts from the last time."""
+        """Store a request; a repeated request counts from its last sending."""
         self._asked_ns[av, stamp_ns] = log_time_ns
 
     def answered(self, av: str, stamp_ns: int, log_time_ns: int) -> int | None:
         """
-        Return the log time that an answer has taken [ns].
+        Return the log time between a request and its answer [ns].
 
-        :return: None where no request with that stamp is open.
+        :return: None if no request with that stamp is open.
         """
         asked_ns = self._asked_ns.pop((av, stamp_ns), None)
         return None if asked_ns is None else log_time_ns - asked_ns
@@ -75,7 +75,7 @@ def read_plans(path: Path, epoch: int | None = None,
 
     :param path: a recording, finished or cut off.
     :param epoch: which run, where a recording holds several; None for the last.
-    :param progress: is told how much of the recording has been read, 0 to 1.
+    :param progress: called with the share of the recording that has been read, 0 to 1.
     :raises InputError: if the recording lacks its documents, or is damaged inside.
     """
     with BagReader(path, parts=True, progress=progress) as reader:
@@ -113,7 +113,7 @@ def _plan(reader: BagReader, message: BagMessage, av: str, run: Epoch) -> tuple[
 
 
 def _requested_state(message: BagMessage, av: str) -> VehicleState | None:
-    """Return the state of the AV itself in a request; None if it does not say."""
+    """Return the state of the AV itself in a request; None if the request lacks it."""
     try:
         head = request_head(message.data, message.topic)
     except InputError:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The recorded states of driven vehicles, simulation step by simulation step."""
+"""Reads the recorded states of driven vehicles at every simulation step."""
 
 from pathlib import Path
 
@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 def recorded_states(path: Path, epoch: int | None = None) -> dict[str, NDArray[np.float64]]:
     """
-    Read what was published of each driven vehicle at the steps n = 0, 1, … of a run.
+    Read the published states of each driven vehicle at the steps n = 0, 1, … of a run.
 
-    What was not recorded, up to a second, is cubic between the states around it.
+    Gaps of up to a second are filled by cubics between the states around them.
 
     :param path: of a recording.
     :param epoch: which run, where it holds several; None for the last.

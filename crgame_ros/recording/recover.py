@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finishing what a killed recorder left, without ever risking it."""
+"""Finishes the recording of a killed recorder, without risk to its messages."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -35,10 +35,10 @@ _RECORD_HEAD_BYTES = 9
 @dataclass(frozen=True)
 class RecoverReport:
     """
-    What `recover` found and did.
+    The findings and changes of `recover`.
 
     :param path: the recording.
-    :param messages: how many messages it has now.
+    :param messages: the number of messages it has now.
     :param duration_s: from its first to its last message [s].
     :param bytes_dropped: bytes of the old files that held no readable message.
     :param rewritten: names of the files that were finished.
@@ -54,7 +54,7 @@ class RecoverReport:
 
     @property
     def changed(self) -> bool:
-        """Return whether anything was amiss; if not, nothing was touched."""
+        """Return whether the recording was changed."""
         return bool(self.rewritten) or self.metadata_written
 
 
@@ -62,15 +62,15 @@ def recover(path: Path, progress: Callable[[float], object] | None = None) -> Re
     """
     Finish a recording whose recorder was killed; leave a finished one as it is.
 
-    Each unfinished file is copied, message by message, to a file beside it, which is read back and
-    then takes its place in one step: at every moment there is one file with all messages.
+    Each unfinished file is copied, message by message, to a file beside it. The copy is read back
+    and then replaces the file in one step, so that one file with all messages exists at any time.
 
-    Of SQLite files only the metadata is written.
+    For SQLite files only the metadata is written.
 
     :param path: the folder of a recording, or a bare `.mcap` file.
-    :param progress: is told how much of a file has been copied, 0 to 1.
-    :raises InputError: if there is nothing that could be finished.
-    :raises RecordingError: if the disk refuses; the recording is then as it was.
+    :param progress: called with the copied share of a file, 0 to 1.
+    :raises InputError: if there is nothing to finish.
+    :raises RecordingError: if writing fails; the recording is then unchanged.
     """
     if not path.exists():
         raise InputError('no such file or folder', str(path), 'give a recording')
@@ -94,7 +94,7 @@ def recover(path: Path, progress: Callable[[float], object] | None = None) -> Re
 
 
 def _recover_other(path: Path) -> RecoverReport:
-    """Write the metadata of SQLite files that lack it; what has it is left as it is."""
+    """Write the metadata of SQLite files, unless they have it."""
     files = sorted(path.glob('*.db3')) if path.is_dir() else []
     written = bool(files) and not _is_described(path, files)
     if written:
@@ -105,7 +105,7 @@ def _recover_other(path: Path) -> RecoverReport:
 
 
 def _is_described(folder: Path, files: list[Path]) -> bool:
-    """Return whether the metadata of SQLite files is there and can be read by."""
+    """Return whether SQLite files have metadata with which they can be read."""
     if not _has_metadata(folder, files, False):
         return False
     try:
@@ -125,7 +125,7 @@ def _describe_databases(folder: Path, files: list[Path]) -> None:
     storages = []
     for file in files:
         try:
-            # What was written half is taken back by opening; readers open without looking.
+            # Opening rolls back unfinished transactions; readers open without this check.
             with closing(sqlite3.connect(file)) as connection:
                 (state,), *_ = connection.execute('PRAGMA quick_check(1)').fetchall()
         except sqlite3.Error as error:
@@ -149,7 +149,7 @@ def _describe_databases(folder: Path, files: list[Path]) -> None:
 
 
 def _finish(path: Path, progress: Callable[[float], object] | None) -> int | None:
-    """Rewrite a file unless it is finished and sound; return the bytes dropped, or None."""
+    """Rewrite a file unless it is finished and undamaged; return the bytes dropped, or None."""
     source = McapFile(path)
     damaged = {segment for segment in source.segments if not source.is_sound(segment)}
     if source.complete and not damaged:
@@ -173,7 +173,7 @@ def _finish(path: Path, progress: Callable[[float], object] | None) -> int | Non
 
 def _copy(source: McapFile, target: BinaryIO,
           progress: Callable[[float], object] | None) -> tuple[int, int]:
-    """Copy all messages; return how many, and the bytes of those whose channel is not known."""
+    """Copy all messages; return their number, and the bytes of those with unknown channel."""
     writer: Any = Writer(target, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(source.header.profile, source.header.library)
     schemas: dict[int, int] = {}
@@ -230,13 +230,13 @@ def _copy_record(path: Path, offset: int, size: int, writer: Writer) -> None:
 
 
 def _has_metadata(folder: Path, files: list[Path], rewritten: bool) -> bool:
-    """Return whether `metadata.yaml` is there and speaks of these files as they are now."""
+    """Return whether `metadata.yaml` exists and describes the present files."""
     if rewritten or not (folder / METADATA_FILE).is_file():
         return False
     try:
         listed = {file.name for file in read_metadata(folder).files}
     except InputError:
-        # Unreadable metadata is one of the damages that are mended here.
+        # Unreadable metadata is one kind of damage that is repaired here.
         return False
     return listed == {file.name for file in files}
 

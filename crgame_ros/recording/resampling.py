@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A run's motion at the times that its stamps say.
+Computes a run's motion at the times of its stamps.
 
-State n is stamped n dt, while who is driven by hand has been integrated over measured intervals
-(CRG 13): around a stall it is ahead of its stamp by up to the stall, and differences of positions
-disagree with speeds. Whoever exports or measures motion takes it from here.
+State n is stamped n dt, but vehicles driven by hand are integrated over measured intervals
+(CRG 13). Around a stall such a state is ahead of its stamp by up to the stall, and differences
+of positions disagree with speeds. All exports and measures of motion use this module.
 """
 
 from collections.abc import Collection, Sequence
@@ -23,22 +23,22 @@ IntArray = NDArray[np.int64]
 def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: float,
              wanted_ns: IntArray) -> FloatArray:
     """
-    Return the states of vehicles at time n dt of their motion: at the sum of its intervals.
+    Return the states of vehicles at time n dt of their motion, the sum of its intervals.
 
-    Where that sum is n dt exactly, so without any measured interval, it is the state n itself.
-    Between two states positions and heading are cubic by their rates at both ends, all else is
-    linear; up to dt ahead of the first and beyond the last a vehicle keeps its speed and yaw rate.
+    If that sum is exactly n dt, as without measured intervals, the result is state n itself.
+    Between two states, positions and heading are cubic by their rates at both ends, all else is
+    linear; up to dt before the first and after the last, a vehicle keeps its speed and yaw rate.
 
     :param states: (S, V, 8) rear-axle states, columns as in `StateColumn`, S >= 1
     :param ns: (S) their simulation steps, increasing
     :param intervals_s: (n + 1, V) interval over which each vehicle was moved in the step that led
-        to state n [s]; row 0 means nothing
+        to state n [s]; row 0 is not used
     :param dt_s: nominal step [s]
     :param wanted_ns: (K) simulation steps n
-    :return: (K, V, 8) states at n dt; NaN where a vehicle has not driven so far, as whatever the
-        clip of CRG 13 drops is missing at the end, or was not recorded yet.
+    :return: (K, V, 8) states at n dt; NaN before a vehicle was recorded, and beyond the end of its
+        motion, which the clip of CRG 13 may shorten.
     """
-    # Summed as differences, nominal intervals add up to exactly nothing.
+    # Summed as differences, nominal intervals add up to exactly zero.
     leads_s = np.cumsum(intervals_s - dt_s, axis=0)
     leads_s -= leads_s[:1]
     wanted_s = np.multiply(wanted_ns, dt_s, dtype=np.float64)
@@ -54,17 +54,17 @@ def resample(states: FloatArray, ns: IntArray, intervals_s: FloatArray, dt_s: fl
 def moved_intervals(table: CycleTable, vehicles: Sequence[str], humans: Collection[str],
                     dt_s: float, last_n: int, lost_s: FloatArray | None = None) -> FloatArray:
     """
-    Return the intervals over which each vehicle was moved in each step, as `resample` takes them.
+    Return the intervals over which each vehicle was moved in each step, for `resample`.
 
-    A human is moved over Delta t_eff, and so is an AV while somebody drives it; an AV on its plan
-    takes the nominal step.
+    A human is moved over Delta t_eff, as is an AV while a driver has it; an AV on its plan is
+    moved over the nominal step.
 
     :param table: the recorded cycles.
     :param vehicles: (V) ids.
     :param humans: which of them are humans.
     :param dt_s: nominal step [s]
-    :param lost_s: (last_n + 1) Delta t_eff of the steps that were not recorded [s], nominal where
-        None; an AV was driven there if it was in the cycle before.
+    :param lost_s: (last_n + 1) Delta t_eff of the steps that were not recorded [s], nominal if
+        None; an AV counts as driven there if it was driven in the cycle before.
     :return: (last_n + 1, V) intervals [s]
     """
     ns = table.column('n').astype(np.int64)
@@ -72,7 +72,7 @@ def moved_intervals(table: CycleTable, vehicles: Sequence[str], humans: Collecti
     effective_s = np.full(last_n + 1, dt_s) if lost_s is None else lost_s.copy()
     effective_s[ns[known]] = table.column('dt_eff_s')[known]
     intervals_s = np.full((last_n + 1, len(vehicles)), dt_s)
-    # The cycle whose driver is that of step n: the last that was recorded.
+    # The cycle that gives the driver of step n: the last recorded one.
     latest = np.searchsorted(ns, np.arange(last_n + 1), side='right') - 1
     for column, vehicle in enumerate(vehicles):
         driven = np.ones(last_n + 1, dtype=bool)
@@ -96,12 +96,12 @@ def _at(states: FloatArray, times_s: FloatArray, wanted_s: FloatArray) -> FloatA
     displacement = np.column_stack((second[:, :2] - first[:, :2], turn))
     found[:, :3] = first[:, :3] + cubic(share, length, displacement, pose_rates(first),
                                         pose_rates(second))
-    # Nothing was recorded so early or so late: the vehicle goes on as it was.
+    # Outside the recorded times the vehicle keeps its motion.
     beyond_s = (wanted_s - times_s[after])[:, np.newaxis]
     found = np.where(inside[:, np.newaxis], found, second)
     found[:, :3] += np.where(inside[:, np.newaxis], 0.0, beyond_s * pose_rates(second))
     found[:, 2] = wrap_pi_array(found[:, 2])
-    # What was recorded for that very time stays as it is to the last bit.
+    # A state recorded for exactly this time is kept bit for bit.
     exact = times_s[after] == wanted_s
     found[exact] = second[exact]
     return found

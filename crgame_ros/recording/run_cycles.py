@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The cycles of a recorded run: what each measured, and what its drivers did."""
+"""Reads the cycles of a recorded run: measurements and driver commands."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -23,10 +23,10 @@ FloatArray = NDArray[np.float64]
 
 class ReplayInputs(NamedTuple):
     """
-    What `ReplayDriver` and `run_offline` need to repeat a recorded run to the last bit.
+    The inputs with which `ReplayDriver` and `run_offline` repeat a recorded run bit for bit.
 
     :param commands: (n, 6) throttle, brake, steering, reverse, lights and put_back by human, and
-        by AV that somebody took over (NaN while it followed its plan); row i was consumed in the
+        by AV that a driver took over (NaN while it followed its plan); row i was consumed in the
         step from i to i + 1.
     :param dt_eff_s: (n) interval over which that step was integrated [s]
     """
@@ -41,7 +41,7 @@ def read_cycles(bag: Path | BagReader, epoch: int | None = None) -> CycleTable:
 
     :param bag: a recording, or its reader.
     :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if there are none, or they are not as the contract has them.
+    :raises InputError: if there are none, or they do not follow the contract.
     """
     if isinstance(bag, Path):
         with BagReader(bag, parts=True) as reader:
@@ -60,21 +60,21 @@ def cycle_tables(reader: BagReader) -> list[CycleTable]:
 
 
 def table_of(tables: Sequence[CycleTable], epoch: int | None, reader: BagReader) -> CycleTable:
-    """Put the cycles of one run together."""
+    """Join the cycles of one run."""
     epochs = [table.epoch for table in tables]
     tables = [table for table in tables if table.epoch == epoch]
     if not tables:
         raise InputError(f'no cycles of epoch {epoch} in it', str(reader.path),
                          'it has ' + (', '.join(map(str, sorted(set(epochs)))) or 'none'))
-    # Those of most cycles are the run's.
+    # The columns of most cycles are the run's.
     widths: Counter[tuple[str, ...]] = Counter()
     for table in tables:
         widths[table.columns] += len(table.rows)
     columns = widths.most_common(1)[0][0]
     rows = np.concatenate([table.rows for table in tables if table.columns == columns])
     table = CycleTable(columns, rows)
-    # Where n falls, a restarted simulation began the same epoch anew; a few cycles are none, but
-    # the first of a recording that was played once more.
+    # Where n falls, a restarted simulation began the same epoch again. A piece of a few cycles is
+    # not a run, but the start of a recording that was played once more.
     pieces = np.split(rows, np.flatnonzero(np.diff(table.column('n')) <= 0) + 1)
     runs = [piece for piece in pieces if len(piece) >= _FEW_CYCLES] or pieces
     return CycleTable(columns, runs[-1])
@@ -96,7 +96,7 @@ def _readable_tables(reader: BagReader) -> Iterator[CycleTable]:
                                      'record with this version')
                 table = CycleTable.from_message(decoded.layout.dim[1].label, decoded.data)
                 shape = _Shape.find(message.data, decoded, table.columns)
-            # The epoch of nothing is none.
+            # A message without rows has no epoch.
             epoch = table.epoch
         except (InputError, IndexError, ValueError) as error:
             reader.foreign[CYCLE_TOPIC] += 1
@@ -119,10 +119,10 @@ def _joined(block: Sequence[CycleTable]) -> CycleTable:
 
 class _Shape(NamedTuple):
     """
-    What messages have in common that differ in their numbers alone, to read those without more.
+    The common layout of messages that differ only in their numbers, to read these directly.
 
-    :param head: all that stands before the numbers.
-    :param size: how many numbers there are.
+    :param head: the bytes before the numbers.
+    :param size: the count of numbers.
     :param columns: of their rows.
     """
 
@@ -132,12 +132,12 @@ class _Shape(NamedTuple):
 
     @classmethod
     def find(cls, data: bytes, decoded: Any, columns: tuple[str, ...]) -> '_Shape | None':
-        """Find it in a message that has been decoded; None where it is laid out otherwise."""
+        """Return the layout of a decoded message; None if it has another one."""
         place = 8
         for dim in decoded.layout.dim:
             # The label, then size and stride.
             place = aligned(aligned(place, 4) + 4 + len(dim.label.encode()) + 1, 4) + 8
-        # The offset, then the number of numbers.
+        # The offset, then the count of numbers.
         place = aligned(place, 4) + 8
         shape = cls(data[:aligned(place, 8)], len(decoded.data), columns)
         right = shape.fits(data) and data.startswith(LITTLE_ENDIAN) \
@@ -145,21 +145,21 @@ class _Shape(NamedTuple):
         return shape if right else None
 
     def fits(self, data: bytes) -> bool:
-        """Return whether a message has this shape."""
+        """Return whether a message has this layout."""
         return data.startswith(self.head) and len(data) >= len(self.head) + 8 * self.size
 
     def rows(self, data: bytes) -> FloatArray:
-        """Return the rows of a message that has it."""
+        """Return the rows of a message with this layout."""
         return np.frombuffer(data, '<f8', self.size, len(self.head)).reshape(
             -1, len(self.columns))
 
 
 def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
     """
-    Read what a run's drivers did and over which intervals, cycle by cycle.
+    Read the drivers' commands and the intervals of a run, cycle by cycle.
 
     :param epoch: which run, where a recording holds several; None for the last.
-    :raises InputError: if a cycle is missing, for nothing after it could be exact.
+    :raises InputError: if a cycle is missing, since no later state could be exact.
     """
     table = read_cycles(path, epoch)
     expected = np.arange(1, len(table.rows) + 1)
@@ -169,7 +169,7 @@ def replay_inputs(path: Path, epoch: int | None = None) -> ReplayInputs:
                          'a run can be repeated exactly only from a recording without gaps')
     suffix = f'/{COMMAND_COLUMNS[0]}'
     vehicles = [name.removesuffix(suffix) for name in table.columns if name.endswith(suffix)]
-    # What an AV indicates by itself is no input.
+    # Lights that an AV shows by itself are not an input.
     return ReplayInputs({
         vehicle: np.where(drove[:, None], table.commands(vehicle), np.nan)
         for vehicle in vehicles if (drove := table.drove(vehicle)).any()

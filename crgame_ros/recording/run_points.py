@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a recorded run's vehicles and objects moved, point by point."""
+"""Reads the motion of a recorded run's vehicles and objects, point by point."""
 
 from collections.abc import Mapping, Sequence
 import struct
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
-# Behind the encapsulation and the stamp.
+# Offset of the names, after the encapsulation and the stamp.
 _NAMES = 12
 _COUNT = struct.Struct('<I')
 
@@ -26,10 +26,10 @@ FloatArray = NDArray[np.float64]
 def read_points(reader: BagReader, run: Epoch, ids: Mapping[str, Sequence[str]],
                 ) -> dict[str, dict[int, FloatArray]]:
     """
-    Read how vehicles and objects moved.
+    Read the motion of vehicles and objects.
 
-    :param ids: whose joints are wanted, by topic: objects of `OBJECT_STATES_TOPIC`, vehicles of
-        every other.
+    :param ids: ids whose joints are read, by topic: objects for `OBJECT_STATES_TOPIC`, vehicles
+        for every other.
     :return: by topic and step n: (3, joints) positions, velocities, accelerations.
     :raises InputError: if no message of a topic holds them, though it has some.
     """
@@ -42,7 +42,7 @@ def read_points(reader: BagReader, run: Epoch, ids: Mapping[str, Sequence[str]],
         try:
             stamp_ns = header_stamp_ns(message.data)
             n = scheduler.step_of_stamp(stamp_ns)
-            # The first is the run's own: others can only answer it.
+            # The first point at a stamp is the run's own: a foreign one can only follow it.
             if not run.holds(stamp_ns, message.log_time_ns) \
                     or scheduler.stamp_ns(n) != stamp_ns or n in points[message.topic]:
                 continue
@@ -60,10 +60,10 @@ class PointReader:
     """
     Reads the single points of one topic.
 
-    A run's messages differ in stamp and numbers alone: what stands before the numbers is read
-    once, then compared. That is ten times faster than to decode each.
+    A run's messages differ only in stamp and numbers: the bytes before the numbers are decoded
+    once, then compared. That is ten times faster than decoding each message.
 
-    :param wanted: names of the joints, in the order in which they are given back.
+    :param wanted: names of the joints, in the order in which they are returned.
     :param topic: for messages.
     :param reader: of the recording.
     """
@@ -80,7 +80,7 @@ class PointReader:
         """
         Return the first point of a message: (3, joints) positions, velocities, accelerations.
 
-        :raises InputError: if it is no such message, or a joint is missing.
+        :raises InputError: if it is not such a message, or a joint is missing.
         """
         data = message.data
         if self._joints >= 0 and self._fits(data):
@@ -93,7 +93,7 @@ class PointReader:
         return point
 
     def _learn(self, data: bytes, decoded: Any) -> None:
-        """Find where the numbers are in a message that has been decoded."""
+        """Store where the numbers are in a decoded message."""
         place = _NAMES
         for text in (decoded.header.frame_id, None, *decoded.joint_names):
             place = aligned(place, 4) + 4 + (0 if text is None else len(text.encode()) + 1)
@@ -106,12 +106,12 @@ class PointReader:
             place = self._rows[row] + 8 * self._joints + 4
         order = self._joint_reader.order(decoded.joint_names)
         self._order = slice(None) if order == list(range(self._joints)) else order
-        # Nothing is aligned without joints, and there is nothing to be fast about.
+        # Without joints nothing is aligned, and speed does not matter.
         if not self._joints or not self._fits(data):
             self._joints = -1
 
     def _fits(self, data: bytes) -> bool:
-        """Return whether a message has the names and lengths that were learned."""
+        """Return whether a message has the stored names and lengths."""
         size = 8 * self._joints
         return (data[:2] == LITTLE_ENDIAN and data.startswith(self._head, _NAMES)
                 and len(data) >= self._rows[2] + size

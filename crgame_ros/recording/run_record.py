@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All of a run that measures need beside its motion: what its drivers did, and its events."""
+"""Reads all data of a run that measures need: motion, drivers' commands, tasks and events."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -35,14 +35,14 @@ from numpy.typing import NDArray
 
 SEAT_ORDER_TOPIC = '/seats/order'
 _DIAGNOSTICS = '/diagnostics'
-# Of people at pages, and of devices at the machine of the game.
+# Statuses of drivers at pages, and of devices at the game's machine.
 _DRIVER = re.compile('(?:cockpit|driver)_node: (.+) driver')
 _DELAYS = ('input_delay_ms', 'round_trip_ms')
 
 
 def read_task_entries(path: Path, epoch: int) -> tuple[TaskEntry, ...]:
     """
-    Read what happened in the tasks of one run, in order; nothing of a game without tasks.
+    Read the task entries of one run, in order; empty for a game without tasks.
 
     :param epoch: which run.
     :raises InputError: if the recording cannot be read.
@@ -53,7 +53,7 @@ def read_task_entries(path: Path, epoch: int) -> tuple[TaskEntry, ...]:
             try:
                 number, entries = parse_log(message.data)
             except InputError:
-                # Anybody may have published on this topic.
+                # The message may come from a foreign publisher.
                 continue
             if number == epoch:
                 found += entries
@@ -62,11 +62,11 @@ def read_task_entries(path: Path, epoch: int) -> tuple[TaskEntry, ...]:
 
 class SeatOrder(NamedTuple):
     """
-    That somebody asked for a seat, or gave it back.
+    An order to take a seat, or to give it back.
 
-    :param n: simulation step of the newest state then.
+    :param n: simulation step of the newest state at that time.
     :param seat: the vehicle.
-    :param source: whose commands it shall obey; `game` and `planner` give it back.
+    :param source: the source of the seat's commands; `game` and `planner` give it back.
     """
 
     n: int
@@ -97,12 +97,12 @@ def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, .
                 newest = run.game.scheduler.step_of_stamp(stamp_ns) if held else None
                 continue
             if newest is None:
-                # Before the run's first state, or of another run.
+                # It came before the run's first state, or belongs to another run.
                 continue
             try:
                 found.append(_order(newest, str(reader.decode(message).message.data)))
             except InputError:
-                # Anybody may have published on this topic.
+                # The message may come from a foreign publisher.
                 continue
         return tuple(found)
 
@@ -120,12 +120,13 @@ def _order(n: int, text: str) -> SeatOrder:
 
 class RecordedDriver(NamedTuple):
     """
-    One stretch of a run that somebody drove.
+    One stretch of a run with one driver.
 
-    :param spell: who, which seat, from which step to which.
-    :param input_delay_ms: median from the hand to the first later state, at the page (drawing is
-        more) or at the machine of a device [ms]; None if not measured.
-    :param round_trip_ms: median from the page to the simulation and back [ms]; likewise.
+    :param spell: the driver, the seat, the first and the last step.
+    :param input_delay_ms: median input latency, from the hand to the first later state at the page
+        (without drawing) or at the machine of a device [ms]; None if not measured.
+    :param round_trip_ms: median round-trip time from the page to the simulation [ms]; None if not
+        measured.
     """
 
     spell: DrivingSpell
@@ -135,7 +136,7 @@ class RecordedDriver(NamedTuple):
 
 def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, ...]:
     """
-    Read who drove in a run from its recording; nobody, in one that does not say it.
+    Read the drivers of a run from its recording; empty if the recording does not name them.
 
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if there is no such run in it.
@@ -165,11 +166,11 @@ def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, 
 
 def _newer(spells: tuple[DrivingSpell, ...], text: str,
            wanted: int) -> tuple[DrivingSpell, ...]:
-    """Take what a message says of the wanted run: each says all so far."""
+    """Return the driving spells of the wanted run; each message holds all so far."""
     try:
         epoch, newer = parse_spells(text)
     except InputError:
-        # Anybody may have published on this topic.
+        # The message may come from a foreign publisher.
         return spells
     return newer if epoch == wanted else spells
 
@@ -189,18 +190,18 @@ def _median(values: list[float] | None) -> float | None:
 @dataclass(frozen=True)
 class RunRecord:
     """
-    A run that is over.
+    The data of a finished run.
 
-    :param log: how everybody moved, at the scenario's steps.
-    :param ns: (R) simulation steps n of which is known what led to them, rising; where a recorder
-        missed some they are not consecutive.
+    :param log: the motion of all vehicles and objects, at the scenario's steps.
+    :param ns: (R) simulation steps n with known commands, increasing; not consecutive if the
+        recorder missed some.
     :param commands: (R, V, 6) throttle, brake, steering, reverse, lights and put_back that the
-        step from n - 1 to n consumed, of the driven vehicles in the log's order; NaN of an AV
-        that follows its plan.
+        step from n - 1 to n consumed, of the driven vehicles in the log's order; NaN for an AV
+            that follows its plan.
     :param fired: events that took effect, in order.
     :param orders: of the seats, in order; an offline run has none.
-    :param drivers: who drove, in order; an offline run does not say it.
-    :param tasks: what happened in the game's tasks, in order.
+    :param drivers: the drivers, in order; an offline run has none.
+    :param tasks: the entries of the game's tasks, in order.
     """
 
     log: RunTrajectories
@@ -229,25 +230,25 @@ class RunRecord:
 
     def jumps(self, column: int) -> tuple[int, ...]:
         """
-        Return the log's rows at which a driven vehicle stands where it was put back.
+        Return the rows of the log at which a driven vehicle has just been put back.
 
         :param column: of the vehicle among the driven ones.
         """
         log = self.log
         ks = self.put_back.get(log.vehicles[column].id, ())
         steps = np.hypot(*np.diff(log.vehicle_states[:, column, :2], axis=0).T)
-        # Its own time may be a step behind.
+        # The vehicle's own time may be a step behind.
         return tuple(row + 1 + int(np.argmax(steps[row:row + 2]))
                      for row in np.searchsorted(log.ks, ks).tolist() if row < len(steps))
 
     def ways(self) -> NDArray[np.float64]:
-        """Return how far each driven vehicle has come (V) [m], but for where it was put back."""
+        """Return the distance driven by each vehicle (V) [m], without jumps of put-backs."""
         log = self.log
         steps = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[..., :2], axis=0), -1, 0))
         for vehicle, ks in self.put_back.items():
             column = [item.id for item in log.vehicles].index(vehicle)
             for row in np.searchsorted(log.ks, ks).tolist():
-                # Its own time may be a step behind; it stands before and after.
+                # The vehicle's own time may be a step behind; it stands before and after.
                 steps[row:row + 2, column] = 0.0
         return np.asarray(steps.sum(axis=0))
 
@@ -264,7 +265,7 @@ def read_run_record(path: Path, epoch: int | None = None,
 
 def record_of_log(path: Path, log: RunTrajectories) -> RunRecord:
     """
-    Read what else there is of a run that has been read from a recording.
+    Read the rest of a run's data after its log.
 
     :raises InputError: if its events cannot be read.
     """

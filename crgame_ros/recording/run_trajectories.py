@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a run was, on the grid of its scenario's time steps."""
+"""The trajectories of a run on the grid of its scenario's time steps."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -56,15 +56,15 @@ class RunTrajectories:
     :param ks: (K) consecutive scenario steps.
     :param vehicle_states: (K, V, 8) rear-axle states at the time (k - k0) Delta t_c of their own
         motion (`resampling`), columns as in `StateColumn`.
-    :param published_states: (K, V, 8) the states that were published at these steps, and that
-        everybody saw together: around a stall those of who is driven by hand are ahead of the
-        others. Where a recorder missed one, that of `vehicle_states`.
+    :param published_states: (K, V, 8) the states that were published at these steps, as all
+        participants saw them: around a stall, vehicles driven by hand are ahead of the others.
+        Where a recorder missed one, that of `vehicle_states`.
     :param object_poses: (K, M, 3) centre poses [m, m, rad]; NaN where absent.
     :param object_velocities: (K, M, 3) their derivatives; NaN where absent.
-    :param notices: what of the run is not in here, one line each.
+    :param notices: the parts of the run that are missing here, one line each.
     :param cycles: its recorded cycles, where they are known.
-    :param commands: (K, V, 6) that the steps which led to these states consumed, columns as in
-        `COMMAND_COLUMNS`; NaN where none is known, None where none at all is.
+    :param commands: (K, V, 6) that the steps to these states consumed, columns as in
+        `COMMAND_COLUMNS`; NaN where unknown, None if all are unknown.
     """
 
     xml_text: str
@@ -81,16 +81,16 @@ class RunTrajectories:
 
     @property
     def vehicles(self) -> tuple[ObjectDescription, ...]:
-        """Descriptions of the V driven vehicles."""
+        """Return the descriptions of the V driven vehicles."""
         return self.descriptions[:self.vehicle_states.shape[1]]
 
     @property
     def objects(self) -> tuple[ObjectDescription, ...]:
-        """Descriptions of the M other objects."""
+        """Return the descriptions of the M other objects."""
         return self.descriptions[self.vehicle_states.shape[1]:]
 
     def until(self, k: int) -> 'RunTrajectories':
-        """Return the run up to a scenario step, the step itself included; without its cycles."""
+        """Return the run up to and including a scenario step, without its cycles."""
         count = int(np.searchsorted(self.ks, k, side='right'))
         return replace(
             self, ks=self.ks[:count], cycles=None, vehicle_states=self.vehicle_states[:count],
@@ -105,15 +105,15 @@ def read_trajectories(path: Path, epoch: int | None = None,
     """
     Read a run from a recording: ours or of `ros2 bag record`, finished or cut off.
 
-    What a busy recorder missed is bridged by what other topics hold and by the states around it,
-    as far as `gap_filling` allows; a notice names each gap. Where more is missing, the run is its
-    longest piece, for the pieces could only be joined by inventing motion.
+    Gaps of a busy recorder are filled from other topics and from the states around them, as far as
+    `gap_filling` allows; a notice names each gap. If more is missing, the longest piece is
+    returned, because the pieces could only be joined by inventing motion.
 
     :param epoch: which run, where a recording holds several; None for the last.
-    :param progress: is told how much of the recording has been read, from 0 to 1 for states, then
-        for cycles.
+    :param progress: called with the share of the recording that has been read, from 0 to 1 for
+        states, then for cycles.
     :raises RunTooShortError: if the run ended before its second scenario step.
-    :raises InputError: if the recording lacks what describes the run, or its states.
+    :raises InputError: if the recording lacks the documents of the run, or its states.
     """
     with BagReader(path, parts=True, progress=progress) as reader:
         run = read_epoch(reader, epoch)
@@ -159,7 +159,7 @@ def _commands(table: CycleTable, vehicles: Sequence[str], ticks: IntArray) -> Fl
 
 
 def _wanted(reader: BagReader, vehicles: list[str], objects: list[str]) -> dict[str, list[str]]:
-    """Return whose joints to read from which topics."""
+    """Return the ids of the vehicles and objects to read, by topic."""
     wanted = {VEHICLES_TOPIC: vehicles, TICK_STATES_TOPIC: vehicles, OBJECT_STATES_TOPIC: objects}
     for topic in wanted:
         found = reader.topics.get(topic)
@@ -171,7 +171,7 @@ def _wanted(reader: BagReader, vehicles: list[str], objects: list[str]) -> dict[
 
 def _check_begun(reader: BagReader, run: Epoch, points: Mapping[str, Mapping[int, FloatArray]],
                  table: CycleTable | None, objects: Sequence[str]) -> None:
-    """See that a run went on long enough, and that what moved in it was recorded."""
+    """Check that a run was long enough, and that its vehicles and objects were recorded."""
     needed = {VEHICLES_TOPIC: points[VEHICLES_TOPIC] or points[TICK_STATES_TOPIC]}
     if objects:
         needed[OBJECT_STATES_TOPIC] = points[OBJECT_STATES_TOPIC]
@@ -193,7 +193,7 @@ def _check_begun(reader: BagReader, run: Epoch, points: Mapping[str, Mapping[int
 
 def _spare_states(points: Mapping[str, Mapping[int, FloatArray]], run: Epoch
                   ) -> dict[str, dict[int, FloatArray]]:
-    """Return what other topics tell of states that `VEHICLES_TOPIC` lacks, by topic and step."""
+    """Return other topics' points for steps that `VEHICLES_TOPIC` lacks, by topic and step."""
     states = points[VEHICLES_TOPIC]
     ticks = {n: point for n, point in points[TICK_STATES_TOPIC].items() if n not in states}
     begun = min((*states, *ticks), default=0)
@@ -217,7 +217,7 @@ def _ticks(path: Path, run: Epoch, steps: Mapping[str, IntArray],
 
 def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatArray]],
             notices: list[str]) -> CycleTable | None:
-    """Read a run's cycles, None where they are not known; take out what is not the run's."""
+    """Read a run's cycles (None if unknown), and remove points that belong to another run."""
     try:
         tables = cycle_tables(reader)
         table = table_of(tables, run.game.epoch, reader)
@@ -229,7 +229,7 @@ def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatA
     strange = [(found, n) for found in points.values() for n in found
                if n > last_n + run.game.scheduler.steps_per_tick]
     if later and strange:
-        # Where the next game is not known, its states would pass for late ones of this.
+        # Without the next game's document, its states would count as late ones of this run.
         notices.append(f'what was recorded after cycle {last_n} is of another run, whose '
                        f'{GAME_TOPIC} was not recorded: left out')
         for found, n in strange:
@@ -240,9 +240,9 @@ def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatA
 def _vehicle_states(points: Mapping[int, FloatArray], ns: IntArray, vehicles: Sequence[str],
                     run: Epoch, table: CycleTable | None, ticks: IntArray,
                     notices: list[str]) -> tuple[FloatArray, IntArray]:
-    """Return the states at those of the ticks that every vehicle has reached; give them too."""
+    """Return the states at the ticks that every vehicle has reached, and these ticks."""
     scheduler = run.game.scheduler
-    # Nothing behind a gap that cuts the run is used.
+    # Nothing after a gap that cuts the run is used.
     ns = piece_around(ns, int(ticks[0]), scheduler)
     joints = np.array([points[n] for n in ns.tolist()]).reshape(len(ns), 3, len(vehicles), 4)
     return _on_ticks(vehicles_from_joints(joints[:, 0], joints[:, 1], joints[:, 2]), ns,
@@ -256,7 +256,7 @@ def _published(points: Mapping[int, FloatArray], ticks: IntArray,
     published = resampled.copy()
     for row, n in enumerate(ticks.tolist()):
         if (point := points.get(n)) is not None:
-            # One by one, as who follows a run reads them: to the last bit.
+            # One by one, as live readers convert them, for equal bits.
             published[row] = vehicles_from_joints(*point.reshape(3, -1, len(VEHICLE_JOINTS)))
     return published
 
@@ -280,7 +280,7 @@ def _intervals(run: Epoch, table: CycleTable | None, vehicles: Sequence[str], la
 def _on_ticks(states: FloatArray, ns: NDArray[np.int64], intervals_s: FloatArray,
               scheduler: ScenarioScheduler, ticks: IntArray,
               notices: list[str]) -> tuple[FloatArray, IntArray]:
-    """Resample at the ticks n that every vehicle has reached on its own time; give them too."""
+    """Resample at the ticks n that every vehicle has reached; return these ticks too."""
     found = resample(states, ns, intervals_s, scheduler.dt_s, ticks)
     reached = np.flatnonzero(np.isfinite(found[:, :, StateColumn.X]).all(axis=1))
     if not len(reached):

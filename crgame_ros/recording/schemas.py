@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Message definitions as a recording stores them, read from the installed interface packages."""
+"""Reads message definitions, as recordings store them, from installed interface packages."""
 
 from collections.abc import Iterator
 import functools
@@ -19,7 +19,7 @@ _VEHICLE = re.compile(r'/(hv|av)\d{1,3}(/.+)')
 
 @functools.lru_cache(maxsize=4096)
 def contract_type(topic: str) -> str | None:
-    """Return package/msg/Type of a topic; None for a topic that is none of a run."""
+    """Return package/msg/Type of a topic; None for a topic that is not in the contract."""
     topics = load_contract().topics
     names = [topic]
     vehicle = _VEHICLE.fullmatch(topic)
@@ -42,14 +42,14 @@ _SEPARATOR = '=' * 80
 
 
 def share_directories() -> tuple[Path, ...]:
-    """List where interface packages may be: each AMENT_PREFIX_PATH entry, then this Python's."""
+    """Return the share folders to search: of each AMENT_PREFIX_PATH entry, then this Python's."""
     prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
     return tuple(dict.fromkeys(Path(prefix) / 'share' for prefix in prefixes if prefix))
 
 
 def schema_text(type_name: str) -> str:
     """
-    Return the definition of a message type with those of all types that it uses (`ros2msg`).
+    Return the definitions of a message type and of all types that it uses (`ros2msg`).
 
     :param type_name: such as `nav_msgs/msg/Odometry`.
     :raises InputError: if it, or a type it uses, is not installed.
@@ -59,10 +59,10 @@ def schema_text(type_name: str) -> str:
 
 def type_hash(type_name: str) -> str:
     """
-    Return the `RIHS01_...` hash of a message type, by which ROS 2 tells versions of a type apart.
+    Return the `RIHS01_...` hash of a message type, by which ROS 2 distinguishes its versions.
 
     :param type_name: such as `nav_msgs/msg/Odometry`.
-    :raises InputError: if it is not installed or its description names no hash.
+    :raises InputError: if it is not installed or its description lacks a hash.
     """
     return _type_hash(type_name, share_directories())
 

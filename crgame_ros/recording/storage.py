@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the messages of a recording come from: MCAP files, or SQLite and compressed ones."""
+"""Reads the messages of a recording from MCAP files, or from SQLite or compressed files."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -31,10 +31,10 @@ class Storage(Protocol):
     """
     The messages of a recording.
 
-    :ivar topics: what it holds, by name.
-    :ivar start_ns: log time of the first message [ns], 0 where there is none.
-    :ivar end_ns: log time of the last message [ns], 0 where there is none.
-    :ivar damages: what is wrong with it although it can be read.
+    :ivar topics: the recorded topics, in order of their names.
+    :ivar start_ns: log time of the first message [ns], 0 without messages.
+    :ivar end_ns: log time of the last message [ns], 0 without messages.
+    :ivar damages: damage that does not prevent reading.
     """
 
     topics: tuple[BagTopic, ...]
@@ -45,24 +45,24 @@ class Storage(Protocol):
     def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
                  end_ns: int | None = None) -> Iterator[BagMessage]:
         """
-        Yield the messages of these topics, or of all, in the order of their log time.
+        Yield the messages of these topics, or of all, in order of log time.
 
-        :param start_ns: none that was logged earlier [ns]; None for no limit.
-        :param end_ns: none that was logged then or later [ns]; None for no limit.
+        :param start_ns: earliest log time [ns]; None for no limit.
+        :param end_ns: log time before which to stop [ns]; None for no limit.
         """
 
     def definition(self, type_name: str) -> str:
         """Return the stored `ros2msg` definition of a type, empty where there is none."""
 
     def close(self) -> None:
-        """Let go of the files."""
+        """Close the files."""
 
 
 class McapStorage:
     """
     The messages of the MCAP files of one recording, finished or not.
 
-    :raises InputError: if a file is no MCAP file, or a file without summary is damaged inside.
+    :raises InputError: if a file is not an MCAP file, or a file without summary is damaged inside.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
@@ -88,7 +88,7 @@ class McapStorage:
 
     def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
                  end_ns: int | None = None) -> Iterator[BagMessage]:
-        """Yield the messages as `Storage` has it; only the chunks that may hold them are read."""
+        """Yield the messages as `Storage` does; read only the chunks that may hold them."""
         first_ns = 0 if start_ns is None else start_ns
         last_ns = _FOREVER_NS if end_ns is None else end_ns - 1
         for message in self._ordered(topics, first_ns, last_ns):
@@ -103,7 +103,7 @@ class McapStorage:
             key=lambda pair: pair[1].start_ns)
         held: list[BagMessage] = []
         for file, segment in order:
-            # What is earlier than this segment's start is earlier than all that follows.
+            # Messages earlier than this segment's start are earlier than all that follow.
             ready = 0
             while ready < len(held) and held[ready].log_time_ns < segment.start_ns:
                 ready += 1
@@ -151,7 +151,7 @@ def merge_topics(topics: Iterable[BagTopic]) -> tuple[BagTopic, ...]:
     for topic in topics:
         known = merged.get(topic.name, topic)
         if is_foreign(topic.name, known.type_name):
-            # Anybody may have spoken first on a topic; the run's own type is the topic's.
+            # A foreign publisher may have been first on a topic; the contract's type counts.
             known = replace(known, type_name=topic.type_name, type_hash=topic.type_hash)
         count = topic.message_count + (known.message_count if topic.name in merged else 0)
         qos = tuple(dict.fromkeys(known.qos + topic.qos))
@@ -161,7 +161,7 @@ def merge_topics(topics: Iterable[BagTopic]) -> tuple[BagTopic, ...]:
 
 class RosbagsStorage:
     """
-    SQLite recordings, and those that rosbag2 has compressed file by file or message by message.
+    The messages of SQLite recordings, or of recordings that rosbag2 compressed by file or message.
 
     :param path: the folder with its `metadata.yaml`, or a bare `.db3` file.
     :raises InputError: if it cannot be read.
@@ -179,7 +179,7 @@ class RosbagsStorage:
             # rosbags counts the end as the first instant after the last message.
             self.end_ns = self._reader.end_time - 1 if filled else 0
         self.topics = merge_topics(
-            # Metadata may give other things than text.
+            # Metadata may hold other types than text.
             BagTopic(str(connection.topic), str(connection.msgtype), connection.msgcount,
                      _qos_of(connection), str(connection.digest or ''))
             for connection in self._connections)
@@ -197,7 +197,7 @@ class RosbagsStorage:
 
     def messages(self, topics: Collection[str] | None, start_ns: int | None = None,
                  end_ns: int | None = None) -> Iterator[BagMessage]:
-        """Yield the messages as `Storage` has it."""
+        """Yield the messages as `Storage` does."""
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
         if not wanted:
             return

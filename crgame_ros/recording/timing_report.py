@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`timing.json`: what a recorded run says of its timing, planners, violations and contacts."""
+"""Computes `timing.json`: timing, planners, violations and contacts of a recorded run."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
@@ -40,7 +40,7 @@ def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleD
     """
     Find the contacts of a recorded run.
 
-    :param verdicts: of the run's vehicles as they were recorded, in order.
+    :param verdicts: the recorded verdicts of the run's vehicles, in order.
     :param fired: the run's events.
     :raises InputError: if the motion that led to one of them was not recorded.
     """
@@ -48,7 +48,7 @@ def recorded_contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleD
     told: set[tuple[str, str]] = set()
     touching = []
     for verdict in verdicts:
-        # Heartbeats repeat a contact, also after the last state.
+        # Repeated statuses repeat a contact, also after the last state.
         new = tuple(name for name in verdict.hit
                     if name in known and (verdict.vehicle_id, name) not in told)
         if new:
@@ -90,7 +90,7 @@ def _read_motions(reader: BagReader, run: Epoch) -> Motions:
 
 
 def _every_step(states: NDArray[np.float64], ns: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return states (n + 1, V, 8) at every step, those between messages by interpolation."""
+    """Return the states (n + 1, V, 8) at every step, interpolated between messages."""
     if len(ns) == ns[-1] + 1:
         return states
     turned = states.copy()
@@ -102,27 +102,27 @@ def _every_step(states: NDArray[np.float64], ns: NDArray[np.int64]) -> NDArray[n
 
 
 _DIAGNOSTICS = '/diagnostics'
-# Besides table I, what stands in every report.
+# The keys of every report besides table I.
 REPORT_KEYS = frozenset((
     'gaps', 'scenario_steps', 'planners', 'drivability', 'contacts', 'benchmark_id', 'epoch',
     'notices', 'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
     'real_time_ratio', 'time_efficiency', 'precision_ratio'))
-# Counts of a status `sim_node: <av> plans`, as the engine keeps them.
+# The engine's counts in a status `sim_node: <av> plans`.
 PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
                'steps_without_plan')
-# Of a status of a planner that braked, and of a tracked AV.
+# Prefixes in the status of a planner that braked, and of a tracked AV.
 _BRAKING, _WORST = 'braking: ', 'worst_'
 
 
 def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | None = None,
                   progress: Callable[[float], object] | None = None) -> dict[str, Any]:
     """
-    Report on a recorded run; `docs/recordings.md` and `docs/timing.md` define the keys.
+    Compute a recorded run's report; `docs/recordings.md` and `docs/timing.md` define the keys.
 
     :param bag: a recording, finished or cut off.
     :param epoch: which run, where the recording holds several; None for the last.
-    :param log: the run, where it has been read already.
-    :param progress: is told how much of the recording has been read, 0 to 1.
+    :param log: the run, if it has been read already.
+    :param progress: called with the share of the recording that has been read, 0 to 1.
     :raises InputError: if the recording lacks its documents or cycles.
     :raises CrgameError: if it holds fewer than two cycles.
     """
@@ -144,7 +144,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
         return {
             **metrics.summary().as_dict(),
             'late_steps': late.as_dict(),
-            # The first row is that of the step to n = 1.
+            # The first row belongs to the step to n = 1.
             'gaps': int(numbers[-1]) - len(numbers),
             'scenario_steps': None if log is None else
             {'first': int(log.ks[0]), 'last': int(log.ks[-1])},
@@ -165,7 +165,7 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
                         log: RunTrajectories | None = None,
                         progress: Callable[[float], object] | None = None) -> dict[str, Any]:
     """
-    Write `timing.json`; the file is there whole or not at all.
+    Write `timing.json`, completely or not at all.
 
     Parameters are those of `timing_report`.
 
@@ -179,17 +179,17 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
 
 def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability],
               fired: Sequence[FiredEvent]) -> tuple[list[dict[str, Any]] | None, tuple[str, ...]]:
-    """Return the entries of the contacts, or None and why they are not known."""
+    """Return the entries of the contacts, or None and the reason if they are not known."""
     try:
         return [item.as_dict() for item in recorded_contacts(
             reader, run, verdicts, fired)], ()
     except (InputError, ValueError, GEOSException) as error:
-        # Of states that somebody else sent there may be no outlines.
+        # States from another sender may have no outlines.
         return None, (f'contacts are not named: {error}',)
 
 
 class _Collector:
-    """Follows one run's requests, plans, diagnostics and verdicts in the order of log time."""
+    """Collects one run's requests, plans, diagnostics and verdicts in order of log time."""
 
     def __init__(self, run: Epoch) -> None:
         self._run = run
@@ -215,7 +215,7 @@ class _Collector:
         self.view = ViewPeriods()
 
     def add(self, recorded: BagMessage, reader: BagReader) -> None:
-        """Take one message; those of other runs, and those that are none, are passed over."""
+        """Process one message; skip those of other runs and malformed ones."""
         topic, _, log_time_ns, data = recorded
         if topic == EVENTS_TOPIC:
             self._add_events(recorded, reader)
@@ -223,7 +223,7 @@ class _Collector:
         stamp_ns = header_stamp_ns(data)
         if not self._run.holds(stamp_ns, log_time_ns):
             return
-        # Of requests and plans, which are large, the stamp is enough.
+        # Requests and plans are large, and their stamp is enough.
         if topic in self._requests:
             self._open.sent(self._requests[topic], stamp_ns, log_time_ns)
         elif topic in self._plans:
@@ -241,7 +241,7 @@ class _Collector:
                     self._add_status(status, stamp_ns)
 
     def _add_events(self, recorded: BagMessage, reader: BagReader) -> None:
-        """Take what has taken effect since the start of the run; each message tells all of it."""
+        """Store the events since the start of the run; each message holds all of them."""
         try:
             epoch, fired = parse_events_document(reader.decode(recorded).message.data)
         except InputError:
@@ -257,7 +257,7 @@ class _Collector:
             return
         latency_ms = lapse_ns * 1e-6
         if stamp_ns == self._run.game.scheduler.clock_offset_ns:
-            # The run waits for this answer, and the planner for its imports.
+            # The run waits for this first answer, and the planner for its imports.
             self._first_latency_ms[av] = latency_ms
         else:
             self._latencies_ms[av].append(latency_ms)
@@ -277,7 +277,7 @@ class _Collector:
             self._ages_ms[status.name].append(float(values['age_ms']))
 
     def _add_verdict(self, vehicle: str, status: Any) -> None:
-        """Note what has begun to be violated; heartbeats repeat what lasts."""
+        """Store new violations; repeated statuses contain those that last."""
         violated = set(status.message.split('; ')) if status.level else set()
         values = read_status(status).values
         n = _count(values, 'n')
@@ -290,12 +290,12 @@ class _Collector:
                 vehicle, True, values.get('road_compliance') == 'false', hit, n))
 
     def planner(self, av: str) -> dict[str, Any]:
-        """Sum up one AV; None stands for what was not recorded."""
+        """Return the report on one AV; None for values that were not recorded."""
         engine = self._statuses.get(f'sim_node: {av} plans', {})
         name = f'planner_node: {av}'
         node = self._statuses.get(name, {})
         report: dict[str, Any] = {key: _count(engine, key) for key in PLAN_COUNTS}
-        # The node reports its counts now and then, but every fallback at once.
+        # The node reports its counts at intervals, but every fallback immediately.
         report['last_refusal'] = engine.get('last_refusal') or None
         report['plans'] = max(self._answers[av], _count(node, 'plans') or 0)
         report['fallback'] = _count(node, 'fallbacks')
@@ -316,7 +316,7 @@ def _count(values: dict[str, str], key: str) -> int | None:
 
 
 def spread_of(samples: Sequence[float] | NDArray[np.float64]) -> dict[str, float] | None:
-    """Return median, 99th percentile and maximum; None of nothing."""
+    """Return median, 99th percentile and maximum; None without samples."""
     values = np.array(samples)
     if not len(values):
         return None

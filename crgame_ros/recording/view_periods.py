@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What people in the cockpit's seats saw, from when to when, as cockpit_node told of it."""
+"""Summarises the views and sounds of the cockpit's seats, as reported by cockpit_node."""
 
 from collections.abc import Iterable, Mapping
 import math
@@ -14,13 +14,13 @@ _SOUND_NAME = re.compile(r'cockpit_node: ((?:hv|av)[0-9]{1,3}) sound')
 
 
 class SeatSound:
-    """Sums up the statuses of each seat's sound, which come once a second and at each change."""
+    """A summary of each seat's sound statuses, which come once a second and at each change."""
 
     def __init__(self) -> None:
         self._told: dict[str, list[tuple[bool, float, float]]] = {}
 
     def add(self, status: Status) -> None:
-        """Take a status; one of something else, or of somebody who tells no shares, is no news."""
+        """Process a status; ignore other statuses and those without shares."""
         found = _SOUND_NAME.fullmatch(status.name)
         if found is None:
             return
@@ -32,7 +32,7 @@ class SeatSound:
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """
-        Return by seat: the share of the statuses that had it on, median volume then, and rumble.
+        Return by seat: the share of statuses with sound on, the median volume then, and rumble.
 
         :return: `on_share`, `volume` (null if it was never on) and `rumble`, each 0 to 1.
         """
@@ -62,21 +62,21 @@ _MEASURES = ('across_deg', 'screen_width_m', 'eye_distance_m', 'width_px', 'heig
 
 class _Told(NamedTuple):
     time_s: float
-    # What makes a new period when it changes, by key.
+    # The values by key; a change of one begins a new period.
     choice: dict[str, Any]
     ratio: float | None
     rate_hz: float | None
 
 
 class ViewPeriods:
-    """Sums up the statuses of each seat's view, which come once a second and at each change."""
+    """A summary of each seat's view statuses, which come once a second and at each change."""
 
     def __init__(self) -> None:
         self._told: dict[str, list[_Told]] = {}
 
     def add(self, status: Status, time_s: float) -> None:
         """
-        Take a status; one of something else, or of a page that has told nothing yet, is no news.
+        Process a status; ignore other statuses and those of pages that have not reported yet.
 
         :param time_s: of the run's clock [s]
         """
@@ -93,10 +93,10 @@ class ViewPeriods:
 
     def as_dict(self) -> dict[str, list[dict[str, Any]]]:
         """
-        Return by seat the periods in which one thing was shown in one way.
+        Return by seat the periods with an unchanged view.
 
-        :return: of each period `from_s` and `to_s` (the run's clock; that of the next, or of the
-            last word), what was chosen, and the medians of `ratio` and `rate_hz`.
+        :return: for each period `from_s` and `to_s` on the run's clock (`to_s` is the next
+            period's start, or the last status), the choices, and medians of `ratio` and `rate_hz`.
         """
         return {seat: list(_periods(told)) for seat, told in sorted(self._told.items())}
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writing a recording: serialised messages, as they come, into MCAP in a rosbag2 folder."""
+"""Writes a recording: serialised messages, as they arrive, to MCAP in a rosbag2 folder."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -25,13 +25,13 @@ from mcap.writer import CompressionType, Writer
 
 # A file is some 5 % larger than with 0.9 s.
 FLUSH_INTERVAL_NS = 400_000_000
-# The writer keeps an index of each chunk in memory: with chunks that hold more than the busiest
-# flush interval, it grows by the flush, not by the message.
+# The writer keeps an index of each chunk in memory. A chunk holds more than the busiest flush
+# interval, so the index grows with the number of flushes, not of messages.
 CHUNK_BYTES = 4 << 20
 
 
 class _UnbufferedFile:
-    """A file whose every write reaches the operating system whole before it returns."""
+    """A file whose writes reach the operating system completely before they return."""
 
     def __init__(self, path: Path) -> None:
         self._file = path.open('xb', buffering=0)
@@ -48,7 +48,7 @@ class _UnbufferedFile:
         return self._position
 
     def flush(self) -> None:
-        """Do nothing: nothing is held back."""
+        """Do nothing: nothing is buffered."""
 
     def sync(self) -> None:
         os.fsync(self._file.fileno())
@@ -61,15 +61,15 @@ class BagWriter:
     """
     Writes `<folder>/<folder name>_0.mcap` and, when closed, `<folder>/metadata.yaml`.
 
-    Messages go to the operating system with the first that comes `FLUSH_INTERVAL_NS` after the
-    previous flush, so a recorder that is killed loses its last 0.4 s at most, provided that it
-    also calls `flush_if_due` now and then, for when no more messages come. The missing
-    `metadata.yaml` is what tells an unfinished recording from a finished one. One thread only.
+    The first message later than `FLUSH_INTERVAL_NS` after the previous flush causes the next one.
+    A killed recorder therefore loses at most its last 0.4 s, if it also calls `flush_if_due` at
+    intervals for the time without messages. An unfinished recording has no `metadata.yaml`. Not
+    thread-safe.
 
-    :param folder: made, with its parents; must not hold a recording of that name yet.
+    :param folder: created, with its parents; must not hold a recording of that name yet.
     :param now_ns: steady clock that decides when to flush [ns].
     :raises InputError: if the folder already holds a recording.
-    :raises RecordingError: if the file cannot be made.
+    :raises RecordingError: if the file cannot be created.
     """
 
     def __init__(self, folder: Path, *, now_ns: Callable[[], int]) -> None:
@@ -102,7 +102,7 @@ class BagWriter:
 
     @property
     def bytes_written(self) -> int:
-        """Size of the file so far [bytes]."""
+        """Return the size of the file so far [bytes]."""
         return self._stream.tell()
 
     def add_topic(self, name: str, type_name: str, qos: TopicQos) -> int:
@@ -111,7 +111,7 @@ class BagWriter:
 
         :param name: topic, such as `/clock`.
         :param type_name: such as `nav_msgs/msg/Odometry`.
-        :param qos: what its publisher offers; a replay offers the same.
+        :param qos: the publisher's offer; a replay offers the same.
         :returns: the channel to write its messages to.
         :raises InputError: if the type is not installed.
         :raises RecordingError: if the recording has failed.
@@ -135,13 +135,13 @@ class BagWriter:
     def write(self, channel: int, data: bytes, log_time_ns: int,
               publish_time_ns: int | None = None) -> None:
         """
-        Store one message; after a failure it only counts in `refused`.
+        Store one message; after a failure, only count it in `refused`.
 
         :param channel: from `add_topic`.
         :param data: the message as serialised by the middleware (CDR with its header).
         :param log_time_ns: when it was received, not negative [ns].
         :param publish_time_ns: when it was sent, by default the same [ns].
-        :raises RecordingError: if the disk refuses; once, and the recording is then at its end.
+        :raises RecordingError: if writing fails; raised once, and the recording then ends.
         """
         if self.failed is not None:
             self.refused += 1
@@ -173,7 +173,7 @@ class BagWriter:
 
     def flush(self) -> None:
         """
-        Hand every message so far to the operating system.
+        Write every message so far to the operating system.
 
         :raises RecordingError: as `write`.
         """
@@ -187,7 +187,7 @@ class BagWriter:
 
     def close(self) -> None:
         """
-        Finish the file and write `metadata.yaml`; does nothing after a failure or a second time.
+        Finish the file and write `metadata.yaml`; do nothing after a failure or a second time.
 
         :raises RecordingError: as `write`.
         """
@@ -195,7 +195,7 @@ class BagWriter:
             return
         try:
             self._mcap.finish()
-            # Who finds the metadata takes the recording for whole, after a power cut, too.
+            # Metadata marks a complete recording, so the data must be on the disk before it.
             self._stream.sync()
             self._stream.close()
             write_metadata(self.folder, self._metadata())
@@ -214,7 +214,7 @@ class BagWriter:
         self.failed = RecordingError(
             self.path, f'recording stopped: {error.strerror}',
             'free some space; what was stored reads, and `crgame recover` finishes the file')
-        # Closing a file on a failing disk may fail once more; the first reason is the one to tell.
+        # Closing a file on a failing disk may fail again; the first error is the one to report.
         with suppress(OSError):
             self._stream.close()
         return self.failed

@@ -56,7 +56,7 @@ class RouteLane:
         self._lines = [
             Curve.from_polyline(np.concatenate([roads.line(item).points for item in leg]))
             for leg in route.legs]
-        # Finds the nearest place of a long line fastest.
+        # The fastest way to find the nearest point of a long line.
         self._strings = [shapely.LineString(line.points) for line in self._lines]
         self.error: float | None = None
         self.worst = 0.0
@@ -78,17 +78,17 @@ class RouteLane:
         return x, y, yaw
 
 
-# A planner that is silent for so long is asked again [s] (semantics of the busy flag).
+# A planner that has not answered for this long is asked again [s] (see the busy flag).
 BUSY_TIMEOUT_S = 1.0
-# Given back by a person, the vehicle rolls on for so long until a plan from there comes [s].
+# After the driver hands the vehicle back, it rolls on for at most this long without a plan [s].
 GIVE_BACK_TIMEOUT_S = 1.0
-# Requests remembered, so that an overdue plan can still be checked and used.
+# Number of requests remembered, so that an overdue plan can still be checked and used.
 REMEMBERED_REQUESTS = 64
 
 
 @dataclass
 class AvCounters:
-    """What became of an AV's requests and plans so far."""
+    """Counters of an AV's requests and plans."""
 
     requests: int = 0
     skipped: int = 0
@@ -103,7 +103,7 @@ class AvCounters:
 
 @dataclass
 class _Asked:
-    """Where an AV was at a request, and where its planner was told it is; None: not yet known."""
+    """The true state of an AV at a request, and the state told to its planner; None: not known."""
 
     true: VehicleState
     told: VehicleState | None
@@ -131,14 +131,14 @@ class AutonomousVehicle:
         self._early: JointSeries | None = None
         self.execution = execution
         self._reference: Reference | None = None
-        # Where a tracked AV ought to be by the map, whatever its plans say.
+        # The lane that a tracked AV should follow by the map, independent of its plans.
         self.route_lane: RouteLane | None = None
-        # Where a tracked AV believes to be, if its tracker steers by that.
+        # The estimated state of a tracked AV, if its tracker steers by it.
         self.believed: VehicleState | None = None
         self._busy_since: int | None = None
         self._followed_request_n = -1
         self._without_plan = False
-        # A stopped planner is asked for nothing; the vehicle follows its last plan and brakes.
+        # A stopped planner gets no requests; the vehicle follows its last plan, then brakes.
         self.planner_running = True
         self._driven: HumanVehicle | None = None
         self._given_back_n: int | None = None
@@ -150,7 +150,7 @@ class AutonomousVehicle:
 
     @property
     def busy(self) -> bool:
-        """Return whether a request is out that has not been answered."""
+        """Return whether a request has not been answered yet."""
         return self._busy_since is not None
 
     @property
@@ -159,11 +159,11 @@ class AutonomousVehicle:
         return self._without_plan
 
     def plan_age_steps(self, n: int) -> int | None:
-        """Count the steps since the followed plan was asked for; None without a plan."""
+        """Return the steps since the request of the followed plan; None without a plan."""
         return None if self._followed_request_n < 0 else n - self._followed_request_n
 
     def wants_request(self, n: int) -> bool:
-        """Decide at a tick whether to ask the planner (algorithm 2, line 6)."""
+        """Return whether to send the planner a request at this tick (algorithm 2, line 6)."""
         if not self.planner_running:
             return False
         if self._busy_since is not None:
@@ -174,7 +174,7 @@ class AutonomousVehicle:
         return True
 
     def request_sent(self, n: int, stamp_ns: int, ego: VehicleState) -> None:
-        """Remember what the planner was asked (algorithm 2, line 8)."""
+        """Store the request that was sent to the planner (algorithm 2, line 8)."""
         self._busy_since = n
         self._asked[stamp_ns] = _Asked(ego, None if self.setup.spec.perception else ego)
         if len(self._asked) > REMEMBERED_REQUESTS:
@@ -183,11 +183,11 @@ class AutonomousVehicle:
 
     def request_perceived(self, stamp_ns: int, ego: VehicleState, n: int) -> str | None:
         """
-        Remember where the planner was told that its AV is.
+        Store the AV's pose in the perceived request that its planner receives.
 
         :param ego: of the perceived request, in the AV's scenario coordinates.
-        :param n: step from which on a plan is followed that has come before this.
-        :return: the reason for refusing such a plan.
+        :param n: step from which a plan is followed that arrived before this request.
+        :return: the reason for refusing such a plan, else None.
         """
         asked = self._asked.get(stamp_ns)
         if asked is not None:
@@ -196,15 +196,15 @@ class AutonomousVehicle:
         if early is None:
             return None
         if early.stamp_ns < stamp_ns:
-            # What was perceived for it was never heard, as while a restarted perception is still
-            # being discovered: nobody can tell where the planner took its AV to be.
+            # Its perceived request never arrived, as while a restarted perception is still
+            # being discovered. So it is unknown which pose the planner used.
             self._answered(self._scheduler.tick_of_stamp(early.stamp_ns))
             return None
         return self.offer(early, n)
 
     def offer(self, series: JointSeries, n: int) -> str | None:
         """
-        Take a planner's answer, to be followed from step n on (algorithm 2, lines 2-3).
+        Accept or refuse a planner's answer, to be followed from step n (algorithm 2, lines 2-3).
 
         :return: None if accepted, else the reason for refusing it; the last plan then stays.
         """
@@ -215,7 +215,7 @@ class AutonomousVehicle:
 
     def refuse_unasked(self, stamp_ns: int) -> str | None:
         """
-        Count an answer that answers no request, of whoever it may be.
+        Count an answer that belongs to no request, from whichever sender.
 
         :return: the reason for refusing it; None if a request has that stamp.
         """
@@ -226,7 +226,7 @@ class AutonomousVehicle:
         return reason
 
     def refuse_malformed(self, reason: str) -> None:
-        """Count an answer that could not even be read; the planner may be asked again."""
+        """Count an answer that could not be read; the planner may be asked again."""
         self._busy_since = None
         self._count_refusal(reason)
 
@@ -240,12 +240,12 @@ class AutonomousVehicle:
         if asked is None or request_n is None:
             return _answers_nothing(series.stamp_ns)
         if request_n == self._followed_request_n:
-            # An answer to a request that was sent twice says nothing new.
+            # A second answer to the same request brings nothing new.
             return None
         if request_n < self._followed_request_n:
             return f'stamp {series.stamp_ns} ns is older than the followed plan'
         if asked.told is None:
-            # The perceived request is on its way to the engine, as it was to the planner.
+            # The engine has not received the perceived request yet; the planner has.
             self._early = series
             return None
         self._answered(request_n)
@@ -276,10 +276,10 @@ class AutonomousVehicle:
     def _in_simulation(self, states: NDArray[np.float64], true: VehicleState,
                        told: VehicleState) -> NDArray[np.float64]:
         """
-        Return planned states where the vehicle is to drive them.
+        Return the planned states shifted to where the vehicle drives them.
 
-        A plan that starts where the AV wrongly believes to be is driven from where it is, unless
-        a tracker steers by that same belief.
+        A plan that starts at a wrong estimate of the AV's pose is driven from the true pose,
+        unless a tracker steers by the same estimate.
         """
         moved = told[:3] != true[:3] and not self.setup.spec.localisation_steers
         if self.setup.transform.is_identity and not moved:
@@ -296,9 +296,10 @@ class AutonomousVehicle:
 
     def drive(self, command: DriverCommand, dt_s: float) -> VehicleState:
         """
-        Move one step as a person commands, who has taken the vehicle over.
+        Move one step by the command of a driver who has taken over the vehicle.
 
-        Its planner goes on planning from where the vehicle is, for the moment it is given back.
+        The planner keeps planning from the vehicle's present state, so that a plan is ready when
+        the driver hands the vehicle back.
 
         :param command: the normalised command, within its ranges
         :param dt_s: Delta t_eff [s]
@@ -313,17 +314,17 @@ class AutonomousVehicle:
         return self.state
 
     def stand(self, state: VehicleState) -> None:
-        """Be stopped, while a person drives it, in a state without speed."""
+        """Set the state of a vehicle that was stopped, without speed, while a driver had it."""
         if self._driven is not None:
             self._driven.stand(state)
             self.state = state
 
     def advance(self, n: int) -> VehicleState:
         """
-        Move to step n along the plan (algorithm 1, line 13), or brake where it is used up.
+        Move to step n along the plan (algorithm 1, line 13), or brake once the plan is used up.
 
-        Given back by a person, the vehicle keeps speed and steering until the first plan that
-        was asked for since: an older one starts elsewhere.
+        After the driver hands the vehicle back, it keeps speed and steering until the first plan
+        requested since then: an older plan starts elsewhere.
         """
         if self._driven is not None:
             self._driven, self._given_back_n = None, n - 1
@@ -344,7 +345,7 @@ class AutonomousVehicle:
         return self.state
 
     def _tracked(self, execution: TrackedExecution, n: int) -> VehicleState:
-        """Let the tracking controller drive one step."""
+        """Move one step by the tracking controller."""
         reference = None
         if self._given_back_n is None and self._reference is not None:
             since_s = (n - 1 - self._followed_request_n) * self._scheduler.dt_s
@@ -359,7 +360,7 @@ class AutonomousVehicle:
             and (n - self._given_back_n) * self._scheduler.dt_s <= GIVE_BACK_TIMEOUT_S
 
     def _held(self, acceleration: float) -> VehicleState:
-        """Keep the steering angle for one step, at an acceleration [m/s^2], to a stop at most."""
+        """Move one step at a fixed steering angle and an acceleration [m/s^2], or to a stop."""
         state, wheelbase, dt_s = self.state, self.setup.vehicle.wheelbase, self._scheduler.dt_s
         x, y, yaw, speed, angle = step_to_rest(
             *state[:5], acceleration, 0.0, wheelbase,
@@ -368,7 +369,7 @@ class AutonomousVehicle:
                             speed * math.tan(angle) / wheelbase, 0.0)
 
     def _never_back(self, planned: VehicleState) -> VehicleState:
-        """Hold still where a late plan, braking harder than the last, lies behind the vehicle."""
+        """Return a standstill if a late plan that brakes harder lies behind the vehicle."""
         state = self.state
         along = (planned.x - state.x) * math.cos(state.yaw) \
             + (planned.y - state.y) * math.sin(state.yaw)

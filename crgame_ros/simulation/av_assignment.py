@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which planning problems of a scenario are driven, by which AV."""
+"""Assigns the planning problems of a scenario to AVs."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,23 +19,23 @@ from crgame_ros.vehicle.parameters import load_vehicle_parameters
 import shapely
 
 Part = tuple[AvSpec, PlanningProblem]
-# Problems whose vehicles would touch within these times, each at its first speed, are no cast: no
-# two planners could drive them at once [s].
+# Problems whose vehicles would touch at these times, each at its initial speed, are alternatives:
+# no two planners could drive them at once [s].
 _ON_ONE_SPOT_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 
-# So many alternatives are named in a notice; of five hundred nobody reads them all.
+# Number of alternatives listed in a notice, so that it stays readable.
 NAMED = 8
-# Leaves what the game says.
+# Keeps the setting of the game file.
 OWN: Final = 'own'
 
 
 def assign_avs(game: Game, loaded: LoadedScenario) -> tuple[list[Part], list[str]]:
     """
-    Return each AV of a game its planning problem.
+    Return the AVs of a game, each with its planning problem.
 
-    An AV for which the game names none takes the next one that nobody drives. Problems that
-    start on one spot are alternatives: of these the first is taken. The problem of a recorded
-    human is taken only by an AV that names it.
+    An AV without a named problem gets the next free one. Problems that start on one spot are
+    alternatives: the first of them is used. The problem of a recorded human is used only for an
+    AV that names it.
 
     :return: AVs in the order of the game, their `planning_problem` filled in, and remarks for
         the user.
@@ -80,7 +80,7 @@ def _refuse_unknown(specs: tuple[AvSpec, ...], problems: dict[int, PlanningProbl
 
 def _free_problems(named: list[Part],
                    loaded: LoadedScenario) -> tuple[list[PlanningProblem], list[str]]:
-    """Find the problems for AVs that name none, in the order of the file."""
+    """Find the problems for AVs without a named one, in the order of the file."""
     taken = {problem.planning_problem_id: problem for _, problem in named}
     notices: list[str] = []
     free: list[PlanningProblem] = []
@@ -109,7 +109,7 @@ def _free_problems(named: list[Part],
 
 
 def _on_one_spot(first: PlanningProblem, second: PlanningProblem) -> bool:
-    """Return whether two vehicles touch at the start, or so soon that nobody could prevent it."""
+    """Return whether two vehicles touch at the start or too soon after it to prevent."""
     if first.initial_state.time_step != second.initial_state.time_step:
         return False
     return any(shapely.intersects(_placed(first, time_s), _placed(second, time_s))
@@ -129,13 +129,13 @@ def adapt_game(game: Game, loaded: LoadedScenario, *, seed: int, planner: str = 
                perception: PerceptionSpec | str | None = OWN,
                traffic: TrafficSpec | str | None = OWN) -> Game:
     """
-    Let a game's AVs and traffic be others.
+    Return a game with other planners, perception or traffic.
 
     :param seed: of everything random.
     :param planner: of all AVs, or OWN.
     :param options: of that planner.
     :param perception: of all AVs; None is perfect, OWN the game's.
-    :param traffic: None is none, OWN the game's.
+    :param traffic: None is no traffic, OWN the game's.
     :raises InputError: if the scenario has no planning problems for the game's AVs.
     """
     specs = [spec for spec, _ in assign_avs(game, loaded)[0]]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What executes an AV's plans and perceives the world for it, made from what its game says."""
+"""Builds an AV's plan execution and perception from the game file."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
-# Of models that are made only to see whether they can be [s].
+# Time step of models that are built only to check their options [s].
 CHECKING_STEP_S = 0.01
 
 
@@ -42,9 +42,9 @@ def make_vehicle_model(spec: ModelSpec | None, vehicle: VehicleParameters,
 def make_execution(spec: AvSpec, vehicle: VehicleParameters,
                    dt_s: float) -> TrackedExecution | None:
     """
-    Make what tracks an AV's plans; None if it follows them exactly.
+    Build the tracked execution of an AV's plans; None if the AV follows them exactly.
 
-    :raises InputError: if a model cannot be made, or there is no pose to steer by.
+    :raises InputError: if a model cannot be built, or no pose source exists to steer by.
     """
     if spec.execution == 'perfect':
         return None
@@ -62,10 +62,10 @@ def make_execution(spec: AvSpec, vehicle: VehicleParameters,
 def check_models(avs: Sequence[tuple[AvSpec, VehicleParameters]],
                  humans: Sequence[tuple[str, ModelSpec | None, VehicleParameters]]) -> None:
     """
-    Make every model of a game once, so that a wrong one is refused before anything starts.
+    Build every model of a game once, so that a wrong one is refused before the run starts.
 
     :param humans: id, dynamics and vehicle of each.
-    :raises InputError: naming the vehicle, the model and what there is.
+    :raises InputError: naming the vehicle, the model and the available ones.
     """
     for spec, vehicle in avs:
         make_vehicle_model(spec.dynamics, vehicle, f'{spec.id}: dynamics')
@@ -82,7 +82,7 @@ def check_models(avs: Sequence[tuple[AvSpec, VehicleParameters]],
 
 def make_localisation(spec: AvSpec, initial: VehicleState, game_seed: int,
                       dt_s: float) -> Localisation | None:
-    """Make the localisation that a tracker steers by; the same as the perception's own."""
+    """Build the localisation that a tracker steers by; it equals the perception's own."""
     if not spec.localisation_steers or spec.perception is None \
             or spec.perception.localisation is None:
         return None
@@ -108,7 +108,7 @@ def published_states(states: Sequence[VehicleState]) -> NDArray[np.float64]:
     """
     Return states (V, 8) of driven vehicles as `/vehicles/state` carries them.
 
-    Both runners let perception see these bits.
+    Both runners pass exactly these bits to perception.
     """
     joints = [np.array(rows) for rows in zip(
         *(vehicle_to_joints(state) for state in states), strict=True)]
@@ -122,9 +122,9 @@ def published(state: VehicleState) -> VehicleState:
 
 def ego_of(request: JointSeries) -> VehicleState:
     """
-    Return the state of the AV that a plan request is for, in its scenario coordinates.
+    Return the state of the AV that a plan request is for, in the AV's scenario coordinates.
 
-    :param request: or its head: the AV's joints come first.
+    :param request: the request, or only its head: the AV's joints come first.
     """
     state = vehicles_from_joints(request.positions[0, :4], request.velocities[0, :4],
                                  request.accelerations[0, :4])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the conditions of a game's events and tasks hold at a tick."""
+"""Checks the conditions of a game's events and tasks at a tick."""
 
 from collections.abc import Mapping, Sequence
 import math
@@ -15,7 +15,7 @@ ROUNDING = 1e-9
 
 class ConditionCheck:
     """
-    Looks at conditions at one tick.
+    Checks conditions at one tick.
 
     :param setup: the run.
     :param k: scenario time step.
@@ -33,7 +33,7 @@ class ConditionCheck:
         self._objects = objects
 
     def holds(self, condition: Condition) -> bool:
-        """Return whether a condition holds; NaN, somebody who is absent, makes it false."""
+        """Return whether a condition holds; it does not for an absent vehicle or object (NaN)."""
         if isinstance(condition, AtStep):
             return self._k >= condition.step
         if isinstance(condition, AtTime):

@@ -18,7 +18,7 @@ from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
-# What anything but an AV is taken to brake with [m/s^2], and to react in [s].
+# Assumed deceleration [m/s^2] and reaction time [s] of all participants but AVs.
 _BRAKING, _REACTION_S = 8.0, 1.0
 _CANNOT_BRAKE = (Role.STATIC,)
 _DO_NOT_REACT = (Role.RECORDED, Role.SCRIPTED)
@@ -29,15 +29,15 @@ class Contact:
     """
     A driven vehicle's first contact with something.
 
-    :param vehicle_id: the AV, or a human whom no AV touches there.
+    :param vehicle_id: the AV, or a human in a contact without an AV.
     :param other_id: what it touched.
-    :param other_role: who moves that.
+    :param other_role: what moves `other_id`.
     :param n: simulation step.
     :param side: of the vehicle.
-    :param kind: as nuPlan's score has it, the vehicle being the ego.
+    :param kind: as in nuPlan's score, with the vehicle as the ego.
     :param speed: of the vehicle [m/s]
     :param other_speed: of the other [m/s]
-    :param avoidable_by: ids of those who would have avoided it by braking.
+    :param avoidable_by: ids of the participants that would have avoided it by braking.
     """
 
     vehicle_id: str
@@ -52,7 +52,7 @@ class Contact:
 
     @property
     def verdict(self) -> str:
-        """Return who could have avoided it."""
+        """Return which participants could have avoided it, as text."""
         if self.n == 0:
             return 'nobody: they touch from the start'
         able = ' or '.join(self.avoidable_by) or 'nobody by braking'
@@ -61,7 +61,7 @@ class Contact:
         return able
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it (`docs/planners.md`)."""
+        """Return its JSON form (`docs/planners.md`)."""
         return {'vehicle': self.vehicle_id, 'with': self.other_id, 'n': self.n,
                 'side': self.side, 'kind': self.kind, 'speed': round(self.speed, 2),
                 'other_speed': round(self.other_speed, 2), 'avoidable_by': self.verdict}
@@ -70,7 +70,7 @@ class Contact:
 @dataclass(frozen=True)
 class Motions:
     """
-    How everything in a run moved.
+    The motions of all vehicles and objects of a run.
 
     :param descriptions: V driven vehicles, then M other objects.
     :param braking: the AVs' greatest deceleration by id [m/s^2]
@@ -90,7 +90,7 @@ class Motions:
     object_velocities: NDArray[np.float64]
 
     def course(self, column: int) -> Course:
-        """Return how one moved, by its column among the descriptions."""
+        """Return the motion of one of them, by its column among the descriptions."""
         item = self.descriptions[column]
         dt_s, driven = self.scheduler.dt_s, self.vehicle_states.shape[1]
         if column < driven:
@@ -122,7 +122,7 @@ def contacts_of(result: OfflineResult) -> tuple[Contact, ...]:
 
 
 class _Touch(NamedTuple):
-    """One touched another at a step; `stopped` names who did not make that step for it."""
+    """A touch of two vehicles at a step; `stopped` names the vehicles that it stopped."""
 
     n: int
     vehicle_id: str
@@ -135,11 +135,11 @@ def find_contacts(motions: Motions, verdicts: Iterable[VehicleDrivability],
     """
     Find the first contact of each pair, in order.
 
-    One between a human and an AV is told as the AV's, that of two AVs or humans by each. An AV
-    brakes with its vehicle's greatest deceleration after one time step of the scenario, everybody
-    else with 8 m/s^2 after 1 s, as if it looked; static obstacles cannot. Contacts with permanent
-    obstacles of a map stand among the violations only. Who is stopped by a contact overlaps
-    nobody: the event tells of it, once for both.
+    A contact between a human and an AV is reported for the AV, one between two AVs or two humans
+    for each. An AV is assumed to brake with its vehicle's greatest deceleration after one time
+    step of the scenario, all others with 8 m/s^2 after 1 s, as if attentive; static obstacles
+    cannot brake. Contacts with permanent obstacles of a map are among the violations only. A
+    vehicle that a contact stops overlaps no other; its event reports the contact, once for both.
 
     :param verdicts: of steps whose states are known.
     :param fired: events, of steps whose states are known.
@@ -177,11 +177,11 @@ def _contact(motions: Motions, touch: _Touch) -> Contact:
 
 
 def _unstopped(course: Course, n: int, dt_s: float) -> Course:
-    """Return the course of a vehicle stopped at a step, as if it had gone on into the contact."""
+    """Return the motion of a vehicle stopped at a step as if it had driven on into the contact."""
     before = max(n - 1, 0)
     poses, speeds = course.poses.copy(), course.speeds.copy()
     yaw = float(poses[before, 2])
-    # Two steps: it turned as well, and the outlines must overlap.
+    # Two steps, because it turned as well, and the outlines must overlap.
     way = 2.0 * dt_s * float(speeds[before])
     poses[n:] = poses[before] + np.array((way * np.cos(yaw), way * np.sin(yaw), 0.0))
     speeds[n:] = speeds[before]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The resolved game written as JSON text: `/scenario/game`."""
+"""The resolved game as JSON text: `/scenario/game`."""
 
 from dataclasses import asdict, replace
 import json
@@ -16,14 +16,14 @@ from crgame_ros.simulation.task_check import task_seat
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import table_text
 
-# How an AV executes its plans and perceives the world.
+# Fields for the execution of an AV's plans and for its perception.
 _EXECUTION = ('tracker', 'dynamics', 'perception')
 
 
 def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
                   real_time_factor: float) -> str:
     """
-    Write the resolved game (fields as in the contract, `/scenario/game`).
+    Return the resolved game as JSON (fields as in the contract, `/scenario/game`).
 
     :param epoch: counts resets.
     :param clock_offset_ns: simulation time of n = 0 [ns]
@@ -68,9 +68,9 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
 
 def _vehicle_entry(vehicle: VehicleParameters) -> dict[str, Any]:
     """
-    Write a vehicle; JSON has no infinity, so a limit that is none becomes null.
+    Return the JSON entry of a vehicle; JSON has no infinity, so an infinite limit becomes null.
 
-    The steering ratio's table is written out: who reads this has not its file.
+    The table of the steering ratio is written out: readers do not have its file.
     """
     values = asdict(vehicle) | {'steering_ratio': table_text(vehicle.steering_ratio)}
     return {key: None if value == math.inf else value for key, value in values.items()}

@@ -42,17 +42,17 @@ from numpy.typing import NDArray
 
 class StepResult(NamedTuple):
     """
-    What one step brought about.
+    The result of one step.
 
     :param n: simulation step that the state now belongs to.
     :param k: scenario time step that n belongs to.
-    :param tick: True where k has just advanced; only then are objects and requests given.
+    :param tick: True if k has just advanced; only then objects and requests are filled in.
     :param requests: the plan requests to send, by AV id.
-    :param objects: poses of everything that is no driven vehicle.
+    :param objects: poses of all objects other than the driven vehicles.
     :param fired: the events that took effect in this step.
-    :param agents_k: tick whose agents the objects show, less than k if traffic is late; None
-        without agents.
-    :param tasks: what has happened in the game's tasks since the step before.
+    :param agents_k: tick of the agents' states in the objects, less than k if traffic is late;
+        None without agents.
+    :param tasks: the entries of the game's tasks since the step before.
     """
 
     n: int
@@ -67,16 +67,16 @@ class StepResult(NamedTuple):
 
 class Simulation:
     """
-    Humans, AVs and objects on one integer time line.
+    A simulation of humans, AVs and objects on one integer time line.
 
     State n is the state at n dt. A step consumes plans and commands, moves the humans over the
     measured interval and the AVs along their plans to n + 1, and at each tick of the scenario
-    takes the snapshot that the planners are asked with.
+    builds the snapshot for the planners' requests.
 
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
     :param feed: moves the agents of traffic; None moves them in process.
-    :param traces: (N, 8) states by human, from step 0 on, who takes these instead of being driven.
+    :param traces: (N, 8) states by human, from step 0 on, that replace driving.
     """
 
     def __init__(self, setup: Setup, clock_offset_ns: int = 0, feed: TrafficFeed | None = None,
@@ -121,45 +121,45 @@ class Simulation:
 
     @property
     def objects(self) -> ObjectStates:
-        """States of everything that is no driven vehicle, at the present tick."""
+        """Return the states of all objects other than the driven vehicles, at the present tick."""
         return self._world.objects
 
     @property
     def states(self) -> list[VehicleState]:
-        """States of the driven vehicles at n: humans, then AVs; simulation coordinates."""
+        """Return the driven vehicles' states at n: humans, then AVs; simulation coordinates."""
         return [driven.state for driven in self._driven]
 
     @property
     def lights(self) -> list[int]:
-        """Bits of `Light` that each driven vehicle shows at n; an AV by itself as it plans."""
+        """Return the bits of `Light` of each driven vehicle at n; an AV's follow its plan."""
         planned = chain([0] * len(self.humans), self._indicators.shown)
         return [bits if command is None else command.lights
                 for bits, command in zip(planned, self.commands, strict=True)]
 
     @property
     def command_rows(self) -> list[Sequence[float]]:
-        """`COMMAND_COLUMNS` of each driven vehicle at n; lights alone where nobody drives."""
+        """Return `COMMAND_COLUMNS` of each driven vehicle at n; without driver only lights."""
         return [lights_alone(bits) if command is None else command
                 for bits, command in zip(self.lights, self.commands, strict=True)]
 
     def begin(self) -> StepResult:
-        """Return the requests and objects of step 0, before anything has moved."""
+        """Return the requests and objects of step 0, before any motion."""
         self._localise()
         self._add_to_hash()
         return self._result()
 
     def request_perceived(self, av_id: str, request: JointSeries) -> str | None:
         """
-        Take what an AV's planner is told instead of the true request.
+        Store the perceived request that an AV's planner receives instead of the true one.
 
-        :return: the reason for refusing a plan that has come before it, else None.
+        :return: the reason for refusing a plan that arrived before it, else None.
         """
         return self._av_by_id[av_id].request_perceived(
             request.stamp_ns, ego_of(request), self.n + 1)
 
     def offer_plan(self, av_id: str, plan: JointSeries) -> str | None:
         """
-        Hand a planner's answer to its AV, to be followed from the next step on.
+        Pass a planner's answer to its AV, to be followed from the next step on.
 
         :return: None if accepted, else the reason for refusing it.
         """
@@ -167,7 +167,7 @@ class Simulation:
 
     def unasked_plan(self, av_id: str, stamp_ns: int) -> str | None:
         """
-        Look at a planner's answer by its stamp alone, and count it if it is refused.
+        Check a planner's answer by its stamp alone, and count it if it is refused.
 
         :return: None if it answers a request, else the reason for refusing it.
         """
@@ -178,12 +178,12 @@ class Simulation:
         self._av_by_id[av_id].refuse_malformed(reason)
 
     def set_planner_running(self, av_id: str, running: bool) -> None:
-        """Stop an AV's planner, which is then asked for no plan, or let it go on."""
+        """Stop or restart an AV's planner; a stopped planner gets no requests."""
         self._av_by_id[av_id].planner_running = running
 
     def trigger(self, name: str) -> str | None:
         """
-        Let an event of the game take effect at the next tick, or a task begin or end.
+        Trigger an event of the game at the next tick, or begin or end a task.
 
         :return: None if it will, else the reason why not.
         """
@@ -195,25 +195,25 @@ class Simulation:
 
     def report_task(self, report: TaskReport) -> str | None:
         """
-        Take what a page has shown of a task or its driver answered, at the next step.
+        Accept a page's report about a task, or its driver's answer, for the next step.
 
-        :return: None if it is taken, else the reason why not.
+        :return: None if it is accepted, else the reason why not.
         """
         return 'the game has no tasks' if self._tasks is None else self._tasks.report(report)
 
     @property
     def tasks_running(self) -> tuple[str, ...]:
-        """Names of the tasks that last now."""
+        """Return the names of the tasks that are running."""
         return () if self._tasks is None else self._tasks.running
 
     @property
     def prompts(self) -> tuple[OpenPrompt, ...]:
-        """Stimuli and requests that are neither answered nor over."""
+        """Return the stimuli and requests that are neither answered nor over."""
         return () if self._tasks is None else self._tasks.prompts
 
     @property
     def fired(self) -> tuple[FiredEvent, ...]:
-        """All events that have taken effect so far."""
+        """Return all events that have taken effect so far."""
         of_game = () if self._events is None else self._events.fired
         own = () if self._stopped is None else self._stopped.events
         return tuple(sorted((*own, *of_game), key=lambda event: event.n))
@@ -223,18 +223,18 @@ class Simulation:
         Advance from n to n + 1.
 
         :param dt_eff_s: interval that the humans are integrated over (CRG 13) [s]
-        :param commands: one for each human, in their order; then, if anybody has taken an AV over,
-            one for each AV, None for one that follows its plan
+        :param commands: one for each human, in their order; then, if a driver has taken over an
+            AV, one for each AV, None for one that follows its plan
         """
         self.move(dt_eff_s, commands)
         return self.conclude()
 
     def move(self, dt_eff_s: float, commands: Sequence[DriverCommand | None]) -> None:
         """
-        Move the driven vehicles from n to n + 1, which is half of a step: `conclude` is to follow.
+        Move the driven vehicles from n to n + 1, the first half of a step: call `conclude` next.
 
-        Parameters are those of `step`. Whoever drives can be shown what became of it before
-        planners' requests are made, which takes ten times as long.
+        Parameters are those of `step`. The new states can be shown to drivers before the planners'
+        requests are built, which takes ten times as long.
         """
         before = self.states if self._stopped is not None else []
         self.n += 1
@@ -252,7 +252,7 @@ class Simulation:
             self._stopped.act(self.n, before, self.commands, self._world.objects)
 
     def conclude(self) -> StepResult:
-        """Do what is due once the vehicles have moved: estimates, objects, events, requests."""
+        """Finish the step once the vehicles have moved: estimates, objects, events, requests."""
         self._localise()
         self._indicators.update(self.n, self.avs)
         result = self._result()
@@ -288,7 +288,7 @@ class Simulation:
 
     def _apply_events(self, events: RunEvents, k: int,
                       objects: ObjectStates) -> tuple[FiredEvent, ...]:
-        """Let events change what is there and who plans, at a tick."""
+        """Apply events to objects, agents and planners at a tick."""
         for name in () if self._tasks is None else self._tasks.due_events(self.n):
             # It may have taken effect before.
             events.trigger(name)
@@ -301,20 +301,20 @@ class Simulation:
         return fired
 
     def _task_entries(self) -> tuple[TaskEntry, ...]:
-        """Let the tasks go on, and tell what has happened in them."""
+        """Advance the tasks, and return their new entries."""
         return () if self._tasks is None else self._tasks.at_step(self.n, dict(zip(
             self.setup.vehicle_ids, (command is not None for command in self.commands),
             strict=True)))
 
     def _localise(self) -> None:
-        """Let AVs estimate the pose that they steer by."""
+        """Update the pose estimates of AVs that steer by them."""
         if self.n % self._localise_every == 0:
             for av, localisation in self._localisations:
                 localisation.step(self.n, published(av.state))
                 av.believed = localisation.estimate
 
     def _add_to_hash(self) -> None:
-        # Of traffic alone there is nothing but where it is.
+        # Traffic alone has only the states of its objects.
         states = self.states
         self._hash.update(self._packed(*chain.from_iterable(states)) if states else
                           np.array(self.objects.poses, dtype=np.float64).tobytes())
@@ -325,7 +325,7 @@ class Simulation:
 
 
 def _road_limit(setup: Setup, av: AvSetup) -> RoadLimit | None:
-    """Make what holds an external planner to the road; others' adapters do that themselves."""
+    """Build the road limit of an external planner; other planners' adapters have their own."""
     if av.spec.planner != EXTERNAL or not setup.game.drivability.road \
             or not setup.network.lanelet_ids:
         return None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Comparing a game's events with what its scenario and its vehicles are."""
+"""Checks of a game's events against its scenario and vehicles."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ def held_obstacles(game: Game) -> frozenset[int]:
 
 
 def put_obstacles(game: Game) -> tuple[ObjectDescription, ...]:
-    """Describe the obstacles that events may put."""
+    """Return the descriptions of obstacles that events may put on the road."""
     return tuple(
         ObjectDescription(str(event.object_id), event.action.type, Role.STATIC,
                           Shape.rectangle(event.action.length, event.action.width))
@@ -46,10 +46,10 @@ def put_obstacles(game: Game) -> tuple[ObjectDescription, ...]:
 def check_events(game: Game, where: str, network: RoadNetwork, obstacles: ScenarioObstacles,
                  humans: Sequence[str], avs: Sequence[AvSpec]) -> None:
     """
-    Refuse events about what is not there.
+    Refuse events about things that do not exist.
 
     :param where: file name for messages.
-    :param obstacles: of the scenario, with those that events may put.
+    :param obstacles: of the scenario, including those that events may put on the road.
     :param humans: ids of the humans' vehicles.
     :raises InputError: naming the event and what there is.
     """
@@ -71,7 +71,7 @@ def check_events(game: Game, where: str, network: RoadNetwork, obstacles: Scenar
 
 
 def _named(event: EventSpec) -> list[tuple[str, str | int]]:
-    """List what an event names, each with its kind."""
+    """Return the names in an event, each with its kind."""
     named: list[tuple[str, str | int]] = []
     action, when = event.action, event.when
     if isinstance(action, Release | Brake):
@@ -89,7 +89,7 @@ def _named(event: EventSpec) -> list[tuple[str, str | int]]:
 
 def check_changes(game: Game, where: str, agents: Sequence[str]) -> None:
     """
-    Refuse events about agents that never come, or with options that their model does not take.
+    Refuse events about agents that never appear, or with options unknown to their model.
 
     :param where: file name for messages.
     :param agents: ids of all that may be on the road.
@@ -104,7 +104,7 @@ def check_changes(game: Game, where: str, agents: Sequence[str]) -> None:
         if event.action.agent not in (ALL_AGENTS, *agents):
             raise InputError(f'there is no agent "{event.action.agent}"', place,
                              f'{_listed(agents)}; {ALL_AGENTS} is everybody')
-        # Imports numba: only runs with agents should wait for that.
+        # This imports numba, which only runs with agents should wait for.
         from crgame_ros.traffic.car_following import CAR_FOLLOWING
         CAR_FOLLOWING.create(game.traffic.model, {**game.traffic.options, **event.action.options},
                              place)
@@ -112,10 +112,10 @@ def check_changes(game: Game, where: str, agents: Sequence[str]) -> None:
 
 def check_swap(event: EventSpec, where: str, avs: Sequence[AvSpec]) -> None:
     """
-    Refuse to swap planners with a process that is none of ours.
+    Refuse to swap in or out a planner that runs in an external process.
 
     :param where: the event, for messages.
-    :raises InputError: if an external planner is to come or to go.
+    :raises InputError: if one of the planners is external.
     """
     action = event.action
     if not isinstance(action, PlannerSwap):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whoever looks on at a run: at every published state, live in a node, offline in lockstep."""
+"""Observers of every published state of a run: live in a node, offline in lockstep."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 
 class RunObserver(Protocol):
     """
-    Measures or judges a run without a part in it.
+    Measures or judges a run without taking part in it.
 
-    Offline `run_offline` is given the observers; live each is a node of its own
-    (`ros/observer_node.py`), so that none of them can hold the simulation up.
+    Offline, `run_offline` calls the observers. Live, each is a node of its own
+    (`ros/observer_node.py`), so that none of them can delay the simulation.
     """
 
     def observe(self, n: int, since_tick_s: float, vehicle_states: NDArray[np.float64],
                 objects: ObjectStates | None) -> None:
         """
-        Take a published state, in the order of time; a live one may follow after a gap.
+        Process a published state, in the order of time; live, there may be gaps.
 
         :param n: simulation step.
         :param since_tick_s: simulated time since the last scenario tick [s]
@@ -40,24 +40,24 @@ class RunObserver(Protocol):
         """
 
     def report(self) -> object:
-        """Sum up what has been observed so far."""
+        """Return a summary of the observations so far."""
 
 
 @dataclass(frozen=True)
 class ObservedRun:
     """
-    What an observer knows of a run before it begins, from a setup or from a run's documents.
+    The facts about a run before it begins, from a setup or from a run's documents.
 
     :param vehicles: (V) the driven vehicles: humans, then AVs.
     :param others: (M) everything else that can appear, in the order of its states.
     :param loaded: the scenario.
     :param scheduler: relates simulation steps, scenario ticks and time.
-    :param drivability: which violations are looked for, and whether one ends the run.
+    :param drivability: which violations are checked, and whether one ends the run.
     :param occupancy: the map of permanent obstacles; None if the game has none.
     :param av_transforms: of the AVs, from simulation to scenario coordinates (CRG 6-8)
     :param initial_states: (V, 8) rear-axle states.
-    :param problems: (V) planning problems whose goals lead the vehicles; None who has none, empty
-        where nobody has one.
+    :param problems: (V) planning problems with the vehicles' goals; None for a vehicle without
+        one, empty if no vehicle has one.
     """
 
     vehicles: tuple[ObjectDescription, ...]
@@ -72,7 +72,7 @@ class ObservedRun:
 
     @property
     def road_transforms(self) -> tuple[RigidTransform, ...]:
-        """Return through which transform each driven vehicle is seen on the road (CRG 28)."""
+        """Return the transform of each driven vehicle to the road's coordinates (CRG 28)."""
         humans = sum(item.role is Role.HUMAN for item in self.vehicles)
         return road_transforms(humans, self.av_transforms)
 
@@ -81,7 +81,7 @@ def documented_run(game: GameDocument, loaded: LoadedScenario,
                    descriptions: Sequence[ObjectDescription],
                    occupancy: OccupancyMap | None = None) -> ObservedRun:
     """
-    Return what an observer knows of a run from its documents, live or recorded.
+    Build the observers' facts about a run from its documents, live or recorded.
 
     :param descriptions: of everything that can appear.
     """
@@ -96,7 +96,7 @@ def documented_run(game: GameDocument, loaded: LoadedScenario,
 
 
 def drivability_monitor(run: ObservedRun) -> DrivabilityMonitor:
-    """Make the observer of contacts and the road, ready for the vehicles where they begin."""
+    """Build the observer of contacts and road departures, set to the initial states."""
     monitor = DrivabilityMonitor(
         run.vehicles, run.others, run.loaded.scenario.lanelet_network, run.drivability,
         run.occupancy, run.road_transforms)

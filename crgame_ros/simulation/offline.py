@@ -31,10 +31,10 @@ from numpy.typing import NDArray
 
 def offline_driver(setup: Setup, index: int) -> DriverSource:
     """
-    Make the driver that a game names for a human.
+    Build the driver that a game names for a human.
 
     :param index: of the human.
-    :raises InputError: if it needs a person, a device or a recording that isn't at hand.
+    :raises InputError: if it needs a person, a device or a recording that is not available.
     """
     human = setup.humans[index]
     source = parse_source(human.driver)
@@ -43,7 +43,7 @@ def offline_driver(setup: Setup, index: int) -> DriverSource:
     if source.kind in ('idle', 'auto'):
         return IdleDriver()
     if source.kind == 'policy':
-        # Few games have one, and others should not wait for what it needs.
+        # Few games have a policy driver; the others should not wait for its imports.
         from crgame_ros.policy.driver import DrivenSeat, PolicyDriver
         from crgame_ros.policy.policy_file import load_policy
         transforms = road_transforms(len(setup.humans), [av.transform for av in setup.avs])
@@ -61,11 +61,11 @@ DEFAULT_DURATION_S = 20.0
 @dataclass(frozen=True)
 class PlannerRecord:
     """
-    What an AV's planner did.
+    The results of an AV's planner.
 
     :param counters: requests and plans as the engine saw them.
     :param statistics: answers, braking plans and times of the planner itself.
-    :param tracking: worst errors of a tracked AV against its plans; None of one that follows them
+    :param tracking: worst errors of a tracked AV against its plans; None if it follows them
         exactly.
     :param lane_error: largest distance of a tracked AV from its route's lane [m]
     """
@@ -77,7 +77,7 @@ class PlannerRecord:
 
     @property
     def accepted_ratio(self) -> float:
-        """Share of the planner's answers that were accepted and no fallback."""
+        """Return the share of the planner's answers that were accepted and not a fallback."""
         good = self.counters.accepted - self.statistics.fallbacks
         return max(0, good) / max(1, self.statistics.plans)
 
@@ -95,15 +95,15 @@ class OfflineResult:
     :param commands: (n + 1, H, 6) throttle, brake, steering, reverse, lights and put_back; row i
         was consumed by the step that led to state i, row 0 by none.
     :param intervals_s: (n + 1, V) interval over which each vehicle was moved in that step: Delta
-        t_eff where somebody drives it, else the nominal step [s]
-    :param planners: what each AV's planner did.
+        t_eff if a driver has it, else the nominal step [s]
+    :param planners: the results of each AV's planner.
     :param violations: changes of the vehicles' drivability, in order.
     :param fired: events that took effect, in order.
-    :param stop: the human's violation that ended the run, where the game has it so; its n is that
-        of the last state.
-    :param av_commands: (n + 1, A, 6) the same commands of those who took over an AV; NaN but for
-        the lights while it followed its plan.
-    :param tasks: what happened in the game's tasks, in order.
+    :param stop: the human's violation that ended the run, if the game stops at violations; its n
+        is that of the last state.
+    :param av_commands: (n + 1, A, 6) the same commands of drivers who took over an AV; NaN, except
+        for the lights, while it followed its plan.
+    :param tasks: the entries of the game's tasks, in order.
     """
 
     setup: Setup
@@ -153,14 +153,14 @@ class PlannerSeat:
                 setup.open_occupancy())
 
     def proceed(self, result: StepResult) -> None:
-        """Take in what a step has brought, and hand over what is due."""
+        """Process the result of a step, and deliver the due answers."""
         self.manager.apply([event.name for event in result.fired])
         if self.id in result.requests:
             self.ask(result.requests[self.id])
         self.deliver()
 
     def ask(self, request: JointSeries) -> None:
-        """Plan now; the answer is due after the latency (at once for the first request)."""
+        """Plan now; the answer is due after the latency (immediately for the first request)."""
         if self.perception is not None:
             request = self.perception.perceive(request)
             self._simulation.request_perceived(self.id, request)
@@ -170,12 +170,12 @@ class PlannerSeat:
         self._due.append((n + (self._latency if n else 0), series))
 
     def deliver(self) -> None:
-        """Hand over the answers that are due before the next step."""
+        """Deliver the answers that are due before the next step."""
         while self._due and self._due[0][0] <= self._simulation.n:
             self._simulation.offer_plan(self.id, self._due.pop(0)[1])
 
     def record(self) -> PlannerRecord:
-        """Sum up what the planner did."""
+        """Return the results of the planner."""
         av = next(av for av in self._simulation.avs if av.setup.id == self.id)
         return PlannerRecord(av.counters, self.manager.statistics,
                              None if av.execution is None else av.execution.worst,
@@ -191,20 +191,20 @@ def run_offline(
     traces: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> OfflineResult:
     """
-    Run a game as fast as it can.
+    Run a game as fast as possible.
 
-    :param duration_s: simulated time; the game's own where None [s]
+    :param duration_s: simulated time; None uses the game's own [s]
     :param latency_steps: simulation steps between a request and its plan.
-    :param drivers: drivers of humans by id, instead of the game's own; of AVs: they take it over.
-    :param intervals_s: Delta t_eff of each step, as recorded; the nominal step where None and
-        beyond their end [s]
-    :param check_drivability: run the monitor in lockstep; a game that stops at violations has it
-        run in any case.
-    :param clock_s: clock that times the planners, which the result doesn't depend on.
-    :param triggers: simulation step n and name of the events that somebody triggers; each takes
-        effect at the first tick from n on.
-    :param observers: are given every state that a live run publishes.
-    :param traces: (N, 8) states by human, from step 0 on, who takes these instead of being driven.
+    :param drivers: drivers by vehicle id; a human's replaces the game's own, an AV's takes over.
+    :param intervals_s: Delta t_eff of each step, as recorded; the nominal step if None and beyond
+        their end [s]
+    :param check_drivability: run the monitor in lockstep; a game that stops at violations always
+        runs it.
+    :param clock_s: clock that times the planners; the result does not depend on it.
+    :param triggers: simulation step n and name of each event triggered by hand; it takes effect at
+        the first tick from n on.
+    :param observers: receive every state that a live run publishes.
+    :param traces: (N, 8) states by human, from step 0 on, that replace driving.
     :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
     """
     simulation = Simulation(setup, traces=traces)
@@ -245,7 +245,7 @@ def run_offline(
 
 
 def observed_run(setup: Setup) -> ObservedRun:
-    """Return what observers know of a run before it begins."""
+    """Return the observers' facts about a run before it begins."""
     return ObservedRun(
         setup.vehicle_descriptions, setup.obstacles.descriptions, setup.loaded, setup.scheduler,
         setup.game.drivability, setup.open_occupancy(), tuple(av.transform for av in setup.avs),
@@ -254,7 +254,7 @@ def observed_run(setup: Setup) -> ObservedRun:
 
 
 def perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
-    """Let every perception see what is published of the present state."""
+    """Update every perception with the published part of the present state."""
     states, objects = published_states(simulation.states), simulation.objects
     since_tick_s = simulation.scheduler.since_tick_s(simulation.n)
     for perception in perceiving:
@@ -262,7 +262,7 @@ def perceive(simulation: Simulation, perceiving: Sequence[Perception]) -> None:
 
 
 def show(simulation: Simulation, result: StepResult, hands: Sequence[DriverSource]) -> None:
-    """Let drivers look at the present state, and at everything else in it at a tick."""
+    """Show drivers the present vehicle states, and at a tick all objects too."""
     looking = [hand for hand in hands if type(hand).see is not DriverSource.see]
     if looking:
         states = np.reshape(simulation.states, (-1, STATE_WIDTH))
@@ -271,7 +271,7 @@ def show(simulation: Simulation, result: StepResult, hands: Sequence[DriverSourc
 
 
 def _trigger(simulation: Simulation, triggers: Sequence[tuple[int, str]], n: int) -> None:
-    """Trigger what is due before state n is made."""
+    """Trigger the events that are due before state n is computed."""
     for due, name in triggers:
         if due == n and (reason := simulation.trigger(name)) is not None:
             raise InputError(reason, f'trigger at step {n}', 'see "events" of the game')
@@ -298,7 +298,7 @@ class _Trace:
         self.objects: list[NDArray[np.float64]] = []
         self.tasks: list[TaskEntry] = []
         self.object_velocities: list[NDArray[np.float64]] = []
-        # The steps whose states a live run publishes, and so its observers see.
+        # A live run publishes the states of these steps, so its observers see them.
         self._observe_every = steps_between_messages(setup.game.timing.rate)
         self._drivability = drivability_monitor(observed_run(setup)) \
             if check or setup.game.drivability.stop else None
@@ -320,7 +320,7 @@ class _Trace:
             self.stop, self.av_commands[:count], tuple(self.tasks))
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
-        """Take a state and the interval of the step that led to it [s]."""
+        """Add a state, and the interval of the step that led to it [s]."""
         n = simulation.n
         self.tasks += result.tasks
         for index, command in enumerate(simulation.commands):

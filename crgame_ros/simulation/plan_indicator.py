@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which indicator an AV shows: what its plan is about to do, seen on the map."""
+"""The indicator that an AV shows, derived from its plan and the map."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -19,26 +19,26 @@ from crgame_ros.vehicle.lights import Light
 import numpy as np
 from numpy.typing import NDArray
 
-# So much of a plan is looked at, at poses that are so far apart [s].
+# The plan is checked up to this time ahead, at poses this far apart [s].
 LOOK_AHEAD_S, APART_S = 5.0, 0.5
-# Nobody sees whether an indicator begins a moment later: the AVs take turns [s].
+# The AVs take turns in this interval: the small delay of an indicator is not visible [s].
 LOOK_EVERY_S = 0.5
-# A vehicle that plans to stop before a fork shows from there on where its route goes [m].
+# A vehicle that plans to stop this close to a fork indicates its route's direction [m].
 BEFORE_FORK = 30.0
-# A turn is over when so much of it is left [rad].
+# A turn counts as finished when this much of it is left [rad].
 TURNED = math.radians(15.0)
-# A lane change is over so near to the middle of the new lane [m], or where a plan that goes on
-# so far comes no nearer to it than that [m].
+# A lane change counts as finished this close to the centre line of the new lane [m], or when a
+# plan of this length gets no closer to it than that [m].
 SETTLED = 0.4
 GOES_ON, NEARER = 1.0, 0.1
 
 
 class PlanIndicator:
     """
-    Indicates turns at forks and lane changes, as long as a plan has them and until they are done.
+    Indicates turns at forks and lane changes while a plan has them and until they are finished.
 
-    Planners say nothing of indicators: their plans do. Where a plan ends before a fork, as at a
-    red light, the route to the goal tells the way.
+    Planners send no indicators, so these come from the plans. If a plan ends before a fork, for
+    example at a red light, the route to the goal decides.
 
     :param roads: roads with one lanelet at least.
     :param turns: of these roads.
@@ -57,14 +57,14 @@ class PlanIndicator:
         self._turns = turns
         # The side of a lane change that has begun, and a lanelet of the new lane.
         self._changing: tuple[Light, int] | None = None
-        # Where it was last, and from where it came there, if that is known.
+        # The lanelet it is on, and the one it came from, if that is known.
         self._here: int | None = None
         self._before: int | None = None
         self.shown = 0
 
     def update(self, poses: NDArray[np.float64]) -> None:
         """
-        Look at what is left of a plan.
+        Update the indicator from the rest of a plan.
 
         :param poses: (N, 3) x [m], y [m], yaw [rad] in the roads' coordinates, one or more; the
             first is that of the vehicle now, the others are ahead.
@@ -78,23 +78,23 @@ class PlanIndicator:
                          or self._at_fork(lanelets, poses[0]) or 0)
 
     def forget(self) -> None:
-        """Show nothing, until there is another plan."""
+        """Show no indicator until the next plan."""
         self._changing, self._here, self._before, self.shown = None, None, None, 0
 
     def _come_to(self, here: int) -> None:
-        """Remember from which lanelet the vehicle came to the one where it is."""
+        """Store the present lanelet, and the one from which the vehicle came to it."""
         if here != self._here:
             passed = () if self._here is None else self._turns.between(self._here, here)
             self._before = (self._here, *passed)[-2] if passed else None
             self._here = here
 
     def _unfinished(self, lanelets: Sequence[int], poses: NDArray[np.float64]) -> Light | None:
-        """Go on with a lane change up to the middle of the new lane, if the plan leads there."""
+        """Return the side of an unfinished lane change, if the plan still makes it."""
         if self._changing is None:
             return None
         side, new = self._changing
         here = lanelets[0]
-        # Not yet over the line, it is up to the plan: the change may have been given up.
+        # Before the vehicle crosses the line the plan decides: the change may have been given up.
         if here == new or self._turns.between(new, here) or self._turns.between(here, new):
             to_go = -self._aside(lanelets, poses) * (1.0 if side is Light.LEFT else -1.0)
             stays = len(to_go) == 1 or math.dist(poses[0, :2], poses[-1, :2]) < GOES_ON
@@ -106,9 +106,9 @@ class PlanIndicator:
 
     def _aside(self, lanelets: Sequence[int], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Return how far poses are to the left of their lane's middle, as the vehicle sees it [m].
+        Return the lateral offsets of poses from their lane's centre line, left of the vehicle [m].
 
-        :return: (M) M <= N, of the vehicle now, and of the poses up to where the plan leaves it.
+        :return: (M) M <= N, of the vehicle now, and of the poses until the plan leaves the lane.
         """
         way = list(lanelets[:1])
         for before, after in pairwise(lanelets):
@@ -122,14 +122,14 @@ class PlanIndicator:
         return -d[here] if self._against(lanelets[0], poses[0]) else d[here]
 
     def _against(self, lanelet: int, pose: NDArray[np.float64]) -> bool:
-        """Return whether somebody drives against a lanelet's direction, as who overtakes does."""
+        """Return whether a pose is against a lanelet's direction, as when overtaking."""
         x, y, yaw = pose.tolist()
         line = self._roads.line(lanelet)
         heading = line.heading_at(np.array(self._roads.locate(lanelet, x, y)[0]))
         return math.cos(float(heading) - yaw) < 0.0
 
     def _ahead(self, lanelets: Sequence[int], pose: NDArray[np.float64]) -> Light | None:
-        """Return what the plan does first."""
+        """Return the indicator of the plan's first manoeuvre."""
         here, before_here = lanelets[0], self._before
         x, y, yaw = pose.tolist()
         turn = self._turns.turn_on(here, before_here)
@@ -137,7 +137,7 @@ class PlanIndicator:
         if turn and abs(wrap_pi(heading - yaw)) > TURNED \
                 and self._roads.locate(here, x, y)[0] < end:
             return turn
-        # Shown before it, a turn behind another fork would be taken for one there.
+        # Shown too early, a turn behind another fork would look like a turn at that fork.
         next_fork = True
         for before, after in pairwise(lanelets):
             passed = self._turns.between(before, after)
@@ -154,7 +154,7 @@ class PlanIndicator:
         return None
 
     def _at_fork(self, lanelets: Sequence[int], pose: NDArray[np.float64]) -> Light | None:
-        """Return where the route turns after the plan's end, if that is near."""
+        """Return the side to which the route turns at a fork near the plan's end."""
         here = lanelets[-1]
         left = BEFORE_FORK - math.dist(self._roads.line(here).points[-1], pose[:2])
         while left >= 0.0 and (following := self._onward.get(here)) is not None:
@@ -169,7 +169,7 @@ class PlanIndicator:
 
 class PlanIndicators:
     """
-    What all AVs of a run indicate, in their order.
+    The indicators of all AVs of a run, in their order.
 
     :param setup: of the run.
     :ivar shown: bits of `Light` of each AV.
@@ -180,7 +180,7 @@ class PlanIndicators:
         turns = Turns(setup.network)
         self._each = [PlanIndicator(setup.network, turns, av.planning_problem, av.declared[:3])
                       for av in setup.avs] if setup.network.lanelet_ids else []
-        # The step at which somebody drove it last.
+        # The last step at which a driver had it.
         self._driven_n = [-1] * len(self._each)
         self._apart = max(1, round(APART_S / self._scheduler.dt_s))
         steps_s = self._scheduler.time_step_s / self._steps_in_tick
@@ -191,18 +191,18 @@ class PlanIndicators:
 
     @property
     def _steps_in_tick(self) -> int:
-        """Count the steps of a tick in which plans are looked at: where requests are not made."""
+        """Return how many steps of a tick check plans: those without requests."""
         return max(1, self._scheduler.steps_per_tick - 1)
 
     def update(self, n: int, avs: Sequence[AutonomousVehicle]) -> None:
-        """Look, at step n, at the plan of the AV whose turn it is, and forget unused ones."""
+        """Update, at step n, the indicator of the AV whose turn it is, and clear unused ones."""
         turn = self._turn(n)
         for place, (indicator, av) in enumerate(zip(self._each, avs, strict=False)):
             if av.driven:
                 self._driven_n[place] = n
             age = av.plan_age_steps(n)
-            # What somebody does with it is no part of its plan, and a plan that was asked for
-            # before it was given back begins elsewhere.
+            # A driver's motion is no part of the plan, and a plan requested before the driver
+            # handed the vehicle back begins elsewhere.
             if av.driven or av.uses_no_plan or age is None or n - age < self._driven_n[place]:
                 indicator.forget()
             elif place == turn:
@@ -210,7 +210,7 @@ class PlanIndicators:
             self.shown[place] = indicator.shown
 
     def _turn(self, n: int) -> int | None:
-        """Return the place of the AV whose turn it is: one at most, so that no step takes long."""
+        """Return the index of the AV whose turn it is: at most one, so that no step takes long."""
         ticks, rest = divmod(n, self._scheduler.steps_per_tick)
         if self._scheduler.steps_per_tick > 1 and not rest:
             return None
@@ -218,7 +218,7 @@ class PlanIndicators:
             (ticks * self._steps_in_tick + max(0, rest - 1)) % self._period)
 
     def _coming(self, n: int, av: AutonomousVehicle) -> NDArray[np.float64]:
-        """Return where an AV is and where its plan leads, in the roads' coordinates."""
+        """Return the present and planned poses of an AV, in the roads' coordinates."""
         poses = [av.state[:3]]
         for step in range(n + self._apart, n + round(LOOK_AHEAD_S / self._scheduler.dt_s) + 1,
                           self._apart):

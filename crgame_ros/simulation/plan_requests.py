@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Building plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
+"""Builds plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
 
 from collections.abc import Sequence
 
@@ -32,7 +32,9 @@ Poses = NDArray[np.float64]
 
 class Forecast:
     """
-    Where everybody is and is taken to go, at one tick and in simulation coordinates.
+    The present and predicted motion of all vehicles and objects at one tick.
+
+    All arrays are in simulation coordinates.
 
     :param vehicle_poses: (P, V, 3) rear-axle poses
     :param vehicle_velocities: (P, V, 3)
@@ -50,10 +52,10 @@ class Forecast:
 
 class PlanRequests:
     """
-    Predicts once a tick and packs the request of each AV.
+    Predicts once per tick and packs the request of each AV.
 
     :param setup: the run.
-    :param courses: the objects as events change them; None where no event can.
+    :param courses: the objects as events change them; None if no event can.
     """
 
     def __init__(self, setup: Setup, courses: ObstacleMotions | None = None) -> None:
@@ -83,10 +85,10 @@ class PlanRequests:
                  avs: list[AutonomousVehicle], objects: ObjectStates,
                  changed: Sequence[int]) -> Forecast:
         """
-        Predict everybody's motion from scenario step k (simulation step n) on.
+        Predict the motion of all participants from scenario step k (simulation step n) on.
 
         :param objects: at k.
-        :param changed: columns of those that are not where the scenario says.
+        :param changed: columns of the objects whose states differ from the scenario's.
         """
         steps = self.points - 1
         poses, velocities = predict_constant_steering(
@@ -101,7 +103,7 @@ class PlanRequests:
         if self._mode == 'recorded':
             futures = recorded_future(self._courses or self._setup.obstacles, k, steps)
             if predicted is not None:
-                # Nobody knows the future of what reacts.
+                # The future of reactive objects is not known.
                 living = self._setup.obstacles.living
                 for future, prediction in zip(futures, predicted, strict=True):
                     future[:, living] = prediction[:, living]
@@ -110,7 +112,7 @@ class PlanRequests:
         return Forecast(poses, velocities, *predicted)
 
     def _follow_plan(self, av: AutonomousVehicle, n: int, poses: Poses, velocities: Poses) -> None:
-        """Overwrite a prediction with what the AV's plan says, as far as it reaches."""
+        """Overwrite a prediction with the AV's plan, as far as the plan reaches."""
         for index in range(1, self.points):
             state = av.planned_state(n + index * self._setup.scheduler.steps_per_tick)
             if state is None:
@@ -124,10 +126,11 @@ class PlanRequests:
         """
         Pack the request of one AV, in its scenario coordinates.
 
-        Point 0 is now; the AV itself is present in point 0 only. Objects that are nowhere are left
-        out. Accelerations are known of driven vehicles in point 0, elsewhere they are NaN.
+        Point 0 is now; the AV itself is present in point 0 only. Absent objects are left out.
+        Accelerations are known for driven vehicles in point 0, elsewhere they are NaN.
 
-        :param lights: bits of `Light` that each driven vehicle shows now, for who asks for them.
+        :param lights: bits of `Light` that each driven vehicle shows now, for planners that need
+            them.
         """
         order = self._order[av.id]
         vehicles = len(order)
@@ -152,7 +155,7 @@ class PlanRequests:
             _to_scenario(av, vehicles, positions, velocities, accelerations)
         series = JointSeries(stamp_ns, self._names[av.id], self._times_ns,
                              positions, velocities, accelerations)
-        # Who perceives may remember what is gone.
+        # A perception may remember objects that are gone.
         if not av.spec.perception:
             series = without_absent(series, vehicles)
         return series if av.id not in self._lit else with_lights(
@@ -160,7 +163,7 @@ class PlanRequests:
 
 
 def _is_told_lights(setup: Setup, av: AvSetup) -> bool:
-    """Return whether an AV's planner, or one that an event brings in, asks for others' lights."""
+    """Return whether an AV's planner, or one that an event swaps in, needs others' lights."""
     if av.spec.lights is not None:
         return av.spec.lights
     swaps = [event.action for event in setup.game.events if isinstance(event.action, PlannerSwap)]
@@ -170,9 +173,9 @@ def _is_told_lights(setup: Setup, av: AvSetup) -> bool:
 
 def _to_scenario(av: AvSetup, vehicles: int, positions: Poses, velocities: Poses,
                  accelerations: Poses) -> None:
-    """Map everybody to the AV's scenario coordinates (CRG 9), so that all fit together."""
+    """Transform all participants to the AV's scenario coordinates (CRG 9), consistently."""
     for part, joints in ((slice(4 * vehicles), 4), (slice(4 * vehicles, None), 3)):
-        # Views of who is in the columns, one row each.
+        # Views of the participants in the columns, one row each.
         poses, *vectors = (array[:, part].reshape(len(array), -1, joints)
                            for array in (positions, velocities, accelerations))
         poses[..., :3] = av.transform.to_scenario(poses[..., :3])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who and what takes part in a game, as far as it decides which processes a run needs."""
+"""The participants of a game that decide which processes a run needs."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -12,14 +12,14 @@ from crgame_ros.simulation.setup import Setup
 @dataclass(frozen=True)
 class Participants:
     """
-    What a game needs beside the simulation itself.
+    The parts of a game that need processes besides the simulation.
 
     :param humans: driver source by human.
     :param avs: planner by AV.
     :param perceiving: AVs with perception.
     :param traffic: whether there are agents.
     :param occupancy: whether there is a map of permanent obstacles.
-    :param code: classes that the game names, of modules and files of the user's own.
+    :param code: class names in the game from the user's own modules and files.
     """
 
     humans: dict[str, str]
@@ -31,7 +31,7 @@ class Participants:
 
     @classmethod
     def from_setup(cls, setup: Setup) -> 'Participants':
-        """Read them from a run."""
+        """Read the participants from a setup."""
         return cls({human.id: human.driver for human in setup.humans},
                    {av.id: av.spec.planner for av in setup.avs},
                    tuple(av.id for av in setup.avs if av.spec.perception is not None),
@@ -40,13 +40,13 @@ class Participants:
 
     @classmethod
     def read(cls, content: dict[str, Any]) -> 'Participants':
-        """Read them from what `dataclasses.asdict` gave, by way of JSON."""
+        """Read the participants from the output of `dataclasses.asdict`, by way of JSON."""
         return cls(**content | {'perceiving': tuple(content['perceiving']),
                                 'code': tuple(content['code'])})
 
 
 def _code(value: Any) -> set[str]:
-    """Collect every name of a class in a game, wherever it stands."""
+    """Collect all class names anywhere in a game."""
     if isinstance(value, str):
         return {value} if ':' in value else set()
     if isinstance(value, Mapping):

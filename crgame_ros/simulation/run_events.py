@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The events of one run: which are due at a tick, and what they do to the objects."""
+"""The events of one run: which are due at a tick, and how they change the objects."""
 
 from collections.abc import Sequence
 import math
@@ -22,7 +22,7 @@ from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.state import VehicleState
 
 Point = tuple[float, float]
-# Ticks are counted from decimal fractions of a second.
+# Tolerance of times given as decimal fractions of a second when they become ticks.
 ROUNDING = 1e-9
 
 
@@ -30,12 +30,12 @@ class RunEvents:
     """
     Decides at every tick which events take effect, and changes the objects.
 
-    Each event takes effect once at most, and several at one tick in the order of the game. One
-    that changes an object waits while that object is not there.
+    Each event takes effect at most once; several at one tick follow the order of the game. An
+    event that changes an object waits while the object is absent.
 
     :param setup: the run.
     :ivar obstacles: the objects, as events have changed them.
-    :ivar fired: what has taken effect so far.
+    :ivar fired: the events that have taken effect so far.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -52,7 +52,7 @@ class RunEvents:
 
     def trigger(self, name: str) -> str | None:
         """
-        Let an event take effect at the next tick.
+        Trigger an event at the next tick.
 
         :return: None if it will, else the reason why not.
         """
@@ -67,17 +67,17 @@ class RunEvents:
         return reason
 
     def actions(self, fired: Sequence[FiredEvent]) -> list[Action]:
-        """Return what events do, in their order."""
+        """Return the actions of events, in their order."""
         return [self._actions[event.name] for event in fired]
 
     def at_tick(self, n: int, k: int, states: Sequence[VehicleState],
                 objects: ObjectStates) -> tuple[FiredEvent, ...]:
         """
-        Let take effect what is due, before the objects and requests of a tick are made.
+        Apply the due events, before the objects and requests of a tick are built.
 
         :param states: of the driven vehicles at n.
         :param objects: at k, as earlier events have left them.
-        :return: what took effect now.
+        :return: the events that took effect now.
         """
         self._k, self._objects = k, objects
         if not self._waiting:
@@ -89,7 +89,7 @@ class RunEvents:
                and self._hindrance(event, k) is None]
         fired = []
         for event in due:
-            # Two events may be about one object, of which the first leaves nothing to the second.
+            # Of two events about one object, the first may make the second impossible.
             if self._hindrance(event, k) is None:
                 self._change(event, k)
                 del self._waiting[event.name]
@@ -100,7 +100,7 @@ class RunEvents:
         return tuple(fired)
 
     def _hindrance(self, event: EventSpec, k: int) -> str | None:
-        """Return why an event cannot take effect now, if it cannot."""
+        """Return why an event cannot take effect now; None if it can."""
         action = event.action
         if isinstance(action, TrafficChange):
             return self._absence(action.agent)
@@ -116,14 +116,14 @@ class RunEvents:
         return None if present else f'{object_id} is not there'
 
     def _absence(self, agent: str) -> str | None:
-        """Return that an agent is not on the road, if so."""
+        """Return a message if an agent is not on the road, else None."""
         if agent == ALL_AGENTS or self._objects is None:
             return None
         present = math.isfinite(self._objects.poses[self._columns[agent], 0])
         return None if present else f'{agent} is not on the road'
 
     def _change(self, event: EventSpec, k: int) -> None:
-        """Change the object that the event is about, if it is about one."""
+        """Change the object of an event, if the event has one."""
         action, object_id = event.action, event.object_id
         if object_id is None:
             return

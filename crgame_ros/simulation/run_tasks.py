@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tasks of one run: when stimuli and requests come, and what becomes of them."""
+"""The tasks of one run: onsets of stimuli and requests, and their outcomes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,13 +33,13 @@ import numpy as np
 
 class StimulusSchedule:
     """
-    The onsets of one task, each so long after the one before as chance has it.
+    The onsets of one task, at random intervals.
 
-    The first comes so long after the beginning. Equal seeds and names give equal times on every
-    machine, whatever else happens in the run.
+    The first interval starts with the task. Equal seeds and names give equal times on every
+    machine, independent of the rest of the run.
 
     :param task: its shortest and longest time between onsets.
-    :param name: of the task: two of one game have stimuli of their own.
+    :param name: of the task: two tasks of one game get different onsets.
     :param seed: of the game.
     :param scheduler: time grids of the run.
     :param begin_n: simulation step at which the task begins.
@@ -59,21 +59,21 @@ class StimulusSchedule:
         self.advance()
 
     def advance(self) -> None:
-        """Choose the next onset."""
+        """Draw the next onset."""
         self._after_s += self._shortest_s + self._random.random() * (
             self._longest_s - self._shortest_s)
         self.next_n = self._begin_n + round(self._after_s / self._dt_s)
 
 
-# A page's answer may come so long after the last that counts: the picture and the way back [s].
+# A page's answer may arrive this long after the limit: display and network take time [s].
 GRACE_S = 0.5
-# More reports in a second are no person's.
+# More reports in a second do not come from a person.
 REPORTS_PER_S = 20
 
 
 @dataclass
 class _Course:
-    """How one task stands."""
+    """The state of one task."""
 
     spec: TaskSpec
     seat: str
@@ -86,16 +86,16 @@ class _Course:
     shown: int = 0
     schedule: StimulusSchedule | None = None
     prompt: OpenPrompt | None = None
-    # Step at which what a request is about is triggered.
+    # Step at which the event of a request is triggered.
     due_n: int | None = None
 
 
 class RunTasks:
     """
-    Lets tasks begin and end, makes their stimuli and requests, and takes answers.
+    Begins and ends tasks, makes their stimuli and requests, and processes answers.
 
-    Conditions and buttons take effect at the scenario's ticks, stimuli come and go between them
-    too.
+    Conditions and buttons take effect at the scenario's ticks; stimuli appear and disappear
+    at any step.
 
     :param setup: the run.
     """
@@ -115,7 +115,7 @@ class RunTasks:
         self._n = 0
 
     def _begins(self, spec: TaskSpec) -> TaskCondition | None:
-        """Return when a task begins by itself: a request also by the time of its event."""
+        """Return the condition that begins a task; for a request also its event's time."""
         if spec.when is not None or not isinstance(spec.task, TakeOverPrompt):
             return spec.when
         about = next((event.when for event in self._setup.game.events
@@ -127,17 +127,17 @@ class RunTasks:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Names of the tasks that last now."""
+        """Return the names of the tasks that are running."""
         return tuple(name for name, course in self._courses.items() if course.running)
 
     @property
     def prompts(self) -> tuple[OpenPrompt, ...]:
-        """Stimuli and requests that are neither answered nor over."""
+        """Return the stimuli and requests that are neither answered nor over."""
         return tuple(course.prompt for course in self._courses.values() if course.prompt)
 
     def trigger(self, name: str) -> str | None:
         """
-        Let a task begin at the next tick, or end if it lasts.
+        Begin a task at the next tick, or end it if it is running.
 
         :return: None if it will, else the reason why not.
         """
@@ -149,9 +149,9 @@ class RunTasks:
 
     def report(self, report: TaskReport) -> str | None:
         """
-        Take what a page has shown or its driver answered; it takes effect at the next step.
+        Accept a page's report or its driver's answer; it takes effect at the next step.
 
-        :return: None if it is taken, else the reason why not.
+        :return: None if it is accepted, else the reason why not.
         """
         course = self._courses.get(report.task)
         if course is None or course.seat != report.seat:
@@ -165,7 +165,7 @@ class RunTasks:
         return None
 
     def due_events(self, n: int) -> list[str]:
-        """Name the events that requests have announced and that are to happen by now."""
+        """Return the names of events that requests have announced and that are due by now."""
         due: list[str] = []
         for course in self._courses.values():
             task = course.spec.task
@@ -177,7 +177,7 @@ class RunTasks:
     def at_tick(self, n: int, k: int, states: Sequence[VehicleState], objects: ObjectStates,
                 fired: Sequence[FiredEvent]) -> None:
         """
-        Let tasks begin and end.
+        Begin and end tasks.
 
         :param states: of the driven vehicles at n.
         :param objects: at k.
@@ -198,16 +198,16 @@ class RunTasks:
                     self._end(course, by)
             elif course.pressed or (not course.begun and holds(course.when)):
                 self._begin(course, by)
-                # Begun by the button after that, it is ended by the button.
+                # Restarted by the button after that, it is ended by the button.
                 course.may_end = not holds(course.spec.until)
             course.pressed = False
 
     def at_step(self, n: int, driven: Mapping[str, bool]) -> tuple[TaskEntry, ...]:
         """
-        Let stimuli come, take reports, and let pass what nobody has answered.
+        Show new stimuli, process reports, and close stimuli that were not answered in time.
 
-        :param driven: whether somebody drives a vehicle, by its id.
-        :return: what has happened since the last step.
+        :param driven: whether a driver has the vehicle, by its id.
+        :return: the entries since the last step.
         """
         self._n = n
         for report in self._reports:
@@ -235,7 +235,7 @@ class RunTasks:
         course.running = True
         self._note(course, 'begin', 0, by)
         if isinstance(task, DetectionResponse):
-            # Begun again it goes on with other times, which are the same on every machine too.
+            # A restarted task has other onsets, which are the same on every machine too.
             name = f'{course.spec.name}/{course.number}'
             course.schedule = StimulusSchedule(
                 task, name, self._setup.game.seed, self._setup.scheduler, self._n)
@@ -243,7 +243,7 @@ class RunTasks:
     def _end(self, course: _Course, by: str) -> None:
         course.running, course.schedule = False, None
         if course.prompt is not None:
-            # It could not be answered for as long as others: it does not count.
+            # The time to answer it was cut short, so it does not count.
             self._close(course, 'over', 'end')
         self._note(course, 'end', 0, by)
 
@@ -270,7 +270,7 @@ class RunTasks:
         task, prompt, times = course.spec.task, course.prompt, report.times
         concerns = prompt is not None and prompt.number == report.number
         if report.what == 'shown':
-            # Of several pages the first counts; it may tell of it after the answer.
+            # The first page's report counts; it may arrive after the answer.
             if course.shown < report.number == course.number:
                 course.shown = report.number
                 course.prompt = prompt and replace(prompt, seen=True)
@@ -282,7 +282,7 @@ class RunTasks:
         if not concerns or since_ms is None or not 0.0 <= since_ms <= 1e3 * task.latest:
             if not any(entry.task == report.task and entry.what == 'unrequested'
                        for entry in self._entries):
-                # One a step: nobody is quicker.
+                # At most one a step: a person is not quicker.
                 self._note(course, 'unrequested', 0, times=times)
         else:
             outcome = 'premature' if since_ms < 1e3 * task.earliest else 'hit'

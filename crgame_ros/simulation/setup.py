@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that a run needs, resolved: a game with its scenario loaded and vehicles placed."""
+"""The resolved setup of a run: a game with its scenario loaded and its vehicles placed."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
 # A vehicle recorded this close to an AV's start is a recording of the AV [m].
 SAME_PLACE = 1.0
-# Beyond these discrepancies of both initial poses people are told: [m], half the room that a car
-# has beside it in a lane, and [rad], which is as much 25 m ahead.
+# Larger discrepancies of both initial poses give a notice: [m], half the room beside a car in its
+# lane, and [rad], which makes the same offset 25 m ahead.
 MAX_DISCREPANCY = 0.5
 MAX_TURN = 0.02
 
@@ -77,7 +77,7 @@ class AvSetup:
     """
     One autonomous vehicle, placed.
 
-    :param spec: what the game says of it.
+    :param spec: its entry in the game file.
     :param vehicle: its parameters.
     :param state: its state at n = 0, rear axle, simulation coordinates.
     :param transform: from simulation to scenario coordinates (CRG 6-8).
@@ -97,7 +97,7 @@ class AvSetup:
 
     @property
     def declared(self) -> VehicleState:
-        """State at n = 0 as the planning problem declares it."""
+        """Return the state at n = 0 that the planning problem declares."""
         if self.transform.is_identity:
             return self.state
         x, y, yaw = self.transform.to_scenario(np.array(self.state[:3])).tolist()
@@ -109,7 +109,7 @@ class Setup:
     """
     A run before its first step.
 
-    :param game: the game as its file says it.
+    :param game: the game as in its file.
     :param loaded: the scenario.
     :param network: its roads.
     :param obstacles: its obstacles.
@@ -132,12 +132,12 @@ class Setup:
 
     @cached_property
     def scripted_columns(self) -> NDArray[np.int_]:
-        """Columns of the game's own objects among all objects."""
+        """Return the columns of the game's own objects among all objects."""
         return self._columns(item.id for item in self.game.objects)
 
     @cached_property
     def agent_columns(self) -> NDArray[np.int_]:
-        """Columns of the agents among all objects, in the order of traffic."""
+        """Return the columns of the agents among all objects, in the order of traffic."""
         return self._columns(item.id for item in (
             () if self.traffic is None else self.traffic.descriptions))
 
@@ -146,7 +146,7 @@ class Setup:
         return np.array([places[item] for item in ids], dtype=int)
 
     def make_scripted(self) -> ScriptedObjects | None:
-        """Make the game's own objects as they are at the first tick."""
+        """Build the game's own objects in their states at the first tick."""
         return _scripted(self.game, self.network, self.scheduler)
 
     def open_occupancy(self) -> TiledOccupancy | None:
@@ -159,7 +159,7 @@ class Setup:
 
     @cached_property
     def road(self) -> 'RoadBoundary':
-        """Return the road's boundary, made at first use (3 to 50 ms): ask for it before a run."""
+        """Return the road boundary, computed at first use (3 to 50 ms): call this before a run."""
         from crgame_ros.roads.boundary import RoadBoundary
         return RoadBoundary(self.loaded.scenario.lanelet_network)
 
@@ -170,12 +170,12 @@ class Setup:
 
     @property
     def vehicle_ids(self) -> tuple[str, ...]:
-        """Ids of the driven vehicles: humans, then AVs."""
+        """Return the ids of the driven vehicles: humans, then AVs."""
         return tuple(vehicle.id for vehicle in self.vehicles)
 
     @property
     def vehicle_descriptions(self) -> tuple[ObjectDescription, ...]:
-        """Descriptions of the driven vehicles: humans, then AVs."""
+        """Return the descriptions of the driven vehicles: humans, then AVs."""
         return tuple(
             ObjectDescription(vehicle.id, 'car', role, vehicle.vehicle.shape,
                               vehicle.vehicle.rear_to_center)
@@ -185,7 +185,7 @@ class Setup:
 
     @property
     def descriptions(self) -> tuple[ObjectDescription, ...]:
-        """Descriptions of everything that can appear: driven vehicles, then other objects."""
+        """Return the descriptions of all that can appear: driven vehicles, then other objects."""
         return (*self.vehicle_descriptions, *self.obstacles.descriptions)
 
 
@@ -245,7 +245,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
 
 
 def _from_anywhere(driver: str, base: Path) -> str:
-    """Return a policy's file so that it is found from any folder; other drivers stay."""
+    """Return a policy driver with its file's absolute path; other drivers are unchanged."""
     if not driver.startswith(POLICY):
         return driver
     return POLICY + str((base / Path(driver.removeprefix(POLICY)).expanduser()).resolve())
@@ -258,7 +258,7 @@ def _scripted(game: Game, network: RoadNetwork,
 
 
 def _with_living(setup: Setup) -> Setup:
-    """Add what the run itself moves: objects of the game, and agents of traffic."""
+    """Return the setup with the objects that the run moves: the game's own and the agents."""
     game, base = setup.game, setup.obstacles
     scripted = setup.make_scripted()
     described = () if scripted is None else scripted.descriptions
@@ -280,7 +280,7 @@ def _with_living(setup: Setup) -> Setup:
 
 
 def _recorded_egos(loaded: LoadedScenario, avs: tuple[AvSetup, ...], k0: int) -> dict[int, str]:
-    """Find recorded vehicles that stand where an AV starts: recordings of that very vehicle."""
+    """Find recorded vehicles that start where an AV does: recordings of the same vehicle."""
     doubles: dict[int, str] = {}
     for obstacle in loaded.scenario.dynamic_obstacles:
         state = obstacle.state_at_time(k0)
@@ -288,7 +288,7 @@ def _recorded_egos(loaded: LoadedScenario, avs: tuple[AvSetup, ...], k0: int) ->
             continue
         x, y = exact_position(state.position)
         for av in avs:
-            # Recordings are where the problem is declared, wherever the simulator puts the AV.
+            # A recording starts at the problem's state, wherever the simulator puts the AV.
             center = av.declared.center(av.vehicle.rear_to_center)
             if math.hypot(x - center[0], y - center[1]) < SAME_PLACE:
                 doubles[obstacle.obstacle_id] = av.id
@@ -296,7 +296,7 @@ def _recorded_egos(loaded: LoadedScenario, avs: tuple[AvSetup, ...], k0: int) ->
 
 
 def _discrepancies(avs: Iterable[AvSetup]) -> Iterable[str]:
-    """Tell of AVs that the simulator places far from where their problems do (CRG III-A1)."""
+    """Yield notices about AVs placed far from their problems' initial states (CRG III-A1)."""
     for av in avs:
         apart = math.dist(av.state[:2], av.declared[:2])
         turned = abs(av.transform.yaw_offset)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""People's vehicles that stand where they touched something, and are put back on their lane."""
+"""Stops driven vehicles at contacts, and puts them back on their lane."""
 
 from collections.abc import Iterator, Sequence
 import math
@@ -23,15 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# Places are looked for every metre, this far behind the contact, then as far ahead of it [m].
+# Step and range of the search for places, first behind the contact, then ahead of it [m].
 STEP, FARTHEST = 1.0, 50.0
-# What stays free ahead of the bumper, so that one can drive off, and all around [m].
+# Free space needed ahead of the bumper, so that the driver can drive off, and all around [m].
 ROOM_AHEAD, ROOM_AROUND = 5.0, 0.5
-# Nobody who goes on as they do gets there before [s].
+# No other vehicle may reach the place within this time at its present velocity [s].
 UNTOUCHED_S = 2.0
-# Who presses on against somebody has one contact with them [m].
+# Contacts of one vehicle within this distance count as the same contact [m].
 SAME_CONTACT = 1.0
-# After so much of a way from the contact the vehicle has driven on by itself [m].
+# Beyond this distance from the contact the vehicle has left it without being put back [m].
 LEFT_BEHIND = 20.0
 
 FloatArray = NDArray[np.float64]
@@ -40,11 +40,11 @@ Place = tuple[float, float, float]
 
 class PutBack:
     """
-    Knows which vehicles a contact has stopped, and where each can be put back.
+    The vehicles that a contact has stopped, and the places where each can be put back.
 
-    A vehicle may be put back from its contact on until it has been, or is `LEFT_BEHIND` away.
-    The place is on the middle of the lane of its driving direction, along it, at rest: the
-    nearest free one behind the contact, else ahead.
+    A vehicle may be put back once after its contact, while it is within `LEFT_BEHIND` of it.
+    It then stands at rest on the centre line of the lane in its driving direction, at the
+    nearest free place behind it, else ahead.
 
     :param setup: the run.
     """
@@ -56,7 +56,7 @@ class PutBack:
         self._shapes = shapes + [item.shape for item in setup.obstacles.descriptions]
 
     def note(self, index: int, state: VehicleState) -> bool:
-        """Remember where a contact has stopped a vehicle; tell whether it is another contact."""
+        """Store where a contact stopped a vehicle; return whether it is a new contact."""
         before = self._stopped.get(index)
         self._stopped[index] = state
         return before is None or math.dist(before[:2], state[:2]) > SAME_CONTACT
@@ -64,7 +64,7 @@ class PutBack:
     def place(self, index: int, since_tick_s: float, states: Sequence[VehicleState],
               objects: ObjectStates) -> VehicleState | None:
         """
-        Find where a vehicle whose driver asks for it is put back.
+        Find the place for a vehicle whose driver asks to be put back.
 
         :param since_tick_s: from the objects' tick to the states [s]
         :param states: (V) of the driven vehicles, simulation coordinates.
@@ -86,7 +86,7 @@ class PutBack:
         return None
 
     def _transform(self, index: int) -> RigidTransform:
-        """Choose through which transform the vehicle is on the road (CRG 28)."""
+        """Return the vehicle's transform to the road's coordinates (CRG 28)."""
         avs, humans = self._setup.avs, len(self._setup.humans)
         if index >= humans:
             return avs[index - humans].transform
@@ -109,7 +109,7 @@ class PutBack:
                 yield x, y, wrap_pi(yaw)
 
     def _lane(self, x: float, y: float, yaw: float) -> int:
-        """Find the lane: beside the oncoming one that of the vehicle's own direction."""
+        """Find the nearest lane; prefer the vehicle's own direction to the oncoming one."""
         network = self._setup.network
         lane = network.nearest_lanelet(x, y, yaw)
         beside = network.opposite_of(lane)
@@ -124,7 +124,7 @@ class PutBack:
         return math.cos(heading - yaw) >= 0.0
 
     def _footprint(self, index: int, pose: Place, ahead: float = 0.0) -> shapely.Polygon:
-        """Draw a vehicle with its rear axle at a pose, longer at its front by some metres."""
+        """Return the outline of a vehicle with its rear axle at a pose, extended `ahead` [m]."""
         vehicle = self._setup.vehicles[index].vehicle
         shape = Shape.rectangle(vehicle.shape.length + ahead, vehicle.shape.width)
         x, y = VehicleState(*pose, 0.0).center(vehicle.rear_to_center + 0.5 * ahead)
@@ -135,7 +135,7 @@ class PutBack:
 
     def _taken(self, index: int, since_tick_s: float, states: Sequence[VehicleState],
                objects: ObjectStates) -> list[shapely.Geometry]:
-        """Draw what everybody else near covers from now on until `UNTOUCHED_S`."""
+        """Return the areas that other vehicles and near objects cover within `UNTOUCHED_S`."""
         x, y, _ = objects.poses.T
         near = np.hypot(x - states[index].x, y - states[index].y) < 3.0 * FARTHEST
         taken = []
@@ -153,7 +153,7 @@ class PutBack:
 
 
 def _swept(shape: Shape, pose: FloatArray, velocity: FloatArray) -> shapely.Geometry:
-    """Draw what a body covers that goes straight on at its velocity, centre poses."""
+    """Return the area that a body covers at constant velocity, from its centre pose."""
     x, y, yaw = pose.tolist()
     later_x, later_y = (pose[:2] + UNTOUCHED_S * velocity[:2]).tolist()
     return shapely.union(placed_polygon(shape, x, y, yaw),
@@ -162,10 +162,10 @@ def _swept(shape: Shape, pose: FloatArray, velocity: FloatArray) -> shapely.Geom
 
 class ContactStop:
     """
-    Finds vehicles whose last step led into, or deeper into, somebody or something.
+    Finds vehicles whose last step led into, or deeper into, another vehicle or object.
 
-    Deeper is where the centres come closer: whoever is touched can drive away, backwards mostly.
-    A moved vehicle alone is stopped: who stands and is run into stays where it is.
+    Deeper means that the centres come closer: a vehicle in contact can still drive away, mostly
+    backwards. Only the vehicle that moved is stopped: one that stands and is hit stays in place.
 
     :param setup: the run.
     """
@@ -179,19 +179,19 @@ class ContactStop:
         self._rear_to_center = [vehicle.vehicle.rear_to_center for vehicle in setup.vehicles]
 
     def set_objects(self, objects: ObjectStates) -> None:
-        """Take the objects of a tick."""
+        """Store the objects of a tick."""
         self._objects = objects
         self._detector.set_objects(objects)
 
     def stopped(self, since_tick_s: float, before: Sequence[VehicleState],
                 after: Sequence[VehicleState]) -> list[tuple[int, str]]:
         """
-        Find who must not have moved as they did.
+        Find the vehicles whose last step has to be undone.
 
         :param since_tick_s: from the objects' tick to the states after the step [s]
         :param before: (V) states of the driven vehicles before the step.
         :param after: (V) their states after it.
-        :return: indices of vehicles, in order, each with the id of whom it touched.
+        :return: indices of vehicles, in order, each with the id of what it touched.
         """
         self._detector.move(since_tick_s)
         centers = [self._center(index, state) for index, state in enumerate(after)]
@@ -227,11 +227,11 @@ Driven = HumanVehicle | TracedVehicle | AutonomousVehicle
 
 class StoppedDrivers:
     """
-    Acts on contacts where the game says that they stop who drives.
+    Stops drivers at contacts, where the game asks for it.
 
     :param setup: the run.
     :param driven: its driven vehicles, humans first.
-    :ivar events: what it has done so far.
+    :ivar events: the events so far.
     """
 
     def __init__(self, setup: Setup, driven: Sequence[Driven]) -> None:
@@ -243,17 +243,17 @@ class StoppedDrivers:
         self.events: tuple[FiredEvent, ...] = ()
 
     def events_at(self, n: int) -> tuple[FiredEvent, ...]:
-        """Return what it did in a step."""
+        """Return the events of a step."""
         return tuple(event for event in self.events if event.n == n)
 
     def act(self, n: int, before: Sequence[VehicleState],
             commands: Sequence[DriverCommand | None], objects: ObjectStates) -> None:
         """
-        Let vehicles stand that have driven into something, and put back whose drivers ask for it.
+        Stop vehicles that have driven into something, and put back those whose drivers ask for it.
 
-        :param n: step that the vehicles have just made.
+        :param n: the step just made.
         :param before: their states before it.
-        :param commands: that they obeyed.
+        :param commands: those of this step.
         :param objects: at the last scenario step.
         """
         scheduler = self._scheduler
@@ -275,7 +275,7 @@ class StoppedDrivers:
 
     def _put_on_lane(self, index: int, n: int, since_tick_s: float,
                      objects: ObjectStates) -> None:
-        """Put a vehicle back that a contact has stopped, if there is room."""
+        """Put a vehicle that a contact has stopped back on its lane, if there is room."""
         driven = self._driven[index]
         if not _has_driver(driven):
             return
@@ -288,6 +288,6 @@ class StoppedDrivers:
 
 
 def _has_driver(driven: Driven) -> TypeGuard[HumanVehicle | AutonomousVehicle]:
-    """Return whether a person drives a vehicle now; traces go on, and so do plans."""
+    """Return whether a driver has the vehicle now; traces and plans are never stopped."""
     return isinstance(driven, HumanVehicle) or (
         isinstance(driven, AutonomousVehicle) and driven.driven)

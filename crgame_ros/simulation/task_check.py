@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Comparing a game's tasks with its vehicles, objects and events."""
+"""Checks of a game's tasks against its vehicles, objects and events."""
 
 from collections.abc import Sequence
 
@@ -10,19 +10,19 @@ from crgame_ros.game.task_spec import OnEvent, TakeOverPrompt, TaskSpec
 
 
 def task_seat(spec: TaskSpec, vehicles: Sequence[str]) -> str:
-    """Name the vehicle whose driver a task is for: the first where the game does not say it."""
+    """Return the vehicle whose driver gets a task: by default the first one."""
     return spec.seat or vehicles[0]
 
 
 def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: str,
                 vehicles: Sequence[str], objects: Sequence[str]) -> None:
     """
-    Refuse tasks of or about what is not there.
+    Refuse tasks that name missing vehicles, objects or events.
 
     :param where: file name for messages.
     :param vehicles: ids of the driven vehicles, humans first.
     :param objects: ids of everything else that moves or stands.
-    :raises InputError: naming the task and what there is.
+    :raises InputError: naming the task and the available names.
     """
     by_name = {event.name: event for event in events}
     for spec in tasks:

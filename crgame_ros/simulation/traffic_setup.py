@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for th
     from crgame_ros.traffic.traffic import Traffic
     from crgame_ros.traffic.world_view import WorldView
 
-# Agents move at this rate, whatever the simulation's [Hz] (FS III).
+# Agents move at this rate, independent of the simulation's rate [Hz] (FS III).
 MOTION_RATE = 100.0
 
 
@@ -30,7 +30,7 @@ class TrafficSetup:
     The agents at the first tick.
 
     :param descriptions: of all that may appear, adopted obstacles first.
-    :param make: makes a fresh set of agents, the same every time.
+    :param make: builds a new set of agents, the same every time.
     """
 
     descriptions: tuple[ObjectDescription, ...]
@@ -42,7 +42,7 @@ def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, netw
     """
     Choose the recorded obstacles that become agents.
 
-    :param kept: ids of those that events are about, which stay as recorded.
+    :param kept: ids of obstacles named by events, which stay as recorded.
     :return: their columns, in order
     """
     if spec is None or spec.recorded != 'reactive':
@@ -58,13 +58,13 @@ def make_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork
                  adopted: Sequence[int], world: 'WorldView', scheduler: ScenarioScheduler,
                  seed: int) -> 'Traffic':
     """
-    Make the agents of a run.
+    Build the agents of a run.
 
-    :param others: everything that is no agent, in the order of `world`.
+    :param others: everything but agents, in the order of `world`.
     :param obstacles: the recorded obstacles.
     :param adopted: columns of those that become agents.
-    :param world: everything that is no agent at the first tick.
-    :param seed: of the game; the traffic's own goes before it.
+    :param world: everything but agents at the first tick.
+    :param seed: of the game; the traffic's own seed takes precedence.
     """
     from crgame_ros.traffic.adoption import Adopted
     from crgame_ros.traffic.kernel_cache import compile_now
@@ -97,6 +97,6 @@ def place_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwor
         return make_traffic(spec, loaded, network, reader.others, obstacles, adopted, world,
                             scheduler, seed)
 
-    # Reading the roads takes seconds on large maps: the first run gets what told the descriptions.
+    # Reading the roads takes seconds on large maps: the first call returns the agents made here.
     made = [fresh()]
     return TrafficSetup(made[0].descriptions, lambda: made.pop() if made else fresh())

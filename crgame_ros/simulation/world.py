@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Everything in a run that is no driven vehicle, tick by tick."""
+"""All objects of a run other than the driven vehicles, tick by tick."""
 
 from collections.abc import Sequence
 from typing import Protocol, TYPE_CHECKING
@@ -29,10 +29,10 @@ if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for th
 
 class TrafficOrders:
     """
-    Passes orders on to agents, with the roads of the run as they know them.
+    Passes the orders of events to the agents, with the road network that the agents use.
 
-    :param loaded: the scenario, which stays as it is.
-    :param events: of the game; without one about speed limits nothing is copied.
+    :param loaded: the scenario, which is not changed.
+    :param events: of the game; the network is copied only if an event changes a speed limit.
     """
 
     def __init__(self, loaded: LoadedScenario, events: Sequence[EventSpec]) -> None:
@@ -41,7 +41,7 @@ class TrafficOrders:
             self._scenario = with_own_roads(loaded.scenario)
 
     def obey(self, order: TrafficOrder, traffic: 'Traffic') -> None:
-        """Let agents do as they are told from their next decision on."""
+        """Apply an order to the agents, from their next decision on."""
         if isinstance(order, SpeedLimit):
             set_speed_limit(self._scenario, order.speed, order.lanelets)
             traffic.read_speed_limits(RoadNetwork(self._scenario.lanelet_network))
@@ -51,9 +51,9 @@ class TrafficOrders:
 
 class Surroundings:
     """
-    The world as agents and as objects of the game see it.
+    The world as seen by agents and by objects of the game.
 
-    Agents see all that is no agent; the game's own objects see all that is none of them.
+    Agents see everything but agents; the game's own objects see everything but themselves.
 
     :param setup: the run.
     """
@@ -73,7 +73,7 @@ class Surroundings:
         self._objects = setup.obstacles.states_at(setup.scheduler.k0)
 
     def see(self, states: Sequence[VehicleState], objects: ObjectStates) -> None:
-        """Take the present states of the driven vehicles and of all objects."""
+        """Store the present states of the driven vehicles and of all objects."""
         self._joints = joints_of(states)
         self._objects = objects
 
@@ -91,28 +91,28 @@ class Surroundings:
 
 class TrafficFeed(Protocol):
     """
-    Whatever moves the agents: in process, or another process over DDS.
+    A source of the agents' states: in process, or another process over DDS.
 
     Agents at tick k come from the world of k - 1, live and offline alike.
     """
 
     def states_for(self, k: int) -> tuple[ObjectStates, int]:
-        """Return the agents at tick k, and the tick whose states could be used for that."""
+        """Return the agents at tick k, and the tick whose states were available for it."""
 
     def publish(self, view: 'WorldView') -> None:
-        """Tell what the agents react to."""
+        """Send the world that the agents react to."""
 
     def obey(self, order: TrafficOrder) -> None:
-        """Do as an event says, before the world of its tick is told."""
+        """Apply the order of an event, before the world of its tick is sent."""
 
 
 class LocalTraffic:
     """
-    Agents that are moved in process, when the next tick asks for them.
+    Agents that are moved in process, when the next tick needs them.
 
     :param traffic: at the first tick.
     :param k: that tick.
-    :param orders: what events tell them.
+    :param orders: passes on the orders of events.
     """
 
     def __init__(self, traffic: 'Traffic', k: int, orders: TrafficOrders) -> None:
@@ -129,17 +129,17 @@ class LocalTraffic:
         return self._traffic.states, self._k
 
     def publish(self, view: 'WorldView') -> None:
-        """Keep what the agents will react to."""
+        """Store the world that the agents will react to."""
         self._view = view
 
     def obey(self, order: TrafficOrder) -> None:
-        """Do as an event says."""
+        """Apply the order of an event."""
         self._orders.obey(order, self._traffic)
 
 
 class World:
     """
-    The objects of one run: recorded ones, changed by events, and those that live.
+    The objects of one run: recorded ones, changed by events, and reactive ones.
 
     :param setup: the run.
     :param events: of the run; None where the game has none.
@@ -168,13 +168,13 @@ class World:
 
     @property
     def changed(self) -> Sequence[int]:
-        """Columns of the objects whose states are not the scenario's, in order."""
+        """Return the columns of objects whose states differ from the scenario's, in order."""
         moved = [] if self._events is None else self._events.obstacles.changed
         return sorted({*moved, *self._setup.obstacles.living.tolist()})
 
     def advance(self, k: int) -> ObjectStates:
         """
-        Let what lives move to tick k, before events of that tick happen.
+        Move the reactive objects to tick k, before the events of that tick.
 
         :return: all objects at k, events of earlier ticks included.
         """
@@ -188,13 +188,13 @@ class World:
         return self.objects
 
     def obey(self, order: TrafficOrder) -> None:
-        """Let agents do as an event says."""
+        """Apply the order of an event to the agents."""
         if self._feed is not None:
             self._feed.obey(order)
 
     def settle(self, states: Sequence[VehicleState]) -> ObjectStates:
         """
-        Return all objects at this tick once events have happened, and let what lives see them.
+        Return all objects at this tick after its events, and show them to the reactive ones.
 
         :param states: of the driven vehicles at this tick.
         """

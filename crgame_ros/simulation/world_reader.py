@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What traffic sees of the world, the same bits live and offline.
+The world as traffic sees it, bit for bit the same live and offline.
 
 Driven vehicles are read as the joints that `/vehicles/state` carries.
 """
@@ -42,7 +42,7 @@ def driven_centers(positions: Joints, velocities: Joints,
 
 class WorldReader:
     """
-    Makes the agents' view of the world from joints and objects.
+    Builds the agents' view of the world from joints and objects.
 
     :param descriptions: of everything that can appear: driven vehicles, then objects.
     :param lights: the traffic lights.
@@ -67,7 +67,7 @@ class WorldReader:
         :param velocities: (V, 4)
         :param objects: all objects.
         """
-        # Imports numba: only runs with agents should wait for that.
+        # This imports numba, which only runs with agents should wait for.
         from crgame_ros.traffic.world_view import WorldView
         poses, rates = driven_centers(positions, velocities, self._ahead)
         return WorldView(k, np.concatenate((poses, objects.poses[self._columns])),

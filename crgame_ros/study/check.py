@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Looking at a study before anybody sits down: what is missing, unbalanced or cannot be driven."""
+"""Checks a study before its first session: missing files, balance, and drivable conditions."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -28,19 +28,19 @@ from crgame_ros.study.trial_plan import conditions_of, plan_trials, PlannedTrial
 from crgame_ros.study.trial_settings import TrialSettings
 import yaml
 
-# Of a trial that is looked at, simulated [s].
+# Simulated time of a checked trial [s].
 TRIED_S = 1.0
-# How long people take, roughly [s]: to read a page, to answer a question, to look at the controls.
+# Rough times for reading a page, answering a question and checking the controls [s].
 PAGE_S, QUESTION_S, DEVICE_S = 60.0, 7.0, 45.0
 
 
 @dataclass(frozen=True)
 class StudyFinding:
     """
-    Something about a study.
+    A finding about a study.
 
-    :param kind: an `error` keeps it from being run.
-    :param text: one line for people.
+    :param kind: an `error` prevents the study from running.
+    :param text: one line for the user.
     """
 
     kind: Literal['error', 'warning']
@@ -50,10 +50,10 @@ class StudyFinding:
 @dataclass(frozen=True)
 class SessionLength:
     """
-    How long a participant's session is.
+    The length of a participant's session.
 
-    :param driving_s: at most, practice as often as it may be.
-    :param else_s: about, for everything else.
+    :param driving_s: maximum driving time, with the maximum number of practice drives.
+    :param else_s: approximate time for everything else.
     """
 
     driving_s: float
@@ -63,9 +63,9 @@ class SessionLength:
 def check_study(study: StudyFile,
                 progress: Callable[[float], object] = lambda _: None) -> list[StudyFinding]:
     """
-    Look at everything that a study names, and drive a second of each of its conditions.
+    Check everything that a study names, and drive a second of each of its conditions.
 
-    :param progress: is told how much is done, 0 to 1.
+    :param progress: called with the share that is done, 0 to 1.
     """
     found = [*_steps(study), *_balance(study)]
     drives = list(drives_of(study))
@@ -116,9 +116,9 @@ def _duration_s(settings: TrialSettings) -> float:
 
 
 def _try(settings: TrialSettings) -> None:
-    """Drive a little of a trial, with nobody at the wheel."""
+    """Simulate the start of a trial without a driver."""
     game = trial_game(settings, 'idle')
-    # As the run will read it: what two files say together is checked here.
+    # Read it as the run will, so that the combination of several files is checked.
     game = parse_game(yaml.safe_load(dump_game(game)), 'game of the trial', game.base)
     run_offline(build_setup(game), duration_s=min(TRIED_S, game.duration))
     if game.duration == float('inf'):
@@ -178,6 +178,6 @@ def _unbalanced(study: StudyFile, block: Block, conditions: int,
 
 
 def _within(order: list[str], conditions: int) -> Iterable[tuple[str, str]]:
-    """Yield what follows what within each repetition."""
+    """Yield the pairs of successive conditions within each repetition."""
     for start in range(0, len(order), conditions):
         yield from pairwise(order[start:start + conditions])

@@ -1,25 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the drive that a participant is in, or about to begin."""
+"""The state of a participant's present or next drive."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class DrivePhase(StrEnum):
-    """How far a drive has come."""
+    """The phase of a drive."""
 
-    # Nothing is to be driven now.
+    # No drive is due.
     NONE = 'none'
-    # The graph is started, or the game is loaded.
+    # The graph is starting, or the game is loading.
     PREPARING = 'preparing'
-    # The participant has to say that they are ready.
+    # The participant has to confirm that they are ready.
     READY = 'ready'
     COUNTDOWN = 'countdown'
     DRIVING = 'driving'
     # It is over, and its end is being recorded.
     ENDED = 'ended'
-    # The experimenter has to mend something.
+    # The experimenter has to fix a problem.
     FAILED = 'failed'
 
 
@@ -28,12 +28,12 @@ class DriveState:
     """
     A drive at one moment.
 
-    :param phase: how far it has come.
-    :param item: id of the session's item that is driven; empty where there is none.
+    :param phase: its phase.
+    :param item: id of the session's item that is driven; empty without one.
     :param attempt: at it, from 1 on; 0 before the first cycle.
-    :param link: address of the cockpit's page for the participant; empty while there is none.
+    :param link: address of the cockpit's page for the participant; empty if not available.
     :param time_s: the run's clock [s]; None before the first cycle.
-    :param text: for the experimenter: what is going on, or what failed.
+    :param text: for the experimenter: the present work, or the failure.
     """
 
     phase: DrivePhase = DrivePhase.NONE

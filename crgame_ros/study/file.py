@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The study file: who takes part, what they see and answer, and which trials they drive."""
+"""The study file: participants, pages, questions and trials of an experiment."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +25,8 @@ class Page:
     """
     A page to read.
 
-    :param file: Markdown; `consent.de.md` beside `consent.md` is that for German.
-    :param consent: whether it has to be agreed to, or the study ends.
+    :param file: Markdown; `consent.de.md` beside `consent.md` is the German version.
+    :param consent: whether the participant has to agree; otherwise the study ends.
     """
 
     FORM: ClassVar[Form] = Form(_SEE, short='file')
@@ -53,8 +53,8 @@ class Break:
     """
     A pause.
 
-    :param minutes: that it lasts at least.
-    :param text: what people read.
+    :param minutes: its minimum duration.
+    :param text: shown to the participant.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -66,7 +66,7 @@ class Break:
 @dataclass(frozen=True)
 class DeviceCheck:
     """
-    The participant moves every control once, as the page shows it.
+    A check in which the participant moves every control once, as shown on the page.
 
     :param text: what people read.
     """
@@ -84,9 +84,9 @@ STEPS: dict[str, type[Step]] = {
 @dataclass(frozen=True)
 class StepEntry:
     """
-    Something that participants do between trials.
+    A step of participants between trials.
 
-    :param step: what it is.
+    :param step: the step.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -100,13 +100,13 @@ Steps = Annotated[tuple[StepEntry, ...], Listed(0, 50, 'step')]
 @dataclass(frozen=True)
 class Practice:
     """
-    Driving before the first trial of a block, which is no trial.
+    Practice drives before the first trial of a block.
 
     :param settings: of it, besides those of the study and the block.
-    :param at_least: how often it is driven.
-    :param at_most: after so many the block begins whatever became of them; 0 goes on until one
-        is good.
-    :param seconds: without a collision or leaving the road that make one good [s]
+    :param at_least: minimum number of drives.
+    :param at_most: maximum number of drives, after which the block begins in any case; 0 repeats
+        until one is good.
+    :param seconds: time without a collision or leaving the road that makes a drive good [s]
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -117,7 +117,7 @@ class Practice:
     seconds: Annotated[float, Within(0.0, 3600.0)] = 10.0
 
     def check(self) -> None:
-        """Refuse a greatest number below the least."""
+        """Refuse a maximum number below the minimum."""
         if 0 < self.at_most < self.at_least:
             raise InputError('"at_most" is below "at_least"', '', 'give more, or 0')
 
@@ -128,17 +128,17 @@ class Block:
     Trials that belong together.
 
     :param name: of it.
-    :param factors: names of those whose levels are crossed; all by default.
-    :param repetitions: how often each condition is driven.
-    :param order: of the conditions, in each repetition anew.
-    :param sequences: lists of conditions, `level` or `level/level`, that participants take in
+    :param factors: names of the factors whose levels are crossed; all by default.
+    :param repetitions: number of drives of each condition.
+    :param order: of the conditions, drawn for each repetition.
+    :param sequences: lists of conditions, `level` or `level/level`, assigned to participants in
         turn instead.
     :param settings: of its trials, besides those of the study.
     :param practice: before its first trial.
     :param before: steps before it.
     :param after_trial: steps after each trial.
     :param break_every: trials after which there is a break, 0 for none.
-    :param break_minutes: that it lasts at least.
+    :param break_minutes: minimum duration of the break.
     :param after: steps after it.
     """
 
@@ -164,15 +164,15 @@ class StudyFile:
     A study.
 
     :param name: of its folder.
-    :param title: for people.
+    :param title: as displayed.
     :param language: of participants, unless they choose another one.
-    :param languages: among which they may choose.
+    :param languages: that participants may choose.
     :param seed: of all orders.
-    :param participants: how many are planned, for the checks of balance.
-    :param fields: what is asked of each participant first.
-    :param markers: that the experimenter sets by a key while a session goes on.
+    :param participants: planned number, for the checks of balance.
+    :param fields: questions to each participant at the start.
+    :param markers: that the experimenter can set by a key during a session.
     :param settings: of all trials.
-    :param factors: what differs between conditions.
+    :param factors: the factors of the experiment.
     :param before: steps before the first block.
     :param blocks: in their order.
     :param after: steps after the last block.
@@ -197,7 +197,7 @@ class StudyFile:
     base: Annotated[Path, Folder()] = Path('.')
 
     def check(self) -> None:
-        """Refuse blocks that name what there is not."""
+        """Refuse blocks that name unknown factors or conditions."""
         known = {factor.name for factor in self.factors}
         for block in self.blocks:
             for name in block.factors or ():
@@ -208,7 +208,7 @@ class StudyFile:
 
     @property
     def all_languages(self) -> tuple[str, ...]:
-        """Return the languages among which participants choose, that of the study first."""
+        """Return the languages that participants can choose, that of the study first."""
         return tuple(dict.fromkeys((self.language, *self.languages)))
 
     def factors_of(self, block: Block) -> tuple[Factor, ...]:

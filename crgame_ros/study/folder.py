@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a study's data lies: one folder for it, and one in it for each participant."""
+"""The folder of a study's data, with a folder for each participant."""
 
 from collections.abc import Iterable, Mapping
 import json
@@ -25,12 +25,12 @@ DRIVES, FILES = 'drives.json', 'files'
 
 def keep_drives(study: StudyFile, folder: Path) -> None:
     """
-    Keep what people drive in, or make sure that it still is what was kept.
+    Store the games of a study, or check that they still equal the stored ones.
 
-    `drives.json` has the game of each practice and condition; what they name (scenarios, scripts,
-    maps, code of planners with what stands beside it) lies in `files/`, by digest.
+    `drives.json` has the game of each practice and condition. The files that they name (scenarios,
+    scripts, maps, code of planners with the files beside it) are in `files/`, by digest.
 
-    :param folder: of the study's files; is there.
+    :param folder: of the study's files; must exist.
     :raises InputError: if a game cannot be used, or has changed since.
     :raises OSError: if something cannot be written.
     """
@@ -41,7 +41,7 @@ def keep_drives(study: StudyFile, folder: Path) -> None:
                  for name, settings in drives_of(study)}
         now = json.loads(json.dumps(games, default=str))
         if not kept.exists():
-            # Only the name of the list makes the files count.
+            # The files count only once the list exists.
             _replace(store.folder, folder / FILES)
             write_whole((json.dumps(now, indent=1) + '\n').encode(), kept)
             return
@@ -54,7 +54,7 @@ def keep_drives(study: StudyFile, folder: Path) -> None:
 
 
 def _replace(new: Path, old: Path) -> None:
-    """Put new files in the place of those that a start has left that did not come to its end."""
+    """Replace the files that an interrupted start has left by new ones."""
     if old.is_dir():
         for each in old.iterdir():
             each.rename(new.parent / f'old-{each.name}')
@@ -63,7 +63,7 @@ def _replace(new: Path, old: Path) -> None:
 
 
 def _difference(before: Any, now: Any, where: str = '') -> str:
-    """Name the first thing in which two games differ: a file by its name, others by their key."""
+    """Return the first difference of two games: the name of a file, or the key of a value."""
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for key in (*now, *before):
             if before.get(key) != now.get(key):
@@ -83,7 +83,7 @@ def check_participant(name: str) -> str:
     """
     Check an anonymous id.
 
-    :raises InputError: if it is none.
+    :raises InputError: if it is not valid.
     """
     if _ID.fullmatch(name) is None:
         raise InputError('is no id of a participant', name[:40] or '--participant',
@@ -95,7 +95,7 @@ class StudyFolder:
     """
     The folder of a study.
 
-    :param root: of it.
+    :param root: its path.
     """
 
     def __init__(self, root: Path) -> None:
@@ -103,18 +103,18 @@ class StudyFolder:
 
     @property
     def participants(self) -> list[str]:
-        """Name those who have begun, in the order of their places."""
+        """Return the participants who have begun, in the order of their places."""
         folder = self.root / 'participants'
         found = [(places[0], path.name) for path in (folder.iterdir() if folder.is_dir() else ())
                  if (places := _places(path))]
         return [name for _, name in sorted(found)]
 
     def participant(self, name: str) -> Path:
-        """Return the folder of a participant, which may not be there yet."""
+        """Return the folder of a participant, which may not exist yet."""
         return self.root / 'participants' / name
 
     def place_of(self, name: str) -> int:
-        """Return a participant's place among all: that of their start, or the next free one."""
+        """Return a participant's place among all: the stored one, or the next free one."""
         own = _places(self.participant(name))
         if own:
             return own[0]
@@ -124,7 +124,7 @@ class StudyFolder:
 
     def keep_study(self, study: StudyFile, file: Path, pictures: Iterable[str] = ()) -> None:
         """
-        Keep the study's files as they are, or make sure that they still are what was kept.
+        Store the study's files, or check that they still equal the stored ones.
 
         :param file: of the study.
         :param pictures: of its pages, relative to its folder.
@@ -151,7 +151,7 @@ class StudyFolder:
 
 
 def _beside(study: StudyFile) -> list[str]:
-    """Name pages, questionnaires and words beside a study file, in every language."""
+    """Return pages, questionnaires and words beside a study file, in every language."""
     names: dict[str, None] = dict.fromkeys(
         path.name for path in sorted(study.base.glob('words.*.yaml')))
     for step in steps_of(study):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A text that people read, in the languages of a study."""
+"""Displayed texts in the languages of a study."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class LocalText:
     """
     A text in one or several languages.
 
-    :param by_language: texts by the language's code; that of '' is for every language.
+    :param by_language: texts by language code; the code '' stands for every language.
     """
 
     by_language: tuple[tuple[str, str], ...] = ()
@@ -26,7 +26,7 @@ class LocalText:
     @classmethod
     def from_value(cls, given: Any, where: str = '') -> 'LocalText':
         """
-        Take what a file says: a text, or texts by language.
+        Read a value of a file: a text, or texts by language.
 
         :raises InputError: if it is neither.
         """
@@ -40,16 +40,16 @@ class LocalText:
                          'give a text, or texts by language: {en: ..., de: ...}')
 
     def __bool__(self) -> bool:
-        """Return whether there is anything to read."""
+        """Return whether the text is not empty."""
         return any(text for _, text in self.by_language)
 
     def in_language(self, language: str) -> str:
-        """Return it in a language, else in that for all, else in the first that there is."""
+        """Return the text in a language, else the one for all languages, else the first one."""
         texts = dict(self.by_language)
         return texts.get(language, texts.get('', next(iter(texts.values()), '')))
 
     def lacks(self, language: str) -> bool:
-        """Return whether people of a language get it in another one."""
+        """Return whether the text is missing in a language, so that another one is shown."""
         return bool(self.by_language) and not {language, ''} & {
             code for code, _ in self.by_language}
 
@@ -65,12 +65,12 @@ class _LocalTextMark(Special):
         return LocalText.from_value(given, place)
 
     def json_schema(self) -> dict[str, Any]:
-        """Describe it as JSON Schema."""
+        """Return its JSON Schema."""
         return {'anyOf': [{'type': 'string'}, {
             'type': 'object', 'additionalProperties': {'type': 'string'}, 'minProperties': 1}]}
 
     def __str__(self) -> str:
-        """Return what is wanted."""
+        """Return the expected form."""
         return 'a text, or texts by language: {en: ..., de: ...}'
 
 

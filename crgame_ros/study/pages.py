@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the pages and questionnaires of a study are."""
+"""Finds the pages and questionnaires of a study."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from crgame_ros.study.file import Page, Questions, Step, StudyFile
 
 
 def steps_of(study: StudyFile) -> tuple[Step, ...]:
-    """List all that participants do between drives, each as often as the file has it."""
+    """Return all steps between drives, each as often as in the file."""
     entries = [*study.before, *study.after]
     for block in study.blocks:
         entries += [*block.before, *block.after_trial, *block.after]
@@ -29,6 +29,6 @@ def page_file(study: StudyFile, page: Page, language: str) -> Path | None:
 
 
 def questionnaire_name(study: StudyFile, step: Questions) -> str:
-    """Name a questionnaire as it can be read from anywhere."""
+    """Return a questionnaire's name, or the absolute path of its file."""
     is_file = step.name.endswith(('.yaml', '.yml'))
     return str(study.base / step.name) if is_file else step.name

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A participant's session: what is done, what comes next, and how it goes on after any end."""
+"""A participant's session: finished items, the next item, and resuming after any end."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -20,7 +20,7 @@ from crgame_ros.study.trial_plan import PlannedTrial
 
 
 class SessionEvent(StrEnum):
-    """What an entry of the journal says."""
+    """The kinds of journal entries."""
 
     BEGUN = 'begun'
     OPENED = 'opened'
@@ -39,15 +39,15 @@ class SessionEvent(StrEnum):
 
 class ParticipantSession:
     """
-    Goes through a session; every step is in the journal before it counts.
+    The progress of a session; every step is in the journal before it counts.
 
-    :param study: that it is of.
+    :param study: its study.
     :param folder: of the participant.
     :param participant: anonymous id.
     :param place: among all participants, from 0 on.
     :param clock_s: seconds since 1970.
-    :raises InputError: if the study cannot be planned, the participant takes part elsewhere, or
-        has begun another study or place.
+    :raises InputError: if the study cannot be planned, another process has the session open, or
+        the participant has begun another study or has another place.
     """
 
     def __init__(self, study: StudyFile, folder: Path, participant: str, place: int,
@@ -76,12 +76,12 @@ class ParticipantSession:
         self.journal.close()
 
     def note_software(self, software: Mapping[str, str | None]) -> None:
-        """Say with which programs the session begins, or goes on after an end."""
+        """Record the software versions with which the session begins or resumes."""
         self._add(SessionEvent.OPENED, software=dict(software))
 
     @property
     def done(self) -> frozenset[str]:
-        """Name the items that are finished or skipped."""
+        """Return the ids of finished or skipped items."""
         found: set[str] = set()
         for entry in self.journal.entries:
             if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
@@ -92,7 +92,7 @@ class ParticipantSession:
 
     @property
     def next_item(self) -> SessionItem | None:
-        """Return what is to be done now; None at the end, or once somebody has ended it."""
+        """Return the present item; None at the end, or once the session was ended."""
         if any(entry['entry'] == SessionEvent.ENDED for entry in self.journal.entries):
             return None
         done = self.done
@@ -100,13 +100,13 @@ class ParticipantSession:
 
     @property
     def language(self) -> str | None:
-        """Return the language that the participant has chosen last; None before."""
+        """Return the language that the participant chose last; None before a choice."""
         return next((entry['language'] for entry in reversed(self.journal.entries)
                      if entry['entry'] == SessionEvent.LANGUAGE), None)
 
     def choose_language(self, language: str) -> None:
         """
-        Keep the language in which the participant reads.
+        Record the participant's language.
 
         :raises InputError: if the study does not have it.
         """
@@ -117,27 +117,27 @@ class ParticipantSession:
 
     @property
     def held_at(self) -> str | None:
-        """Name the item after which the experimenter holds the session; None if it goes on."""
+        """Return the item after which the experimenter holds the session; None if not held."""
         last = next((entry for entry in reversed(self.journal.entries)
                      if entry['entry'] == SessionEvent.HELD), None)
         return None if last is None or not last['held'] else last['item']
 
     def hold(self, held: bool) -> None:
-        """Hold the session before the item after the present one, or let it go on."""
+        """Hold the session after the present item, or release it."""
         item = self.next_item
         self._add(SessionEvent.HELD, held=held, item='' if item is None else item.id)
 
     def attempts(self, item: str) -> int:
-        """Count how often an item was started."""
+        """Return how often an item was started."""
         return sum(entry['entry'] == SessionEvent.STARTED and entry['item'] == item
                    for entry in self.journal.entries)
 
     def start(self, run: str = '') -> int:
         """
-        Return that the next item begins.
+        Record the start of the next item.
 
-        :param run: name of the recording's folder, of a drive.
-        :return: which attempt it is, from 1 on; a trial that did not finish is another attempt's.
+        :param run: name of the recording's folder, for a drive.
+        :return: number of the attempt, from 1 on; unfinished attempts count.
         """
         item = self._now()
         attempt = self.attempts(item.id) + 1
@@ -145,7 +145,7 @@ class ParticipantSession:
         return attempt
 
     def questions(self, item: SessionItem) -> tuple[Question, ...]:
-        """Return what is asked in an item; empty where nothing is."""
+        """Return the questions of an item; empty without any."""
         if isinstance(item.what, Fields):
             return self.study.fields
         if isinstance(item.what, Questions):
@@ -154,11 +154,11 @@ class ParticipantSession:
 
     def finish(self, answers: Mapping[str, Any] | None = None, **told: Any) -> SessionItem:
         """
-        Return that the next item is done: nothing of it is asked again.
+        Record that the next item is finished: it is not asked again.
 
         :param answers: to its questions, as the participant gave them.
-        :param told: what else is known of it: a drive's outcome.
-        :raises InputError: if an answer cannot be taken, or a consent is not given.
+        :param told: further values, such as a drive's outcome.
+        :raises InputError: if an answer is refused, or a consent is not given.
         """
         item = self._now()
         if isinstance(item.what, PracticeDrives):
@@ -173,9 +173,9 @@ class ParticipantSession:
 
     def practised(self, good: bool, **told: Any) -> bool:
         """
-        Take a practice drive.
+        Record a practice drive.
 
-        :param good: whether it was as it should be.
+        :param good: whether it met the criterion.
         :return: whether the practice is over.
         """
         item = self._now()
@@ -191,7 +191,7 @@ class ParticipantSession:
         return over
 
     def _practice_drives(self, item: str) -> int:
-        """Count the drives of a practice since it began, or began anew."""
+        """Return the number of drives of a practice since its start or last repeat."""
         drives = 0
         for entry in self.journal.entries:
             if entry.get('item') == item:
@@ -201,23 +201,23 @@ class ParticipantSession:
 
     def abort(self, reason: str, item: str = '') -> None:
         """
-        Say that the present attempt at an item counts for nothing; it comes again.
+        Record that the present attempt at an item does not count; the item is repeated.
 
-        :param item: that is left; the next one where empty.
+        :param item: id of the item; the next one if empty.
         """
         self._add(SessionEvent.ABORTED, item=item or self._now().id, reason=reason)
 
     def skip(self, reason: str) -> None:
-        """Leave the next item out, for a reason."""
+        """Skip the next item, for a reason."""
         if not reason.strip():
             raise InputError('needs a reason', self._now().id, 'say why it is left out')
         self._add(SessionEvent.SKIPPED, item=self._now().id, reason=reason)
 
     def repeat(self, item: str, reason: str) -> None:
         """
-        Let an item that is done come again: what was told of it before stays in the journal.
+        Repeat a finished item; its earlier entries stay in the journal.
 
-        With a trial come the questions after it: they are about how it was driven last.
+        With a trial, the questions after it are repeated too: they are about its last drive.
         """
         done = self.done
         if item not in self._ids or item not in done:
@@ -231,15 +231,15 @@ class ParticipantSession:
                 self._add(SessionEvent.REPEATED, item=after.id, reason=reason)
 
     def note(self, text: str, **told: Any) -> None:
-        """Keep what the experimenter remarks."""
+        """Record a note of the experimenter."""
         self._add(SessionEvent.NOTE, text=text, **told)
 
     def mark(self, name: str, **told: Any) -> None:
-        """Keep a marker of the experimenter's or of a secondary task."""
+        """Record a marker of the experimenter or of a secondary task."""
         self._add(SessionEvent.MARKER, name=name, **told)
 
     def end(self, reason: str) -> None:
-        """End the session before its last item; it does not go on any more."""
+        """End the session before its last item, for good."""
         self._add(SessionEvent.ENDED, reason=reason)
 
     def _now(self) -> SessionItem:

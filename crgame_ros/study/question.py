@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Questions of a study, and whether an answer is one of theirs."""
+"""Questions of a study, and checks of their answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ Answer = float | str | list[str] | None
 @dataclass(frozen=True)
 class LikertQuestion:
     """
-    One of some points in a row, 1 at the left.
+    A question with a row of points, 1 at the left.
 
-    :param points: how many.
-    :param left: what the first means.
-    :param right: what the last means.
-    :param labels: what each means, instead of `left` and `right`.
+    :param points: number of points.
+    :param left: label of the first.
+    :param right: label of the last.
+    :param labels: label of each, instead of `left` and `right`.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -37,13 +37,13 @@ class LikertQuestion:
     labels: Annotated[tuple[Text, ...], Listed(0, 11, 'label')] = ()
 
     def check(self) -> None:
-        """Refuse labels for other points."""
+        """Refuse labels of unknown points."""
         if self.labels and len(self.labels) != self.points:
             raise InputError(f'has {len(self.labels)} labels for {self.points} points', '',
                              'give one for each point')
 
     def refusal(self, answer: Any) -> str:
-        """Return why an answer is none of this question, empty if it is one."""
+        """Return why an answer is invalid, empty if it is valid."""
         whole = isinstance(answer, int | float) and not isinstance(answer, bool) \
             and answer == int(answer) if _finite(answer) else False
         return '' if whole and 1 <= answer <= self.points else f'give 1 to {self.points}'
@@ -52,13 +52,13 @@ class LikertQuestion:
 @dataclass(frozen=True)
 class SliderQuestion:
     """
-    A place on a line, which is not marked before somebody does.
+    A question with a position on a line, unmarked at first.
 
     :param low: at the left end.
     :param high: at the right end.
-    :param step: between neighbouring places.
-    :param left: what the left end means.
-    :param right: what the right end means.
+    :param step: between neighbouring positions.
+    :param left: label of the left end.
+    :param right: label of the right end.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -70,12 +70,12 @@ class SliderQuestion:
     right: Text = LocalText()
 
     def check(self) -> None:
-        """Refuse a line without length."""
+        """Refuse a line of zero length."""
         if not self.high > self.low:
             raise InputError(f'"high" is not above "low", {self.low:g}', '', 'give a higher one')
 
     def refusal(self, answer: Any) -> str:
-        """Return why an answer is none of this question, empty if it is one."""
+        """Return why an answer is invalid, empty if it is valid."""
         fits = _finite(answer) and self.low <= answer <= self.high
         return '' if fits else f'give {self.low:g} to {self.high:g}'
 
@@ -83,9 +83,9 @@ class SliderQuestion:
 @dataclass(frozen=True)
 class ChoiceQuestion:
     """
-    One of some choices, or several of them.
+    A question with one choice, or several choices.
 
-    :param choices: the answer's name, and what people read.
+    :param choices: names of the answers, with the displayed texts.
     :param several: whether more than one, or none, may be chosen.
     """
 
@@ -95,7 +95,7 @@ class ChoiceQuestion:
     several: bool = False
 
     def check(self) -> None:
-        """Refuse what leaves nothing to choose."""
+        """Refuse a question with too few choices."""
         if len(self.choices) < 2:
             raise InputError(f'has {len(self.choices)} choices', '', 'give two or more')
         for name, text in self.choices.items():
@@ -103,11 +103,11 @@ class ChoiceQuestion:
 
     @property
     def texts(self) -> dict[str, LocalText]:
-        """Return what people read, by the answer's name."""
+        """Return the displayed texts, by the answer's name."""
         return {str(name): LocalText.from_value(text) for name, text in self.choices.items()}
 
     def refusal(self, answer: Any) -> str:
-        """Return why an answer is none of this question, empty if it is one."""
+        """Return why an answer is invalid, empty if it is valid."""
         known = set(map(str, self.choices))
         if self.several:
             fits = isinstance(answer, list) and all(isinstance(item, str) for item in answer) \
@@ -120,12 +120,12 @@ class ChoiceQuestion:
 @dataclass(frozen=True)
 class NumberQuestion:
     """
-    A number that somebody types.
+    A question with a typed number.
 
-    :param low: least that is taken.
-    :param high: greatest that is taken.
-    :param whole: whether only whole numbers are taken.
-    :param unit: that stands behind it.
+    :param low: smallest allowed value.
+    :param high: largest allowed value.
+    :param whole: whether only integers are allowed.
+    :param unit: displayed after it.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -136,7 +136,7 @@ class NumberQuestion:
     unit: Annotated[str, Wording(r'[\s\S]{0,20}', 'give 20 characters at most')] = ''
 
     def refusal(self, answer: Any) -> str:
-        """Return why an answer is none of this question, empty if it is one."""
+        """Return why an answer is invalid, empty if it is valid."""
         fits = _finite(answer) and self.low <= answer <= self.high \
             and (not self.whole or answer == int(answer))
         kind = 'a whole number' if self.whole else 'a number'
@@ -146,9 +146,9 @@ class NumberQuestion:
 @dataclass(frozen=True)
 class TextQuestion:
     """
-    Whatever somebody writes.
+    A question with free text.
 
-    :param longest: number of characters that are taken.
+    :param longest: maximum number of characters.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -156,7 +156,7 @@ class TextQuestion:
     longest: Annotated[int, Within(1, MOST_CHARACTERS)] = 10_000
 
     def refusal(self, answer: Any) -> str:
-        """Return why an answer is none of this question, empty if it is one."""
+        """Return why an answer is invalid, empty if it is valid."""
         fits = isinstance(answer, str) and len(answer) <= self.longest
         return '' if fits else f'give {self.longest} characters at most'
 
@@ -173,9 +173,9 @@ class Question:
     One question.
 
     :param name: of its column in the tables.
-    :param kind: what can be answered.
-    :param ask: what people read.
-    :param required: whether it has to be answered before anybody goes on.
+    :param kind: the kind of answer.
+    :param ask: the displayed text.
+    :param required: whether it has to be answered before the participant can continue.
     """
 
     FORM: ClassVar[Form] = Form(_SEE, first=('name', 'ask'))
@@ -186,7 +186,7 @@ class Question:
     required: bool = True
 
     def refusal(self, answer: Any) -> str:
-        """Return why an answer cannot be taken, empty if it can; None is no answer."""
+        """Return why an answer is refused, empty if it is accepted; None means no answer."""
         if answer is None:
             return 'give an answer' if self.required else ''
         if self.required and answer in ('', []):
@@ -197,11 +197,11 @@ class Question:
 def check_answers(questions: tuple[Question, ...], answers: Mapping[str, Any],
                   where: str) -> dict[str, Answer]:
     """
-    Take the answers to some questions.
+    Check the answers to some questions, and return them.
 
-    :param answers: by the question's name; one that is left out is None.
+    :param answers: by the question's name; a missing one counts as None.
     :return: an answer, or None, for each question in its order.
-    :raises InputError: about the first that cannot be taken.
+    :raises InputError: about the first answer that is refused.
     """
     known = {question.name for question in questions}
     for name in answers:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Questionnaires: questions that belong together, and the scores of their answers."""
+"""Questionnaires: groups of questions, and the scores of their answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,15 +25,15 @@ _SEE = 'see docs/studies.md for the keys'
 @dataclass(frozen=True)
 class Score:
     """
-    A number made of answers.
+    A score computed from answers.
 
     :param name: of its column in the tables.
     :param items: names of the questions whose answers count.
     :param how: `mean` or `sum` of the answers; `tally` is their mean weighted by how often each
-        was chosen in the questions of `pairs`.
-    :param factor: by which the result is multiplied.
-    :param flipped: those of the items that count with the opposite sign.
-    :param offset: is added to each answer first.
+        item was chosen in the questions of `pairs`.
+    :param factor: multiplies the result.
+    :param flipped: the items that count with the opposite sign.
+    :param offset: added to each answer first.
     :param pairs: names of the questions that choose between two items, for `tally`.
     """
 
@@ -48,7 +48,7 @@ class Score:
     pairs: Annotated[tuple[str, ...], Listed(noun='question')] = ()
 
     def compute(self, answers: Mapping[str, Answer]) -> float:
-        """Compute it; NaN where an answer is missing."""
+        """Compute the score; NaN if an answer is missing."""
         values = [answers.get(item) for item in self.items]
         if not all(isinstance(value, int | float) for value in values):
             return math.nan
@@ -70,12 +70,12 @@ class Score:
 @dataclass(frozen=True)
 class Questionnaire:
     """
-    A questionnaire, as its file says it.
+    The content of a questionnaire file.
 
-    :param name: of it, in front of its columns in the tables.
-    :param title: above it.
-    :param text: what people read before its questions.
-    :param citation: whose it is.
+    :param name: prefix of its columns in the tables.
+    :param title: its heading.
+    :param text: shown before its questions.
+    :param citation: its source.
     :param questions: in their order.
     :param scores: of the answers.
     """
@@ -90,7 +90,7 @@ class Questionnaire:
     scores: Annotated[tuple[Score, ...], Listed(0, 50, 'score', 'name')] = ()
 
     def check(self) -> None:
-        """Refuse scores of questions that there are not."""
+        """Refuse scores of unknown questions."""
         known = {question.name: question for question in self.questions}
         for score in self.scores:
             for item in (*score.items, *score.flipped, *score.pairs):
@@ -108,12 +108,12 @@ class Questionnaire:
                                      f'scores: {score.name}', 'let its choices be two items')
 
     def score(self, answers: Mapping[str, Answer]) -> dict[str, float]:
-        """Compute all scores of some answers; NaN where an answer is missing."""
+        """Compute all scores of some answers; NaN if an answer is missing."""
         return {score.name: score.compute(answers) for score in self.scores}
 
 
 def standard_questionnaires() -> tuple[str, ...]:
-    """Name those that come with the program."""
+    """Return the names of the questionnaires that come with the program."""
     return tuple(sorted(path.stem for path in SCALES.glob('*.yaml')))
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What has happened in a participant's session, line by line: nothing of it is ever lost."""
+"""The journal of a participant's session, line by line, safe against crashes."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -19,12 +19,12 @@ JOURNAL = 'journal.jsonl'
 
 class SessionJournal:
     """
-    A file to which entries are only ever added; each is on the disk when `add` returns.
+    An append-only file of entries; each is on the disk when `add` returns.
 
-    Whatever ends the process, a line is there whole or, the last one, is dropped when the file is
-    opened again.
+    However the process ends, all lines are complete, except perhaps the last one, which is dropped
+    when the file is opened again.
 
-    :param folder: of the participant; is made.
+    :param folder: of the participant; created if missing.
     :raises InputError: if it cannot be written, or another process writes there.
     """
 
@@ -68,11 +68,11 @@ class SessionJournal:
         self.entries.append(json.loads(line))
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
     def _recovered(self) -> Iterator[dict[str, Any]]:
-        """Read what is there; a line that was cut off is taken away."""
+        """Read the present entries, and remove a line that was cut off."""
         self._file.seek(0)
         content = self._file.read()
         whole = content[:content.rfind(b'\n') + 1]
@@ -87,7 +87,7 @@ class SessionJournal:
 
 
 def read_journal(folder: Path) -> list[dict[str, Any]]:
-    """Read a participant's entries, also while somebody adds some."""
+    """Read a participant's entries, also while a process adds some."""
     try:
         lines = (folder / JOURNAL).read_bytes().splitlines(keepends=True)
     except FileNotFoundError:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that a participant goes through, item by item, in order."""
+"""Scripts a participant's session as a sequence of items."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -12,16 +12,16 @@ from crgame_ros.study.trial_settings import drawn, laid, TrialSettings
 
 @dataclass(frozen=True)
 class Fields:
-    """What is asked of a participant first."""
+    """The questions to a participant at the start."""
 
 
 @dataclass(frozen=True)
 class PracticeDrives:
     """
-    Practice before a block.
+    Practice drives before a block.
 
-    :param practice: how often, and what is good.
-    :param settings: of it.
+    :param practice: number of drives and criterion.
+    :param settings: of the drives.
     """
 
     practice: Practice
@@ -31,11 +31,11 @@ class PracticeDrives:
 @dataclass(frozen=True)
 class SessionItem:
     """
-    One thing to do.
+    One item of a session.
 
-    :param id: of it, the same in each process that reads the same study.
-    :param what: to do.
-    :param trial: after which it comes, for answers; None elsewhere.
+    :param id: its id, the same in each process that reads the same study.
+    :param what: its content.
+    :param trial: the trial before it, for answers; None elsewhere.
     """
 
     id: str  # noqa: A003
@@ -45,7 +45,7 @@ class SessionItem:
 
 def session_of(study: StudyFile, place: int) -> tuple[SessionItem, ...]:
     """
-    Script the session of a participant.
+    Return the session of a participant.
 
     :param place: among all participants, from 0 on.
     :raises InputError: if the study cannot be planned.
@@ -61,7 +61,7 @@ def session_of(study: StudyFile, place: int) -> tuple[SessionItem, ...]:
 
 
 def drives_of(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
-    """Name all that is driven in a study, each practice and condition once."""
+    """Yield names and settings of all practices and conditions of a study, each once."""
     for block in study.blocks:
         if block.practice is not None:
             first = conditions_of(study, block)[0].settings
@@ -72,7 +72,7 @@ def drives_of(study: StudyFile) -> Iterator[tuple[str, TrialSettings]]:
 
 
 def placed(settings: TrialSettings, trial: TrialSettings) -> TrialSettings:
-    """Let practice be where the first trial is, unless its settings say otherwise."""
+    """Return practice settings with the game of the first trial, unless they have their own."""
     if settings.game is not None or settings.scenario is not None:
         return settings
     return replace(settings, game=trial.game, scenario=trial.scenario)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The game of a trial: its game file, with what the trial's settings say otherwise."""
+"""Builds the game of a trial: its game file, overridden by the trial's settings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ PERFECT, NONE = 'perfect', 'none'
 
 def seat_of(settings: TrialSettings, game: Game) -> str:
     """
-    Name the vehicle in which the participant sits: a human's, or an AV that may be taken over.
+    Return the participant's vehicle: a human's, or an AV that may be taken over.
 
     :param game: whose AVs are listed.
     :raises InputError: if the game has no human, or no vehicle of that name.
@@ -42,9 +42,9 @@ def seat_of(settings: TrialSettings, game: Game) -> str:
 
 def trial_game(settings: TrialSettings, driver: str) -> Game:
     """
-    Make the game of a trial.
+    Build the game of a trial.
 
-    :param settings: of the trial, laid over everything further out.
+    :param settings: of the trial, combined with all outer settings.
     :param driver: of the participant's seat.
     :raises InputError: if a file cannot be used, or the settings do not fit the game.
     """
@@ -64,7 +64,7 @@ def trial_game(settings: TrialSettings, driver: str) -> Game:
 
 
 def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
-    """Return the participant's vehicle its driver; there is nobody else to drive."""
+    """Return the game with its driver in the participant's vehicle, the only driver."""
     seat = seat_of(settings, game)
     for human in game.humans:
         if human.id != seat and human.driver == COCKPIT:
@@ -75,7 +75,7 @@ def _seated(settings: TrialSettings, driver: str, game: Game) -> Game:
 
 
 def _written_game(settings: TrialSettings) -> Game:
-    """Return the game as files have it: a game's, a scenario's, or one in the other's road."""
+    """Return the game from the files: a game, a scenario, or a game on a scenario's roads."""
     scenario = settings.scenario
     if settings.game is not None:
         game = load_game(Path(settings.game))
@@ -83,7 +83,7 @@ def _written_game(settings: TrialSettings) -> Game:
     if scenario is None:
         raise InputError('names no game', 'trial', 'give "game" or "scenario" to the study, a '
                          'block or a level')
-    # Without a human only AVs drive there, and the participant sits in one of them.
+    # Without a human all vehicles are AVs, and the participant sits in one of them.
     humans = (HumanSpec('hv0'),) if settings.seat in (None, 'hv0') else ()
     return Game(scenario, humans=humans)
 

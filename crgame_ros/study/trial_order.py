@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""In which order a participant meets the conditions of a block: equal seeds, equal orders."""
+"""Orders the conditions of a block for a participant; equal seeds give equal orders."""
 
 from collections.abc import Sequence
 import random
@@ -14,7 +14,7 @@ def williams_rows(count: int) -> list[list[int]]:
     """
     Return the sequences of a Latin square that is balanced for carry-over.
 
-    Each condition stands equally often at each place, and each follows each other equally often.
+    Each condition is equally often at each place, and follows each other one equally often.
     An even number of conditions needs as many sequences, an odd number twice as many (Williams,
     Experimental designs balanced for the estimation of residual effects of treatments, Australian
     Journal of Scientific Research A 2, 1949).
@@ -28,23 +28,23 @@ def williams_rows(count: int) -> list[list[int]]:
 
 
 def rows_of(kind: OrderKind, count: int) -> int:
-    """Count the participants after whom an order begins anew: a multiple of them is balanced."""
+    """Return the number of participants after which the orders repeat; multiples are balanced."""
     return len(williams_rows(count)) if kind == 'williams' else 1
 
 
 def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: int = 0,
              sequences: Sequence[Sequence[int]] = ()) -> list[int]:
     """
-    Order the conditions of one pass through a block.
+    Return the order of conditions in one pass through a block.
 
-    :param kind: `williams` gives each participant the next row of a square, whose conditions the
+    :param kind: `williams` assigns each participant the next row of a square whose conditions the
         seed has shuffled; `random` shuffles for each participant and pass; `given` is the file's.
     :param count: of conditions.
     :param seed: of the study.
     :param place: of the participant, from 0 on.
-    :param pass_number: which repetition of the block, from 0 on.
-    :param sequences: taken in turn by participants instead, whatever the kind, if there are any.
-    :return: a permutation of 0 … count - 1, unless a sequence says otherwise.
+    :param pass_number: number of the repetition of the block, from 0 on.
+    :param sequences: if any, assigned to participants in turn instead of any kind of order.
+    :return: a permutation of 0 … count - 1, or a sequence.
     """
     if sequences:
         return list(sequences[place % len(sequences)])
@@ -54,12 +54,12 @@ def order_of(kind: OrderKind, count: int, seed: int, place: int, pass_number: in
         return shuffled(count, f'{seed} {place} {pass_number}')
     rows = williams_rows(count)
     names = shuffled(count, f'{seed}')
-    # The next pass takes the next row, so that one participant alone is not always first the same.
+    # Each pass uses the next row, so that a participant does not always start with the same one.
     return [names[item] for item in rows[(place + pass_number) % len(rows)]]
 
 
 def shuffled(count: int, seed: str) -> list[int]:
-    """Shuffle 0 … count - 1; a text's random numbers are the same on every machine."""
+    """Return 0 … count - 1 shuffled; a text as seed gives the same order on every machine."""
     items = list(range(count))
     random.Random(seed).shuffle(items)
     return items

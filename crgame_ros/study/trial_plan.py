@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which trials a participant drives, in their order: conditions crossed, settings laid over."""
+"""Plans a participant's trials in order, with crossed conditions and combined settings."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -14,10 +14,10 @@ from crgame_ros.study.trial_settings import drawn, laid, Level, TrialSettings
 @dataclass(frozen=True)
 class Condition:
     """
-    A combination of levels.
+    A combination of factor levels.
 
     :param levels: one of each factor of the block, by the factor's name.
-    :param settings: of its trials, laid over those of study and block.
+    :param settings: of its trials, which override those of study and block.
     """
 
     levels: tuple[tuple[str, Level], ...]
@@ -25,20 +25,20 @@ class Condition:
 
     @property
     def name(self) -> str:
-        """Name it by its levels."""
+        """Return its name, made of its levels."""
         return '/'.join(level.name for _, level in self.levels) or 'all'
 
 
 @dataclass(frozen=True)
 class PlannedTrial:
     """
-    A trial to drive.
+    A planned trial.
 
-    :param number: among all of the participant's, from 1 on.
+    :param number: among all trials of the participant, from 1 on.
     :param block: name of its block.
     :param place: in its block, from 1 on.
     :param repetition: from 1 on.
-    :param condition: that it has.
+    :param condition: its condition.
     """
 
     number: int
@@ -49,7 +49,7 @@ class PlannedTrial:
 
 
 def conditions_of(study: StudyFile, block: Block) -> tuple[Condition, ...]:
-    """Cross the levels of a block's factors; the last factor changes fastest."""
+    """Return the crossed levels of a block's factors; the last factor changes fastest."""
     factors = study.factors_of(block)
     return tuple(
         Condition(tuple((factor.name, level) for factor, level in
@@ -63,7 +63,7 @@ def plan_trials(study: StudyFile, place: int) -> tuple[PlannedTrial, ...]:
     Plan all trials of a participant.
 
     :param place: of the participant among all, from 0 on.
-    :raises InputError: if a block's sequence names no condition of it.
+    :raises InputError: if a block's sequence names an unknown condition.
     """
     trials: list[PlannedTrial] = []
     for block in study.blocks:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a trial is like: settings that cascade from the study to its blocks, levels and trials."""
+"""The settings of a trial, which cascade from the study to its blocks, levels and trials."""
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -19,27 +19,27 @@ _SEE = 'see docs/studies.md for the keys'
 @dataclass(frozen=True)
 class TrialSettings:
     """
-    Settings of trials; what is left out stays as it is further out.
+    Settings of trials; a setting that is left out keeps the value of the outer settings.
 
     :param game: game file.
-    :param scenario: CommonRoad file instead of the game's; without a game anybody drives near its
-        first AV.
-    :param seat: the vehicle in which the participant sits; the game's first human by default. An
-        AV drives itself until the participant takes it over.
+    :param scenario: CommonRoad file instead of the game's; without a game, the participant starts
+        near its first AV.
+    :param seat: the participant's vehicle; the game's first human by default. An AV drives itself
+        until the participant takes it over.
     :param planner: of all AVs, instead of the game's.
     :param options: of that planner.
     :param perception: file with the `perception` of all AVs, `perfect`, or `own` for the game's.
     :param traffic: file with the `traffic`, `none`, or `own` for the game's.
-    :param seed: of everything random; `each` draws another one for each drive of each participant.
-    :param duration: longest simulated time [s]
-    :param view: what the participant sees at the start.
-    :param map: whether the map is there, beside the view.
-    :param plans: whether AVs' plans and what they perceive may be shown.
+    :param seed: of everything random; `each` draws one for each drive of each participant.
+    :param duration: maximum simulated time [s]
+    :param view: the participant's view at the start.
+    :param map: whether the map is shown beside the view.
+    :param plans: whether AVs' plans and perceptions may be shown.
     :param names: whether the names of planners are shown.
-    :param sound: whether there is sound.
+    :param sound: whether sound is on.
     :param events: added to those of the game.
-    :param tasks: besides driving, added to those of the game; one of the same name replaces that
-        further out.
+    :param tasks: besides driving, added to those of the game; a task replaces an outer one of the
+        same name.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -62,10 +62,10 @@ class TrialSettings:
     tasks: TaskList = ()
 
     def over(self, outer: 'TrialSettings') -> 'TrialSettings':
-        """Lay these over settings further out; events and tasks of both count."""
+        """Return the outer settings overridden by these; events and tasks of both count."""
         given = {item.name: value for item in fields(self) if item.name not in ('events', 'tasks')
                  and (value := getattr(self, item.name)) is not None}
-        # Options are those of a planner: another one does not take them.
+        # Options belong to one planner; another planner does not inherit them.
         if 'planner' in given and 'options' not in given:
             given['options'] = None
         return replace(outer, **given, events=(*outer.events, *self.events),
@@ -73,14 +73,14 @@ class TrialSettings:
 
 
 def tasks_over(outer: tuple[TaskSpec, ...], inner: tuple[TaskSpec, ...]) -> tuple[TaskSpec, ...]:
-    """Lay tasks over those further out: one of the same name takes the place of the other."""
+    """Return outer and inner tasks; an inner one replaces an outer one of the same name."""
     names = {task.name for task in inner}
     return (*(task for task in outer if task.name not in names), *inner)
 
 
 NOTHING = TrialSettings()
 EACH = 'each'
-# What holds where nobody says otherwise.
+# The default settings.
 STANDARD = TrialSettings(perception='own', traffic='own', seed=0, view='driver', map=False,
                          plans=False, names=False, sound=True)
 
@@ -88,10 +88,10 @@ STANDARD = TrialSettings(perception='own', traffic='own', seed=0, view='driver',
 @dataclass(frozen=True)
 class Level:
     """
-    One of the conditions that a factor has.
+    A level of a factor.
 
     :param name: in tables.
-    :param settings: what is so in it.
+    :param settings: of its trials.
     """
 
     FORM: ClassVar[Form] = Form(_SEE, rest='settings')
@@ -103,10 +103,10 @@ class Level:
 @dataclass(frozen=True)
 class Factor:
     """
-    Something that differs between conditions.
+    An experimental factor.
 
     :param name: of its column in tables.
-    :param levels: of it, in the order of the file.
+    :param levels: its levels, in the order of the file.
     """
 
     FORM: ClassVar[Form] = Form(_SEE)
@@ -117,9 +117,9 @@ class Factor:
 
 def drawn(settings: TrialSettings, drive: str) -> TrialSettings:
     """
-    Draw the seed of a drive that is to have one of its own.
+    Return the settings with a seed drawn for this drive, if they ask for one.
 
-    :param drive: names it among all of the study; the same name gives the same seed everywhere.
+    :param drive: its unique name in the study; equal names give equal seeds everywhere.
     """
     if settings.seed != EACH:
         return settings
@@ -127,7 +127,7 @@ def drawn(settings: TrialSettings, drive: str) -> TrialSettings:
 
 
 def laid(*settings: TrialSettings) -> TrialSettings:
-    """Lay settings over each other, the outermost first, over what is standard."""
+    """Return the default settings overridden by these, given from outermost to innermost."""
     whole = STANDARD
     for each in settings:
         whole = each.over(whole)

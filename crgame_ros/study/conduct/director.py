@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The study's node in the graph: it chooses games, starts and stops runs, and follows them."""
+"""The study's node in the graph, which chooses games and starts, stops and follows runs."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -27,10 +27,10 @@ _QUEUE = 100
 
 class Director:
     """
-    Directs one graph. It is polled, and never waits but where it is awaited.
+    The controller of one graph. It is polled, and waits only in its coroutines.
 
     :param domain_id: of the graph.
-    :ivar status: how the run is doing.
+    :ivar status: of the run.
     """
 
     def __init__(self, domain_id: int) -> None:
@@ -52,7 +52,7 @@ class Director:
 
     @property
     def epoch(self) -> int:
-        """Count the games that have begun in this graph, from 0 on; -1 before the first."""
+        """Return the number of the present game in this graph, from 0 on; -1 before the first."""
         return -1 if self.game is None else self.game.epoch
 
     @property
@@ -62,7 +62,7 @@ class Director:
         return max(0, self._stamp_ns - offset_ns) / NS_PER_S
 
     def poll(self) -> None:
-        """Take what has come."""
+        """Process the messages that have arrived."""
         self._read_game()
         self._read_clock()
         self._read_events()
@@ -86,20 +86,20 @@ class Director:
         await self._orders.control('reset')
 
     async def start(self) -> None:
-        """Begin the run once its driver is there."""
+        """Start the run once its driver is present."""
         await self._orders.control('start')
 
     async def stop(self) -> None:
-        """End the run."""
+        """Stop the run."""
         await self._orders.control('stop')
 
     def record(self, subject: str, text: str, **values: object) -> None:
-        """Say something that the recording is to keep."""
+        """Publish a text for the recording."""
         self._endpoints.diagnostics.publish(
             f'study_node: {subject}', DiagnosticStatus.OK, text, values, self._stamp_ns)
 
     def watch(self, seat: str) -> None:
-        """Follow the verdicts on a vehicle."""
+        """Subscribe to the verdicts on a vehicle."""
         if self._verdicts is not None and seat != self._seat:
             self._endpoints.release(self._verdicts)
             self._verdicts = None
@@ -118,7 +118,7 @@ class Director:
             message = self._games.latest()
             game = None if message is None else parse_game_document(message.data)
         except (CrgameError, *MALFORMED):
-            # Of another program: sim_node's own can be read.
+            # It comes from another program: those of sim_node are readable.
             return
         if game is not None and (self.game is None or game.epoch != self.game.epoch):
             self.game = game
@@ -129,7 +129,7 @@ class Director:
         message = self._events.latest()
         if message is None or self.game is None:
             return
-        # What another program publishes there may be no such document.
+        # Another program may publish a malformed document there.
         with suppress(InputError):
             epoch, fired = parse_events_document(message.data)
             if epoch == self.game.epoch:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Drives of a session in the live graph: prepared while people answer, started when ready."""
+"""Conducts a session's drives in the live graph; prepares them while participants answer."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -29,28 +29,28 @@ from crgame_ros.study.participant_session import ParticipantSession
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 
 LOOK_S = 0.02
-# A recording is closed within it, and a game loaded [s].
+# Time limit for closing a recording and for loading a game [s].
 CLOSES_S = 20.0
 LOADS_S = 60.0
-# Whose page is gone for so long has not driven the trial [s].
+# A trial does not count if the participant's page was gone for this long [s].
 LOST_S = 2.0
-# A graph that dies so often, in so short a time, is left alone [s].
+# A graph that dies this often within this time is not restarted [s].
 MAX_DEATHS, DEATHS_S = 3, 120.0
 
 
 class _LostGraphError(Exception):
-    """The graph has ended by itself."""
+    """An unexpected end of the graph."""
 
 
 class LiveDrives:
     """
-    Lets a participant drive, in one graph as long as it lives.
+    Conducts a participant's drives, in one graph as long as it runs.
 
-    :param session: whose items are driven.
+    :param session: the session.
     :param folder: of the participant.
-    :param language: gives that of the participant.
+    :param language: returns that of the participant.
     :param port: of the cockpit.
-    :param more: gives further arguments of the launcher.
+    :param more: returns further arguments of the launcher.
     """
 
     def __init__(self, session: ParticipantSession, folder: Path, language: Callable[[], str],
@@ -60,7 +60,7 @@ class LiveDrives:
         self._key = secrets.token_hex(16)
         self._graph: StudyGraph | None = None
         self._director: Director | None = None
-        # What the graph has loaded and not yet driven.
+        # The drive that the graph has loaded but not yet driven.
         self._loaded: StudyDrive | None = None
         self._state = DriveState()
         self._changed: list[Callable[[], None]] = []
@@ -71,34 +71,34 @@ class LiveDrives:
 
     @property
     def state(self) -> DriveState:
-        """Tell of the drive that goes on or comes next."""
+        """Return the state of the present or next drive."""
         if self._director is None or self._state.phase not in (
                 DrivePhase.DRIVING, DrivePhase.ENDED):
             return self._state
         return replace(self._state, time_s=self._director.time_s)
 
     def watch(self, changed: Callable[[], None]) -> None:
-        """Name who is told whenever the state or the session has changed."""
+        """Set the callback for changes of the state or the session."""
         self._changed.append(changed)
 
     def wake(self) -> None:
-        """Say that the session has moved on."""
+        """Report that the session has advanced."""
         self._news.set()
 
     def ready(self, item: str) -> None:
-        """Take the participant's word that a drive may begin."""
+        """Report that the participant is ready for a drive."""
         if self._state.phase is DrivePhase.READY and self._state.item == item:
             self._ready = item
             self._news.set()
 
     def abort(self, reason: str) -> None:
-        """End the drive that goes on; it comes again."""
+        """End the present drive; it is repeated."""
         if self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING):
             self._abort = reason
             self._news.set()
 
     def record(self, kind: str, text: str) -> None:
-        """Let the recording keep a note or marker, if one goes on."""
+        """Add a note or marker to the present recording, if there is one."""
         if self._director is not None and self._state.phase is DrivePhase.DRIVING:
             self._director.poll()
             self._director.record(kind, text)
@@ -108,7 +108,7 @@ class LiveDrives:
         while self._session.next_item is not None:
             item = self._next()
             if item is None:
-                # Recordings are finished while people answer what is left.
+                # Recordings are finished while the participant answers the last questions.
                 self._set_phase(DrivePhase.NONE)
                 await self.close()
                 await self._wait()
@@ -123,7 +123,7 @@ class LiveDrives:
         await self.close()
 
     async def close(self) -> None:
-        """End the graph; a drive that goes on counts for nothing."""
+        """End the graph; a present drive does not count."""
         if self._is_under_way:
             self._session.abort('the study was ended', self._state.item)
         self._state, self._loaded = DriveState(), None
@@ -139,7 +139,7 @@ class LiveDrives:
         return self._state.phase in (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
     def _next(self) -> SessionItem | None:
-        """Return what is driven next, however much is asked before it."""
+        """Return the next item to drive, even if other items come before it."""
         if self._session.next_item is None:
             return None
         done = self._session.done
@@ -151,12 +151,12 @@ class LiveDrives:
         return now is not None and now.id == item.id
 
     async def _conduct(self, item: SessionItem) -> None:
-        """Prepare an item, and drive it once it is its turn and somebody is ready."""
+        """Prepare an item, and drive it once it is due and the participant is ready."""
         drive = await self._prepare(item)
         self._ready = ''
         while self._next() is item:
             due = self._is_due(item)
-            # The page may load its frame while people still answer.
+            # The page may load its frame while the participant still answers.
             self._set_phase(DrivePhase.READY if due else DrivePhase.NONE, item.id, drive=drive)
             if due and self._ready == item.id:
                 await self._drive(drive)
@@ -235,7 +235,7 @@ class LiveDrives:
         self._set_phase(DrivePhase.NONE)
 
     async def _break_off(self, item: SessionItem, reason: str | None) -> None:
-        """End a run that counts for nothing: aborted, or its item was skipped."""
+        """End a run that does not count: it was aborted, or its item was skipped."""
         director = self._directs()
         self._session.abort(reason or 'the session went on with something else', item.id)
         self._set_phase(DrivePhase.PREPARING, item.id, 'the drive was ended')
@@ -245,7 +245,7 @@ class LiveDrives:
                           'the run does not end')
 
     async def _lose(self) -> None:
-        """Take note that the graph is gone; another one is started for the same drive."""
+        """Record the loss of the graph; another one is started for the same drive."""
         graph, words = self._graph, 'it was killed'
         if graph is not None and not graph.was_killed:
             words = graph.last_words()
@@ -263,7 +263,7 @@ class LiveDrives:
             await self._wait()
 
     async def _fail(self, item: SessionItem, text: str) -> None:
-        """Tell the experimenter what keeps an item from being driven, and wait for them."""
+        """Show the experimenter why an item cannot be driven, and wait for them."""
         if self._graph is not None and self._graph.has_ended:
             await self._lose()
             return
@@ -279,7 +279,7 @@ class LiveDrives:
         return self._director
 
     async def _poll(self, pause_s: float = LOOK_S) -> None:
-        """Follow the graph for a moment."""
+        """Poll the graph, then pause."""
         graph, director = self._graph, self._director
         if graph is not None and director is not None:
             if graph.has_ended:
@@ -296,7 +296,7 @@ class LiveDrives:
             await self._poll()
 
     async def _wait(self) -> None:
-        """Follow the graph until something is new."""
+        """Poll the graph until something changes."""
         self._news.clear()
         while not self._news.is_set():
             await self._poll()

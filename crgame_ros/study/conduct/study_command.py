@@ -27,16 +27,16 @@ from crgame_ros.study.participant_session import ParticipantSession
 HOST = '127.0.0.1'
 # From "I am ready" to the first cycle [s].
 COUNTDOWN_S = 2.0
-# Pages show the end, and the experimenter may still say something [s].
+# Time in which pages show the end and the experimenter may still add a note [s].
 LINGER_S = 5.0
 
 
 @dataclass(frozen=True)
 class SessionRequest:
     """
-    Whose session is conducted, and where.
+    The session to conduct.
 
-    :param study: that it is of.
+    :param study: its study.
     :param folder: of the participant.
     :param participant: anonymous id.
     :param place: among all participants, from 0 on.
@@ -52,11 +52,11 @@ class SessionRequest:
 
 def conduct(request: SessionRequest, say: Callable[[str], None]) -> bool:
     """
-    Conduct a session until it is over or somebody ends the program; it goes on at the next call.
+    Conduct a session until it is over or the program is ended; the next call resumes it.
 
     :param say: prints one line.
     :return: whether the session is over.
-    :raises CrgameError: if it cannot begin, or the participant takes part elsewhere.
+    :raises CrgameError: if it cannot begin, or another process has the participant's session.
     """
     with ParticipantSession(request.study, request.folder, request.participant,
                             request.place) as session:
@@ -101,12 +101,12 @@ async def _conduct(session: ParticipantSession, request: SessionRequest,
 
 async def _until_over(session: ParticipantSession, driving: asyncio.Task[None],
                       stop: asyncio.Event) -> None:
-    """Wait for the last item, or for somebody who ends the program."""
+    """Wait for the last item, or for the end of the program."""
     stopped = asyncio.create_task(stop.wait())
     try:
         while not stop.is_set() and session.next_item is not None:
             if driving.done() and driving.exception() is not None:
-                # Nothing that a page can mend.
+                # An error that no page can fix.
                 driving.result()
             await asyncio.sleep(0.1)
         if not stop.is_set():
@@ -129,7 +129,7 @@ docs/studies.md leads through an example."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
+    """Add the options."""
     parser.description = DESCRIPTION
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     what = parser.add_subparsers(title='what', metavar='WHAT', required=True)
@@ -157,9 +157,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def new_command(values: argparse.Namespace) -> int:
     """
-    Write a study to begin with.
+    Write a template study.
 
-    :raises InputError: if the folder is there or cannot be written.
+    :raises InputError: if the folder exists or is not writable.
     """
     source, folder = config_directory() / 'studies' / 'example', values.folder
     scenarios = str(scenarios_directory())
@@ -179,10 +179,10 @@ def new_command(values: argparse.Namespace) -> int:
 
 def check_command(values: argparse.Namespace) -> int:
     """
-    Look at a study.
+    Check a study.
 
-    :return: 1 if it cannot be run as it is.
-    :raises InputError: if the file cannot be read, or names what there is not.
+    :return: 1 if it cannot be run in its present form.
+    :raises InputError: if the file cannot be read, or names missing things.
     """
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.check import check_study, length_of
@@ -209,9 +209,9 @@ def check_command(values: argparse.Namespace) -> int:
 
 def run_command(values: argparse.Namespace) -> int:
     """
-    Lead a participant through a session, or through what is left of it.
+    Conduct a participant's session, or the rest of it.
 
-    :raises CrgameError: if the study cannot be run, or the participant takes part already.
+    :raises CrgameError: if the study cannot be run, or another process has the session open.
     """
     from crgame_ros.ros.environment import prepare_environment, require_ros
     from crgame_ros.study.desk.page_markdown import pictures_of

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A drive of a study: its game, written for the graph, and where it is recorded."""
+"""A drive of a study: its game, its outcome and its disturbances."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,20 +18,20 @@ from crgame_ros.study.trial_plan import PlannedTrial
 from crgame_ros.study.trial_settings import TrialSettings
 from crgame_ros.whole_file import write_whole
 
-# How runs end that were driven to their end: at their time, or by their own drivability.
+# Reasons of complete runs: end of the duration, or the vehicle's own drivability.
 TIME, DRIVABILITY = 'duration', 'drivability of '
 RESET = 'reset'
 _CUT_SHORT = {'stop': 'somebody stopped the run', RESET: 'somebody began the run anew',
               'signal': 'the programs were asked to end', 'silence': 'the simulation fell silent'}
-# A machine that slept for less was only busy [s].
+# Shorter pauses of the machine count as load, not as sleep [s].
 SLEEP_S = 0.5
 
 
 def cut_short(reason: str) -> str:
     """
-    Return why a run is no whole drive; empty if it is one.
+    Return why a run is not a complete drive; empty if it is one.
 
-    :param reason: with which it ended, as sim_node gives it.
+    :param reason: of its end, from sim_node.
     """
     if reason == TIME or reason.startswith(DRIVABILITY):
         return ''
@@ -40,18 +40,18 @@ def cut_short(reason: str) -> str:
 
 def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
     """
-    Return what became of a drive.
+    Return the outcome of a drive.
 
-    :param status: at its end, which was not cut short.
+    :param status: at its end; the drive is complete.
     :param seat: vehicle of the participant.
     :param end_time_s: the run's clock then [s].
-    :return: `outcome`: time, collision or off_road; `end_time_s`; and how often the vehicle
-        touched something, and left the road.
+    :return: `outcome`: time, collision or off_road; `end_time_s`; and the numbers of contacts and
+        road departures of the vehicle.
     """
     contacts, departures = _times(status, seat)
     outcome = 'time'
     if status.reason != TIME:
-        # Its own drivability ended it: whichever came last.
+        # Its own drivability ended it: the later of contact and departure.
         outcome = 'collision' if contacts and contacts[-1] >= max(departures, default=0.0) \
             else 'off_road'
     return {'outcome': outcome, 'end_time_s': round(end_time_s, 6), 'contacts': len(contacts),
@@ -59,7 +59,7 @@ def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any
 
 
 def clean_s(status: RunStatus, seat: str, end_time_s: float) -> float:
-    """Return the longest time of a drive without a contact or leaving the road [s]."""
+    """Return the longest time of a drive without a contact or road departure [s]."""
     contacts, departures = _times(status, seat)
     times = [0.0, *sorted((*contacts, *departures)), end_time_s]
     return max(later - sooner for sooner, later in zip(times, times[1:], strict=False))
@@ -71,17 +71,17 @@ def _times(status: RunStatus, seat: str) -> tuple[list[float], list[float]]:
 
 
 def _boot_s() -> float:
-    # It goes on while the machine sleeps; the steady clock does not.
+    # This clock runs while the machine sleeps; the steady clock does not.
     return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Disturbance:
     """
-    Watches over one drive.
+    Detects disturbances of one drive.
 
-    :param patience_s: for which the participant's page may be gone [s].
-    :param steady_s: clock that stands while the machine sleeps [s].
-    :param boot_s: clock that does not [s].
+    :param patience_s: how long the participant's page may be gone [s].
+    :param steady_s: clock that stops while the machine sleeps [s].
+    :param boot_s: clock that does not stop [s].
     """
 
     def __init__(self, patience_s: float, steady_s: Callable[[], float] = time.monotonic,
@@ -92,9 +92,9 @@ class Disturbance:
 
     def check(self, lost: bool) -> str | None:
         """
-        Return why the drive does not count, None while it does.
+        Return why the drive does not count, None if it does.
 
-        :param lost: whether nobody holds the participant's seat now.
+        :param lost: whether the participant's seat is empty now.
         """
         now_s = self._steady_s()
         slept_s = self._boot_s() - now_s - self._ahead_s
@@ -110,7 +110,7 @@ class Disturbance:
 
 
 def settings_of(item: SessionItem) -> TrialSettings | None:
-    """Return the settings of an item that is driven; None of others."""
+    """Return the settings of an item that is driven; None for others."""
     if isinstance(item.what, PlannedTrial):
         return item.what.condition.settings
     return item.what.settings if isinstance(item.what, PracticeDrives) else None
@@ -122,7 +122,7 @@ class StudyDrive:
     An item of a session that is driven.
 
     :param item: of the session.
-    :param settings: of it.
+    :param settings: of the item.
     :param seat: the vehicle that the participant drives.
     :param game: file of its game.
     """
@@ -134,9 +134,9 @@ class StudyDrive:
 
     def link(self, cockpit: str, language: str, key: str) -> str:
         """
-        Return the address of the cockpit's page as the participant sees it.
+        Return the address of the participant's cockpit page.
 
-        :param key: by which the cockpit knows the participant again, in whatever browser.
+        :param key: by which the cockpit recognises the participant in any browser.
         """
         settings = self.settings
         shown = {name: int(bool(getattr(settings, name)))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The graph in which participants drive, as a child process with a DDS domain of its own."""
+"""The graph in which participants drive, as a child process with its own DDS domain."""
 
 from collections.abc import Sequence
 import os
@@ -13,7 +13,7 @@ import time
 from crgame_ros.ros.environment import free_domain_id
 
 _AT = 'the cockpit is at '
-# Recordings are finished within it [s].
+# Time limit for finishing recordings [s].
 _END_S = 90.0
 
 
@@ -21,9 +21,9 @@ class StudyGraph:
     """
     A launcher with its nodes.
 
-    :param game: file that it begins with; later ones may come from the same folder.
-    :param folder: of its runs; is made.
-    :param port: of its cockpit; the next free one where it is taken.
+    :param game: its first game file; later ones may come from the same folder.
+    :param folder: of its runs; created if missing.
+    :param port: of its cockpit; the next free one if it is in use.
     :param more: further arguments of the launcher.
     :ivar domain_id: its `ROS_DOMAIN_ID`.
     """
@@ -43,7 +43,7 @@ class StudyGraph:
                  '--no-report', '--start-paused', *more],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
                 env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain_id)},
-                # Ctrl-C is for the study, which ends the graph when it has ended its drive.
+                # Ctrl-C goes to the study only, which ends its drive, then the graph.
                 start_new_session=True)
 
     @property
@@ -53,16 +53,16 @@ class StudyGraph:
 
     @property
     def has_ended(self) -> bool:
-        """Whether the launcher has ended, for whatever reason."""
+        """Return whether the launcher has ended, for any reason."""
         return self._process.poll() is not None
 
     @property
     def was_killed(self) -> bool:
-        """Whether a signal ended the launcher."""
+        """Return whether a signal ended the launcher."""
         return (self._process.poll() or 0) < 0
 
     def poll(self) -> None:
-        """Read what it has said since: where the cockpit is."""
+        """Read the launcher's new output, which contains the cockpit's address."""
         with self._log.open('rb') as log:
             log.seek(self._read)
             text = self._rest + log.read()
@@ -74,19 +74,19 @@ class StudyGraph:
                 self.cockpit = address.strip()
 
     def last_words(self) -> str:
-        """Return its last line that tells of an error, or its last one."""
+        """Return its last line about an error, or else its last line."""
         lines = [line for line in self._log.read_text('utf-8', 'replace').splitlines()
                  if line.strip()]
         errors = [line for line in lines if 'error' in line.lower() or ' died ' in line]
         return (errors or lines or ['it said nothing'])[-1].strip()[:300]
 
     def ask_to_end(self) -> None:
-        """Ask it to end in good order."""
+        """Request a clean shutdown."""
         if not self.has_ended:
             self._process.send_signal(signal.SIGINT)
 
     def end(self) -> None:
-        """End it, and wait until its recordings are finished."""
+        """Shut it down, and wait until its recordings are finished."""
         self.ask_to_end()
         until_s = time.monotonic() + _END_S
         while not self.has_ended and time.monotonic() < until_s:

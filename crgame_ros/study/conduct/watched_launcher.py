@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The launcher as a study starts it: it ends, in good order, when whoever started it has died.
+Starts the launcher for a study; it shuts down cleanly when its parent process has died.
 
     python -m crgame_ros.study.conduct.watched_launcher PARENT ARGUMENTS
 """

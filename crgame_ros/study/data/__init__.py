@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a study has found: its tables, its report, and its people against another planner."""
+"""The data of a study: tables, report, and reruns against other planners."""

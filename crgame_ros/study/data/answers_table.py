@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of answers: a row is a question that somebody answered."""
+"""The table of answers: one row for each answered question."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -58,7 +58,7 @@ def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[di
 
 
 def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, Any]:
-    """Return when an item was shown, and of the run before it."""
+    """Return when an item was shown, and values of the run before it."""
     run = answered.after
     folder = None if run is None else run.folder
     return {'shown_s': answered.told.get('shown_at'), 'taken_s': answered.told.get('taken_s'),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which questions a study asks where, and the columns in which their answers stand."""
+"""The questions of a study at each point, and the columns of their answers."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from crgame_ros.study.trial_plan import PlannedTrial
 @dataclass(frozen=True)
 class AskedScale:
     """
-    A questionnaire where it is asked.
+    A questionnaire at one point of a study.
 
     :param prefix: of its columns.
     :param scale: the questionnaire.
@@ -34,7 +34,7 @@ class AskedScale:
     scale: Questionnaire
 
     def columns(self, language: str) -> list[Column]:
-        """Declare its columns: answers, then scores."""
+        """Return its columns: answers, then scores."""
         return [*(question_column(question, f'{self.prefix}{question.name}', language)
                   for question in self.scale.questions),
                 *score_columns(self.scale, self.prefix)]
@@ -49,11 +49,11 @@ class AskedScale:
 
 class AskedQuestions:
     """
-    All questionnaires of a study, where they are asked.
+    All questionnaires of a study, with the points at which they are asked.
 
     :param study: the study.
     :ivar after_trials: by the columns' prefix, those that come after trials.
-    :ivar else_where: the same of all others.
+    :ivar else_where: all others, likewise.
     :raises InputError: if a questionnaire cannot be read.
     """
 
@@ -62,7 +62,7 @@ class AskedQuestions:
         self.after_trials: dict[str, AskedScale] = {}
         self.else_where: dict[str, AskedScale] = {}
         self._by_item: dict[str, AskedScale] = {}
-        # All participants answer the same, whatever the order of their trials.
+        # All participants answer the same questions, independent of the order of their trials.
         for item, step, before in _questions(study):
             scale = load_questionnaire(questionnaire_name(study, step))
             place = '' if item.trial is not None else f'{plain_name(_place(item.id))}_'
@@ -75,7 +75,7 @@ class AskedQuestions:
             self._by_item[item.id] = known.setdefault(prefix, AskedScale(prefix, scale))
 
     def find(self, item: SessionItem) -> AskedScale | None:
-        """Return the questionnaire of an item; None where none is."""
+        """Return the questionnaire of an item; None without one."""
         return self._by_item.get(item.id)
 
     def scales(self) -> list[Questionnaire]:
@@ -89,12 +89,12 @@ def plain_answer(answer: Any) -> Any:
 
 
 def _place(item: str) -> str:
-    """Name where an item stands, without its number there."""
+    """Return the position of an item, without its number there."""
     return item.rpartition('/')[0]
 
 
 def _questions(study: StudyFile) -> Iterator[tuple[SessionItem, Questions, int]]:
-    """Yield the items with questionnaires, and how often each was asked there before."""
+    """Yield the items with questionnaires, and how often each was asked before at that point."""
     seen: dict[tuple[str, str], int] = {}
     for item in session_of(study, 0):
         if isinstance(item.what, Questions):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A study's events and participants as the Brain Imaging Data Structure has them."""
+"""Writes a study's events and participants in the Brain Imaging Data Structure."""
 
 from collections.abc import Iterator, Mapping, Sequence
 import csv
@@ -44,7 +44,7 @@ _EVENT_COLUMNS = {
 
 def write_bids(data: StudyData, out: Path) -> None:
     """
-    Write the data set: description, participants, events of each, with their sidecars.
+    Write the data set: description, participants, and each one's events, with sidecars.
 
     :raises InputError: if the folder cannot be written, or two participants get one label.
     """
@@ -77,7 +77,7 @@ def write_bids(data: StudyData, out: Path) -> None:
 
 
 def escaped(value: Any) -> str:
-    """Write a value as a cell: texts with escapes, what is missing as n/a."""
+    """Return a value as a cell: texts with escapes, missing values as n/a."""
     if value is None:
         return MISSING
     if isinstance(value, bool):
@@ -90,7 +90,7 @@ def escaped(value: Any) -> str:
 
 def _events(record: ParticipantRecord,
             rows: Sequence[Mapping[str, Any]]) -> Iterator[list[Any]]:
-    """Yield the rows: a driven trial with its duration, everything else as a moment."""
+    """Yield the rows: a driven trial with its duration, all else without duration."""
     ends = {(each.item, each.attempt): each for each in record.attempts}
     for row in rows:
         attempt = ends.get((row['item'], row['attempt']))
@@ -98,7 +98,7 @@ def _events(record: ParticipantRecord,
         kind, name, value = row['kind'], row['name'], row['text']
         duration: float | None = row['duration_s'] or 0.0
         if kind in ('trial_finished', 'trial_aborted') and attempt is not None:
-            # It is told where it began.
+            # The row of its start contains it.
             continue
         if kind == 'trial_started' and attempt is not None:
             kind = 'trial'
@@ -134,7 +134,7 @@ def _described(column: Column) -> dict[str, Any]:
 
 
 def _label(text: str) -> str:
-    """Return a label as BIDS has them: letters and digits."""
+    """Return a BIDS label: letters and digits only."""
     return re.sub(r'[^A-Za-z0-9]', '', text)
 
 

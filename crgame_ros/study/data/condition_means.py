@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Means of conditions and their intervals, corrected for who takes part in all of them."""
+"""Means of conditions and their intervals, within participants where possible."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ class ConditionMean:
     """
     A condition's mean over participants.
 
-    :param condition: name of it.
+    :param condition: its name.
     :param mean: of the participants' means.
-    :param half: half of the interval's width; NaN where there is none.
+    :param half: half of the interval's width; NaN without an interval.
     :param points: the participants' means, by their ids.
     """
 
@@ -36,9 +36,9 @@ class ConditionMeans:
     The means of all conditions.
 
     :param conditions: in the order of the study.
-    :param within: whether the intervals are those within participants; otherwise each is that
-        of its own participants alone.
-    :param used: ids of whom intervals within participants are of.
+    :param within: whether the intervals are within participants; otherwise each is computed from
+        its own participants alone.
+    :param used: ids of the participants of intervals within participants.
     """
 
     conditions: tuple[ConditionMean, ...]
@@ -49,12 +49,12 @@ class ConditionMeans:
 def condition_means(values: Mapping[tuple[str, str], float],
                     conditions: Sequence[str]) -> ConditionMeans:
     """
-    Take the means of conditions over participants, with 95 % intervals.
+    Compute the means of conditions over participants, with 95 % intervals.
 
-    Where two participants or more have a value in each condition, means and intervals are those
-    of these participants, the intervals Cousineau's (2005) with Morey's (2008) correction: the
-    values less the participant's mean plus the grand mean, variances times C / (C - 1). Elsewhere
-    they are Student's intervals of each condition by itself.
+    If two or more participants have a value in each condition, means and intervals use only these
+    participants. The intervals are Cousineau's (2005) with Morey's (2008) correction: the values
+    less the participant's mean plus the grand mean, variances times C / (C - 1). Otherwise they
+    are Student's intervals of each condition by itself.
 
     :param values: of participants in conditions; NaN and infinite ones count as missing.
     :param conditions: in their order.
@@ -80,7 +80,7 @@ def condition_means(values: Mapping[tuple[str, str], float],
 
 def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
     """
-    Return half of the widths of the 95 % intervals within participants.
+    Return the half widths of the 95 % intervals within participants.
 
     :param table: (N, C) of N >= 2 participants in C >= 2 conditions, without gaps.
     :return: (C)
@@ -94,9 +94,9 @@ def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
 def participant_means(rows: Iterable[Mapping[str, Any]],
                       column: str) -> dict[tuple[str, str], float]:
     """
-    Take the mean of a column of each participant in each condition, over repetitions.
+    Compute the mean of a column for each participant in each condition, over repetitions.
 
-    :param rows: of the table of trials; what is missing or infinite is left out.
+    :param rows: of the table of trials; missing and infinite values are left out.
     """
     found: dict[tuple[str, str], list[float]] = {}
     for row in rows:
@@ -118,6 +118,6 @@ def _mean(values: NDArray[np.float64]) -> float:
 
 
 def _t(freedom: int) -> float:
-    # It takes a while to load.
+    # A slow import.
     from scipy.stats import t
     return float(t.ppf(0.5 + LEVEL / 2.0, freedom))

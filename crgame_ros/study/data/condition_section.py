@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What conditions did: means with intervals, and a picture of each measure and score."""
+"""The report section on conditions: means with intervals, and a plot of each measure."""
 
 from collections.abc import Callable, Sequence
 import math
@@ -19,21 +19,21 @@ from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS
 from crgame_ros.study.trial_plan import conditions_of
 import numpy as np
 
-# Of the picture, which is scaled as a whole [px].
+# Sizes of the plot, which is scaled as a whole [px].
 WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 420, 170, 10, 22, 52
-# Of a line of words, and of one of their characters [px].
+# Height of a text line, and width of a character [px].
 _LINE, _CHARACTER = 17, 8.3
-# Points of equal height stand side by side up to so far from the middle [px].
+# Points of equal height are drawn side by side up to this distance from the middle [px].
 _SPREAD, _NEAR = 26.0, 7.0
 _LONGEST_NAME = 60
 
 
 def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) -> str:
     """
-    Draw the conditions beside each other.
+    Draw the conditions side by side, as SVG.
 
-    :param words: what is drawn, for those who do not see it.
-    :param digits: behind the point, of the means.
+    :param words: alternative text of the plot.
+    :param digits: decimal places of the means.
     """
     ticks = _ticks([value for each in conditions for value in (
         *each.points.values(), each.mean - each.half, each.mean + each.half, each.mean)])
@@ -46,7 +46,7 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
     marks = [f'<line class="grid" x1="{_LEFT}" x2="{WIDTH}" y1="{y(tick):.1f}" '
              f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
              f'{format(tick, "g").replace("-", "−")}</text>' for tick in ticks]
-    # A condition is called by its levels, one a line.
+    # A condition is labelled by its levels, one per line.
     lines = max(each.condition.count('/') + 1 for each in conditions)
     for place, each in enumerate(conditions):
         middle = _LEFT + wide * (place + 0.5)
@@ -68,7 +68,7 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
 
 def _points(each: ConditionMean, middle: float, wide: float,
             y: Callable[[float], float]) -> list[str]:
-    """Draw the participants; those of about equal height beside each other."""
+    """Draw the participants' points; those of about equal height side by side."""
     marks: list[str] = []
     taken: list[float] = []
     far = min(_SPREAD, 0.2 * wide)
@@ -98,7 +98,7 @@ def _fitting(name: str, wide: float) -> str:
 
 
 def _ticks(numbers: Sequence[float]) -> list[float]:
-    """Choose the values that are named at the side, the ends of the picture among them."""
+    """Return the values of the axis ticks, including both ends."""
     from matplotlib.ticker import MaxNLocator
     known = [number for number in numbers if math.isfinite(number)] or [0.0]
     low, high = min(known), max(known)
@@ -109,8 +109,8 @@ def _ticks(numbers: Sequence[float]) -> list[float]:
     return [float(np.format_float_positional(tick, 12)) + 0.0 for tick in ticks]
 
 
-# Of the measures of driving those that are shown, by their names in the table of vehicles; the
-# others stand in the tables.
+# The driving measures that are shown, by their names in the table of vehicles; the others are
+# only in the tables.
 SHOWN = ('mean_speed', 'max_speed', 'min_acceleration', 'worst_ttc', 'worst_thw',
          'worst_min_distance', 'worst_drac', 'worst_pet_s', 'tet_s', 'drive_sdlp',
          'drive_lane_changes', 'drive_srr_visual', 'drive_tlc_min', 'drive_time_above_limit',
@@ -120,10 +120,10 @@ _SCORES, _DRIVING, _TASKS = 'Questionnaires', 'Driving', 'Tasks'
 
 class ShownMeasure(NamedTuple):
     """
-    A column whose means are shown.
+    A column with shown means.
 
-    :param group: under which heading.
-    :param column: as it is declared.
+    :param group: its heading.
+    :param column: its declaration.
     :param means: of the conditions.
     """
 
@@ -134,7 +134,7 @@ class ShownMeasure(NamedTuple):
 
 def shown_measures(data: StudyData, conditions: Sequence[str],
                    blocks: Sequence[str]) -> list[ShownMeasure]:
-    """Return the scores and measures of which some blocks have any value, with their means."""
+    """Return the scores and measures with values in these blocks, with their means."""
     measures = measure_columns()
     columns = [(_SCORES, column) for column in _scored(data)]
     columns += [(_DRIVING, measures[name]) for name in SHOWN if name in measures]
@@ -149,7 +149,7 @@ def shown_measures(data: StudyData, conditions: Sequence[str],
 
 
 def condition_section(data: StudyData) -> str:
-    """Show the means of each block's conditions; those of equal names are taken together."""
+    """Return the section: means of each block's conditions, with equal names combined."""
     study = data.folder.study
     blocks: dict[tuple[str, ...], list[str]] = {}
     for block in study.blocks:
@@ -163,7 +163,7 @@ def condition_section(data: StudyData) -> str:
 
 
 def interval_note(means: Sequence[ConditionMeans]) -> str:
-    """Return which intervals these are, and of whom."""
+    """Return a note on the kind of the intervals and their participants."""
     if not means:
         return ''
     within = [each for each in means if each.within]
@@ -219,7 +219,7 @@ def _figure(shown: ShownMeasure) -> str:
 
 
 def _differs(means: ConditionMeans) -> bool:
-    """Return whether there is anything to see in a picture."""
+    """Return whether a plot would show any difference."""
     return len({value for each in means.conditions for value in each.points.values()}) > 1
 
 
@@ -232,7 +232,7 @@ def _digits(value: float) -> int:
 
 
 def _scored(data: StudyData) -> list[Column]:
-    """Return the columns of scores; without scores those of the answers that are numbers."""
+    """Return the columns of scores; without scores, of the numeric answers."""
     columns: list[Column] = []
     language = data.folder.study.language
     for asked in data.asked.after_trials.values():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The folder of a study that is going on or over: its file, its participants, its data."""
+"""The folder of a started or finished study: its file, participants and data."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ STUDY, PARTICIPANTS, DATA = 'study', 'participants', 'data'
 
 class ConductedStudy:
     """
-    A study's folder, as `crgame study run` makes it.
+    A study's folder, as created by `crgame study run`.
 
     :param path: of the folder.
     :ivar study_path: of the copied study file.
@@ -31,19 +31,19 @@ class ConductedStudy:
 
     @property
     def data(self) -> Path:
-        """Return the folder of what has been found."""
+        """Return the folder of the study's data."""
         return self.path / DATA
 
     def participants(self) -> list[ParticipantRecord]:
         """
-        Read the journals of all who have begun, in the order of their names.
+        Read the journals of all started participants, in the order of their names.
 
-        :raises InputError: if somebody began another study.
+        :raises InputError: if a participant began another study.
         """
         return list(self._participants())
 
     def relative(self, path: Path) -> str:
-        """Write a file's name as the tables do, from the study's folder on."""
+        """Return a file's path relative to the study's folder, as in the tables."""
         return path.relative_to(self.path).as_posix()
 
     def _participants(self) -> Iterator[ParticipantRecord]:

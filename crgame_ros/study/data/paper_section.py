@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a paper has to say of a study, put together."""
+"""Collects the facts about a study that a paper has to report."""
 
 from collections.abc import Iterator, Mapping, Sequence
 import hashlib
@@ -17,13 +17,13 @@ from crgame_ros.study.data.timing_quality import BOUNDS
 from crgame_ros.study.data.trials_table import measure_columns
 from crgame_ros.study.trial_plan import conditions_of
 
-# Columns of the table of trials about the picture.
+# Columns of the trials table about the display.
 _VIEW_NAMES = ('view_across_deg', 'screen_width_m', 'eye_distance_m', 'view_rate_hz')
 
 
 def provenance_of(data: StudyData) -> dict[str, Any]:
     """
-    Return where the data come from: nothing in it changes while the data do not.
+    Return the provenance of the data; equal data give equal provenance.
 
     :raises InputError: if a file of the study cannot be read.
     """
@@ -34,7 +34,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
         'file': folder.relative(folder.study_path), 'seed': study.seed,
         'files': {folder.relative(path): _digest(path) for path in files},
         'data_written_by': software_with_commit(),
-        # As the sessions have noted it: more than one where it changed on the way.
+        # As noted by the sessions: more than one if it changed during the study.
         'sessions_run_by': {record.id: record.software for record in data.records},
         'conditions': {f'{block.name}: {condition.name}': _plain(write(condition.settings))
                        for block in study.blocks for condition in conditions_of(study, block)},
@@ -57,7 +57,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
 
 
 def spread(values: list[float | None]) -> dict[str, float] | None:
-    """Return least, median and greatest of what is known; None where nothing is."""
+    """Return minimum, median and maximum of the known values; None without any."""
     known = [value for value in values if value is not None]
     return {'min': min(known), 'median': statistics.median(known), 'max': max(known),
             'of': len(known)} if known else None
@@ -72,7 +72,7 @@ def _digest(path: Path) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return values as JSON has them."""
+    """Return values in JSON form."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -90,7 +90,7 @@ _GEOMETRY = (('view_across_deg', 'Angle across the picture', '°'),
 
 
 def paper_section(data: StudyData) -> str:
-    """Return which software and machine, delays, views, reference points and questionnaires."""
+    """Return the section on software, machine, delays, views, reference points, questionnaires."""
     told = provenance_of(data)
     html = note('The same stands in <code>provenance.json</code>, with the SHA-256 of every file '
                 'of the study, and the definition of every column in '
@@ -153,7 +153,7 @@ def _delay(words: str, spread: Mapping[str, float] | None) -> Sequence[str]:
 
 
 def _definitions() -> str:
-    """Define the measures, as the dictionary does."""
+    """Return the definitions of the measures, as in the dictionary."""
     rows = [(f'<code>{plain(column.name)}</code>', plain(column.unit), plain(column.definition),
              plain(column.reference_point), plain(column.variant))
             for column in measure_columns().values()]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a participant's journal tells: which attempts were driven, which count, what was said."""
+"""The content of a participant's journal: attempts, those that count, and answers."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -21,16 +21,16 @@ Ending = Literal['finished', 'aborted', 'lost', 'open']
 @dataclass(frozen=True)
 class TrialAttempt:
     """
-    A trial that was started.
+    An attempt at a trial.
 
-    :param item: id of it in the session.
-    :param trial: that it is.
-    :param attempt: at it, from 1 on.
-    :param folder: of its recording; None where the journal names none.
+    :param item: id of the session's item.
+    :param trial: the planned trial.
+    :param attempt: its number, from 1 on.
+    :param folder: of its recording; None if the journal names none.
     :param started_at: wall clock [s since 1970]
     :param ended_at: likewise; None without an end.
-    :param ending: `lost` has no end, but something came after it.
-    :param told: what the entry of its end says.
+    :param ending: how it ended; `lost` means without an end, but with later entries.
+    :param told: the content of its last entry.
     """
 
     item: str
@@ -43,20 +43,20 @@ class TrialAttempt:
     told: Mapping[str, Any] | None = None
 
     def says(self, key: str) -> Any:
-        """Return what the entry of its end says under a key; None if nothing."""
+        """Return a value of its last entry by key; None without one."""
         return None if self.told is None else self.told.get(key)
 
 
 @dataclass(frozen=True)
 class AnsweredItem:
     """
-    Questions that were answered, for the last time.
+    The last answers to an item's questions.
 
     :param item: of the session.
     :param answers: by question.
     :param at: wall clock [s since 1970]
-    :param attempt: at the trial before it that had finished last; None elsewhere.
-    :param told: what the entry of them says: when they were shown, after which time each was.
+    :param attempt: number of the last finished attempt at the trial before it; None elsewhere.
+    :param told: the content of the entry: when they were shown, and each answer's time.
     :param after: that attempt; None elsewhere.
     """
 
@@ -71,7 +71,7 @@ class AnsweredItem:
 @dataclass(frozen=True)
 class ParticipantRecord:
     """
-    A participant's journal, read.
+    The content of a participant's journal.
 
     :param id: anonymous.
     :param place: among all participants, from 0 on.
@@ -94,9 +94,9 @@ class ParticipantRecord:
     @cached_property
     def counted(self) -> dict[str, TrialAttempt]:
         """
-        Return the attempts that count, by item: the last that finished.
+        Return the attempts that count, by item: the last finished ones.
 
-        One that was left out in the end does not count, whatever was driven of it before.
+        An item that was skipped in the end does not count, even if it was driven before.
         """
         found = {each.item: each for each in self.attempts if each.ending == 'finished'}
         for entry in self.entries:
@@ -108,7 +108,7 @@ class ParticipantRecord:
 
     @cached_property
     def to_repeat(self) -> frozenset[str]:
-        """Name the items that are to be driven again and have not been yet."""
+        """Return the items whose requested repeat has not been driven yet."""
         found: set[str] = set()
         for entry in self.entries:
             if entry['entry'] == SessionEvent.REPEATED:
@@ -119,7 +119,7 @@ class ParticipantRecord:
 
     @cached_property
     def answered(self) -> tuple[AnsweredItem, ...]:
-        """Return what was answered, each item's last answers, in the order of the session."""
+        """Return each item's last answers, in the order of the session."""
         found: dict[str, AnsweredItem] = {}
         driven: dict[int, int] = {}
         ended: dict[int, TrialAttempt | None] = {}
@@ -146,7 +146,7 @@ class ParticipantRecord:
 
     @property
     def software(self) -> list[dict[str, Any]]:
-        """Return with which programs the session was run, each once, in their order."""
+        """Return the software versions that ran the session, each once, in order."""
         found: list[dict[str, Any]] = []
         for entry in self.entries:
             if entry['entry'] == SessionEvent.OPENED and entry.get('software') not in (
@@ -156,12 +156,12 @@ class ParticipantRecord:
 
     @property
     def ended_at(self) -> float:
-        """Return when the last entry was made [s since 1970]."""
+        """Return the time of the last entry [s since 1970]."""
         return float(self.entries[-1]['at'])
 
     @property
     def complete(self) -> bool:
-        """Return whether every item is finished or left out."""
+        """Return whether every item is finished or skipped."""
         done: set[str] = set()
         for entry in self.entries:
             if entry['entry'] in (SessionEvent.FINISHED, SessionEvent.SKIPPED):
@@ -172,7 +172,7 @@ class ParticipantRecord:
 
     @property
     def language(self) -> str | None:
-        """Return the language that the participant chose last; None where nobody told."""
+        """Return the language that the participant chose last; None without a choice."""
         return next((entry['language'] for entry in reversed(self.entries)
                      if isinstance(entry.get('language'), str)), None)
 
@@ -223,7 +223,7 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     """
     Read a participant's journal, also while the session goes on.
 
-    :return: None of one that has not begun.
+    :return: None if the participant has not begun.
     :raises InputError: if it is of another study.
     """
     entries = tuple(entry for entry in read_journal(folder)

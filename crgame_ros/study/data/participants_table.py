@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of participants: a row is somebody who has begun."""
+"""The table of participants: one row for each participant who has begun."""
 
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ class ParticipantsTable:
 
     @property
     def fields(self) -> list[Column]:
-        """Return the columns of what is asked of each participant first."""
+        """Return the columns of the questions to each participant at the start."""
         return list(self._fields.values())
 
     def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, Any]:

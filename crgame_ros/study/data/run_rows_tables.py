@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of all runs of a study's trials: those of `crgame export`, with whose they are."""
+"""The tables of all runs of a study's trials: those of `crgame export`, by participant."""
 
 from collections.abc import Sequence
 import json
@@ -23,7 +23,7 @@ from crgame_ros.yaml_text import read_text
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-if TYPE_CHECKING:  # Other commands do not wait for it.
+if TYPE_CHECKING:  # A slow import that other commands do not need.
     pass
 
 
@@ -32,17 +32,17 @@ _WHOSE = (Column('participant', TEXT, '', 'anonymous id of who drove'),
           Column('condition', TEXT, '', 'of the trial'))
 DECLARATIONS = tuple(TableDeclaration(table.name, table.row, table.key, (*_WHOSE, *table.columns))
                      for table in TABLES)
-# In the dictionary: which runs these tables are made of.
+# Key in the dictionary that lists the runs of these tables.
 MADE_OF = 'madeOf'
 
 
 def write_run_tables(trials: Sequence[CountedTrial], out: Path, study: str) -> dict[str, int]:
     """
-    Write the tables of all runs, unless they are there already; a file is replaced whole.
+    Write the tables of all runs, unless they exist; files are replaced as a whole.
 
-    One run after the other is read, so that memory is that of one.
+    Runs are read one after the other, to need the memory of only one.
 
-    :param study: name of it.
+    :param study: name of the study.
     :return: rows by table.
     :raises InputError: if the folder cannot be written.
     """
@@ -90,7 +90,7 @@ def _add(trial: CountedTrial, name: str, writer: TableWriter) -> None:
 
 
 def _earlier(out: Path, made_of: list[list[Any]]) -> dict[str, int] | None:
-    """Return the rows of tables that are there already, made of the same runs; else None."""
+    """Return the row counts of existing tables of the same runs, else None."""
     try:
         package = json.loads(read_text(out / PACKAGE_FILE, 'data dictionary'))
         if package[MADE_OF] != made_of:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All tables of a run, measured once and kept by what its recording holds."""
+"""All tables of a run, computed once and cached by the content of its recording."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ _PIECE = 1 << 20
 @dataclass(frozen=True)
 class RunTables:
     """
-    A run whose tables are kept.
+    A run with cached tables.
 
-    :param key: of everything that they depend on.
-    :param folder: in which they are.
-    :param summary: what else is told of it: humans, planners, seed, drivers with input delays,
-        the events of tasks.
+    :param key: hash of everything that they depend on.
+    :param folder: of the tables.
+    :param summary: further facts: humans, planners, seed, drivers with input delays, the events of
+        tasks.
     """
 
     key: str
@@ -45,7 +45,7 @@ class RunTables:
         return pq.read_table(self.folder / f'{name}.parquet')
 
     def row(self, name: str, **equal: Any) -> dict[str, Any]:
-        """Return the first row of a table with such values; empty without one."""
+        """Return the first row of a table with these values; empty without one."""
         for row in self.table(name).to_pylist():
             if all(row[column] == value for column, value in equal.items()):
                 return dict(row)
@@ -54,9 +54,9 @@ class RunTables:
 
 class RunTablesCache:
     """
-    Measures runs, and keeps what came out.
+    Measures runs, and caches the results.
 
-    :param folder: that keeps it; is made.
+    :param folder: of the cache; created if missing.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -66,11 +66,11 @@ class RunTablesCache:
     def measured(self, run: Path, name: str,
                  progress: Callable[[str, float], object]) -> RunTables:
         """
-        Return a run's tables; they are computed if nobody has before.
+        Return a run's tables; compute them if they are not cached.
 
         :param run: folder of the run, complete.
-        :param name: of it in the tables.
-        :raises InputError: if it cannot be measured, or nothing can be written.
+        :param name: of the run in the tables.
+        :raises InputError: if it cannot be measured, or the cache is not writable.
         """
         key = _key(run, name)
         self._used.add(key)
@@ -80,7 +80,7 @@ class RunTablesCache:
         return RunTables(key, folder, json.loads((folder / SUMMARY).read_text('utf-8')))
 
     def forget_others(self) -> None:
-        """Remove what no run of the study has asked for, and what a killed process left."""
+        """Remove entries that no run of the study has used, and leftovers of killed processes."""
         for path in self._folder.iterdir() if self._folder.is_dir() else ():
             if path.name not in self._used:
                 shutil.rmtree(path, ignore_errors=True)
@@ -113,11 +113,11 @@ def _summary(run: TableRun) -> dict[str, Any]:
         'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,
         'humans': {item.id: item.driver for item in game.humans},
         'planners': {item.id: item.planner for item in game.avs},
-        # Whoever had a seat last of those whose delay is known.
+        # For each seat, the last driver with known delay.
         **{name: {item.spell.seat: delay_ms for item in run.record.drivers
                   if (delay_ms := getattr(item, name)) is not None}
            for name in ('input_delay_ms', 'round_trip_ms')},
-        # Of each seat which view its page showed, from when to when.
+        # The periods of each seat's views.
         'views': (run.timing or {}).get('view') or {},
         'tasks': [{
             'kind': str(each.kind), 'what': each.what, 'name': each.name, 'seat': each.seat,
@@ -131,7 +131,7 @@ def _known(value: float) -> float | None:
 
 
 def _key(run: Path, name: str) -> str:
-    """Hash what a run's tables depend on: the recording, and the code that measures it."""
+    """Return a hash of what a run's tables depend on: the recording and the measuring code."""
     digest = hashlib.sha256(f'{engine_digest()}\n{name}\n'.encode())
     for bag in bags_of(run):
         for file in sorted(bag.iterdir()):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of events: everything that happened in sessions, on both clocks."""
+"""The table of all events in sessions, on the wall clock and the run's clock."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
-# Entries of the journal that have other names here, and those that say of what they are.
+# Entries of the journal with other names here.
 _OF_SESSION = {SessionEvent.BEGUN: 'session_begun', SessionEvent.OPENED: 'program_started',
                SessionEvent.ENDED: 'session_ended'}
 _OF_ITEM = (SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
@@ -48,7 +48,7 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
 def event_rows(record: ParticipantRecord,
                runs: Mapping[str, RunTables]) -> list[dict[str, Any]]:
     """
-    Return everything that happened in a participant's session.
+    Return all events of a participant's session.
 
     :param runs: measures of the trials that count, by item.
     """
@@ -93,7 +93,7 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
 
 
 def _kind(kind: str, item: SessionItem | None) -> str:
-    """Name an entry of the journal: trial_finished, practice_started, item_skipped, note."""
+    """Return the kind of a journal entry: trial_finished, practice_started, item_skipped, note."""
     if item is None or kind not in _OF_ITEM:
         return _OF_SESSION.get(SessionEvent(kind), kind) if kind in set(SessionEvent) else kind
     what = 'trial' if isinstance(item.what, PlannedTrial) else \
@@ -120,7 +120,7 @@ def _run_rows(attempt: TrialAttempt, run: RunTables,
 
 
 def drive_start_s(attempt: TrialAttempt) -> float:
-    """Return when the run's clock began [s since 1970]."""
+    """Return the wall clock time at which the run's clock began [s since 1970]."""
     told = attempt.says('start_at')
     return float(told) if isinstance(told, int | float) and told else attempt.started_at
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a study has found, so far: its tables, written again and again while it goes on."""
+"""The data of a study so far, as tables that can be rewritten while it goes on."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ def session_goes_on(participant: Path) -> bool:
     """Return whether a process has a participant's session open."""
     try:
         with (participant / JOURNAL).open('rb') as stream:
-            # Shared and let go of at once: who opens the session now is not refused.
+            # A shared lock, released immediately, so that a session can still be opened.
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             fcntl.flock(stream, fcntl.LOCK_UN)
     except BlockingIOError:
@@ -46,11 +46,11 @@ def session_goes_on(participant: Path) -> bool:
 
 def finished_recording(folder: Path, participant: Path, say: Callable[[str], object]) -> str:
     """
-    See that the recording of a run is complete; finish it if whoever wrote it has been killed.
+    Check that the recording of a run is complete; finish it if its recorder was killed.
 
     :param folder: of the run.
-    :param participant: folder of who drove.
-    :param say: takes one line for people.
+    :param participant: folder of the driver.
+    :param say: prints one line.
     :return: why it cannot be read; empty if it can.
     """
     if not folder.is_dir() or not bags_of(folder):
@@ -60,7 +60,7 @@ def finished_recording(folder: Path, participant: Path, say: Callable[[str], obj
     if (folder / FINISHED_MARK).exists() or closed and derived:
         return ''
     if session_goes_on(participant):
-        # What is derived from a closed recording is written later; measures need none of it.
+        # Files derived from a closed recording come later; measures do not need them.
         return '' if closed else 'the recording is not finished yet'
     say(f'{folder}: finishing what was left unfinished')
     finish_run(folder, lambda line: say(line) if line.startswith('error') else None)
@@ -75,10 +75,10 @@ class CountedTrial:
     """
     A trial that counts.
 
-    :param record: of who drove it.
-    :param attempt: that counts.
-    :param run: its measures; None where there are none.
-    :param row: of it in the table of trials.
+    :param record: of the participant who drove it.
+    :param attempt: the attempt that counts.
+    :param run: its measures; None without any.
+    :param row: its row in the table of trials.
     """
 
     record: ParticipantRecord
@@ -94,10 +94,10 @@ class StudyData:
 
     :param folder: of the study.
     :param asked: its questionnaires.
-    :param trials_table: how trials become rows.
-    :param people_table: how participants do.
+    :param trials_table: builds the rows of trials.
+    :param people_table: builds the rows of participants.
     :param records: of all participants.
-    :param trials: that count, in the order of participants and trials.
+    :param trials: the trials that count, in the order of participants and trials.
     :param tables: by name: trials, participants, answers, events.
     """
 
@@ -117,7 +117,7 @@ class StudyData:
 
     @property
     def problems(self) -> list[str]:
-        """Return which trials have no measures, and why."""
+        """Return the trials without measures, with the reasons."""
         return [f'{each.record.id}, trial {each.attempt.trial.number}: {each.row["problem"]}'
                 for each in self.trials if each.row['problem']]
 
@@ -126,12 +126,12 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
                     progress: Callable[[str, float], object] = lambda _what, _share: None,
                     reports: bool = False) -> StudyData:
     """
-    Read what a study has found; runs that were not measured before are.
+    Read the data of a study, and measure runs that were not measured before.
 
     :param say: takes one line for people.
-    :param progress: is told what is under way, and how much of it is done, 0 to 1.
-    :param reports: whether each trial that counts gets the report of its run, in its folder.
-    :raises InputError: if the study cannot be read, or its folder not be written.
+    :param progress: called with the present work and its finished share, 0 to 1.
+    :param reports: whether to write the run report of each trial that counts, in its folder.
+    :raises InputError: if the study cannot be read, or its folder is not writable.
     """
     asked = AskedQuestions(folder.study)
     records = folder.participants()
@@ -168,7 +168,7 @@ def _answers(data: StudyData) -> Iterator[dict[str, Any]]:
 def _run(folder: ConductedStudy, record: ParticipantRecord, attempt: TrialAttempt,
          runs: RunTablesCache, say: Callable[[str], object],
          progress: Callable[[str, float], object]) -> tuple[RunTables | None, str]:
-    """Measure a trial's run; or say why it cannot be."""
+    """Measure a trial's run; return its tables, or None and the reason."""
     if attempt.folder is None:
         return None, 'the journal names no recording'
     problem = finished_recording(attempt.folder, record.folder, say)
@@ -186,7 +186,7 @@ def _name(record: ParticipantRecord, run: Path) -> str:
 
 def _report(run: Path, name: str, say: Callable[[str], object],
             progress: Callable[[str, float], object]) -> None:
-    """Write the report of a run that has none, under the name that it has in tables."""
+    """Write the report of a run without one, under the run's name in the tables."""
     if (run / REPORT_FILE).exists():
         return
     try:

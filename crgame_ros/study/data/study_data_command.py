@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands `crgame study data`, `report` and `rerun`: what a study has found."""
+"""The commands `crgame study data`, `report` and `rerun`."""
 
 import argparse
 from pathlib import Path
@@ -10,15 +10,15 @@ from typing import Any, TYPE_CHECKING
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.study_data_folder import only_writer, write_study_data
 
-if TYPE_CHECKING:  # Other commands do not wait for it.
+if TYPE_CHECKING:  # A slow import that other commands do not need.
     pass
 
 
 def add_data_arguments(what: Any) -> None:
     """
-    Declare the commands.
+    Add the commands.
 
-    :param what: of `crgame study`, which takes them.
+    :param what: subparsers of `crgame study`.
     """
     data = what.add_parser('data', help='write the tables of what the study has found so far')
     data.add_argument('folder', type=Path, help='of the study')
@@ -84,9 +84,9 @@ def report_command(values: argparse.Namespace) -> int:
 
 def rerun_command(values: argparse.Namespace) -> int:
     """
-    Let recorded people drive again, against other planners.
+    Replay recorded drivers against other planners.
 
-    :raises InputError: if nothing can be repeated, or a planner is none.
+    :raises InputError: if nothing can be repeated, or a planner is unknown.
     """
     from crgame_ros.study.data.conducted_study import ConductedStudy
     from crgame_ros.study.data.study_rerun import rerun_study

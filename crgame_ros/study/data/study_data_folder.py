@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The files of what a study has found: each there whole at any time, with a data dictionary."""
+"""Writes the data files of a study, each always complete, with a data dictionary."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +24,7 @@ from crgame_ros.study.data.run_rows_tables import write_run_tables
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, parquet_of_table
 
-if TYPE_CHECKING:  # Other commands do not wait for it.
+if TYPE_CHECKING:  # A slow import that other commands do not need.
     pass
 
 
@@ -41,9 +41,9 @@ DESCRIPTION = (
 @contextmanager
 def only_writer(folder: Path) -> Iterator[None]:
     """
-    Be the only one that writes a study's data.
+    Hold the lock for writing a study's data.
 
-    :raises InputError: if somebody else does, or nobody can.
+    :raises InputError: if another process holds it, or the folder is not writable.
     """
     prepare_folder(folder)
     with (folder / LOCK).open('w') as stream:
@@ -52,7 +52,7 @@ def only_writer(folder: Path) -> Iterator[None]:
         except BlockingIOError as error:
             raise InputError('another process writes there', str(folder), 'wait for it') from error
         for part in folder.rglob('.*.part'):
-            # Of a process that was killed.
+            # Left by a killed process.
             if part.is_file():
                 part.unlink()
         yield
@@ -60,9 +60,9 @@ def only_writer(folder: Path) -> Iterator[None]:
 
 def write_study_data(data: StudyData) -> dict[str, int]:
     """
-    Write the tables, the tables of all runs, the dictionaries and the provenance.
+    Write the study's tables, the tables of all runs, the dictionaries and the provenance.
 
-    A file is replaced whole; the dictionaries come last. Equal data give equal bytes.
+    Files are replaced as a whole, the dictionaries last. Equal data give equal bytes.
 
     :return: rows by table.
     :raises InputError: if the folder cannot be written.
@@ -85,7 +85,7 @@ def write_study_data(data: StudyData) -> dict[str, int]:
 
 
 def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str, Any]:
-    """Describe the tables: of each there are two files, which hold the same."""
+    """Return the description of the tables, each with two files of equal content."""
     package = data_package(written['csv'], 'csv', study)
     other = data_package(written['parquet'], 'parquet', study)['resources']
     for resource in other:

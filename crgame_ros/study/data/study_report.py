@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a study: one HTML file, for people and for papers."""
+"""Writes the report of a study as one HTML file."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ _TIMES = (('max_cumulative_error_s', 'greatest error [ms]', 1e3, 1),
 
 def write_study_report(data: StudyData, path: Path) -> None:
     """
-    Write the report; the file is there whole or not at all.
+    Write the report, completely or not at all.
 
     :raises InputError: if it cannot be written.
     """
@@ -38,7 +38,7 @@ def write_study_report(data: StudyData, path: Path) -> None:
 
 
 def study_html(data: StudyData) -> str:
-    """Write the page."""
+    """Return the page as HTML."""
     study = data.folder.study
     title = study.title.in_language(study.language) or study.name
     sections = [('conditions', 'Conditions', condition_section(data)),

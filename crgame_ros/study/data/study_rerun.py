@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A study's recorded people again, against other planners, beside what they drove against."""
+"""Reruns a study's recorded drivers against other planners, and compares the results."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import json
@@ -19,7 +19,7 @@ from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows, w
 from crgame_ros.study.data.trials_table import PARTICIPANT, TRIAL
 import pyarrow.parquet as pq
 
-# Of the vehicles' tables, compared as they are.
+# Columns of the vehicles' tables that are compared directly.
 COMPARED = ('distance', 'mean_speed', 'max_speed', 'min_acceleration', 'worst_gap', 'worst_ttc',
             'worst_thw', 'worst_drac', 'worst_min_distance', 'worst_pet_s', 'tet_s', 'tit',
             'score_nuplan', 'score_no_collision_at_fault', 'score_progress', 'score_comfort')
@@ -29,7 +29,7 @@ FILE = f'{COMPARISON}.csv'
 
 
 def comparison_declaration() -> TableDeclaration:
-    """Declare the table of the comparison."""
+    """Return the declaration of the comparison table."""
     known = {column.name: column for column in VEHICLES.columns}
     pairs = [with_unit(known[name], f'{when}_') for name in COMPARED
              for when in (RECORDED, RERUN)]
@@ -53,13 +53,13 @@ def comparison_declaration() -> TableDeclaration:
 def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: int | None,
                 say: Callable[[str], object]) -> list[str]:
     """
-    Let the people of all trials that count drive again as they did, against each planner.
+    Replay the drivers of all trials that count against each planner.
 
     :param planners: of all AVs.
-    :param out: folder of the evaluation, with a folder for each seed where trials differ in it.
-    :param workers: processes; None for one for each processor.
-    :param say: takes one line for people.
-    :return: what came of it, one line each.
+    :param out: folder of the evaluation, with a folder for each seed if trials differ in it.
+    :param workers: number of processes; None for one per processor.
+    :param say: prints one line.
+    :return: the results, one line each.
     :raises InputError: if there is nothing to repeat, or a planner or folder cannot be used.
     """
     from crgame_ros.evaluation.dask_cluster import require_dask
@@ -82,7 +82,7 @@ def rerun_study(data: StudyData, planners: Sequence[str], out: Path, workers: in
 
 
 def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
-    """Return whether everything that a person did in a trial is known; say why not."""
+    """Return whether all inputs of a trial's driver are known; print the reason if not."""
     reason = trial.row['problem']
     if trial.run is not None and not trial.run.summary['humans']:
         reason = 'nobody drove in it'
@@ -102,7 +102,7 @@ def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
 
 def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: int, folder: Path,
                workers: int | None) -> list[str]:
-    """Evaluate, or go on; give the evaluation's names of the recorded runs."""
+    """Run or resume the evaluation; return its names of the recorded runs."""
     from crgame_ros.evaluation.dask_cluster import default_workers
     from crgame_ros.evaluation.evaluation import Computing, evaluate
     from crgame_ros.evaluation.folder import GRID_FILE
@@ -120,7 +120,7 @@ def _evaluated(trials: Sequence[CountedTrial], planners: Sequence[str], seed: in
 
 def _compared(trials: Sequence[CountedTrial], labels: Sequence[str],
               folder: Path) -> Iterator[dict[str, Any]]:
-    """Put what was recorded and what came now side by side."""
+    """Yield rows that compare the recorded and the new results."""
     cells = _parts(folder, 'cells')
     vehicles: dict[str, list[dict[str, Any]]] = {}
     for row in _parts(folder, 'vehicles'):
@@ -157,7 +157,7 @@ def _parts(folder: Path, name: str) -> list[dict[str, Any]]:
 
 
 def _write(rows: Sequence[Mapping[str, Any]], out: Path, study: str) -> None:
-    """Write the table, and its dictionary in a folder of its own beside the evaluation's."""
+    """Write the table and its dictionary, in their own folder beside the evaluation's."""
     folder = out / COMPARISON
     prepare_folder(folder)
     declaration = comparison_declaration()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A study's tables from rows: texts stay what people wrote, to the last character."""
+"""Builds a study's tables from rows; texts keep every character."""
 
 from collections.abc import Iterable, Mapping, Sequence
 import csv
@@ -24,7 +24,7 @@ SHARED = 'of a questionnaire'
 
 
 def with_unit(column: Column, prefix: str = '') -> Column:
-    """Name a measure's column so that its unit is in the name."""
+    """Return a measure's column with its unit in the name."""
     suffix = _SUFFIXES.get(column.unit, '')
     name = prefix + column.name
     if suffix and not name.endswith(f'_{suffix}'):
@@ -33,7 +33,7 @@ def with_unit(column: Column, prefix: str = '') -> Column:
 
 
 def plain_name(name: str) -> str:
-    """Return a name as columns have it: small letters, digits and _."""
+    """Return a column name: lower-case letters, digits and _."""
     return re.sub(r'[^a-z0-9]+', '_', name.lower()).strip('_')
 
 
@@ -42,7 +42,7 @@ def unlike(name: str, taken: Iterable[str], ending: str = '') -> str:
     Return a name that no other column has.
 
     :param taken: names of the others.
-    :param ending: that is tried before numbers.
+    :param ending: tried before numbers.
     """
     known = set(taken)
     tries = [name, *([name + ending] if ending else [])]
@@ -54,7 +54,7 @@ def unlike(name: str, taken: Iterable[str], ending: str = '') -> str:
 
 
 def question_column(question: Question, name: str, language: str) -> Column:
-    """Declare the column of a question's answers."""
+    """Return the column of a question's answers."""
     kind, asked = question.kind, ' '.join(question.ask.in_language(language).split())
     says = f'answer to: {asked}' if asked else 'answer'
     if isinstance(kind, LikertQuestion):
@@ -71,23 +71,23 @@ def question_column(question: Question, name: str, language: str) -> Column:
 
 
 def score_columns(scale: Questionnaire, prefix: str) -> Sequence[Column]:
-    """Declare the columns of a questionnaire's scores."""
+    """Return the columns of a questionnaire's scores."""
     return [Column(f'{prefix}{score.name}', NUMBER, '1', f'{score.name} of {scale.name}',
                    variant=scale.citation, empty='an answer is missing')
             for score in scale.scores]
 
 
 def flag_column(name: str, definition: str) -> Column:
-    """Declare a column of yes and no."""
+    """Return a yes-or-no column."""
     return Column(name, FLAG, '', definition)
 
 
 def table_of_rows(declaration: TableDeclaration,
                   rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     """
-    Make a table; NaN and empty texts are missing.
+    Build a table; NaN and empty texts count as missing.
 
-    :param rows: values by column; columns that are left out are missing.
+    :param rows: values by column; omitted columns count as missing.
     :raises KeyError: if a column is not declared.
     """
     columns: dict[str, list[Any]] = {column.name: [] for column in declaration.columns}
@@ -101,7 +101,7 @@ def table_of_rows(declaration: TableDeclaration,
 
 
 def csv_of_table(table: pa.Table) -> bytes:
-    """Write a table as RFC 4180 has it, in UTF-8; nothing is put in front of any text."""
+    """Return a table as CSV by RFC 4180 in UTF-8; no text gets a prefix."""
     stream = io.StringIO(newline='')
     writer = csv.writer(stream)
     writer.writerow(table.column_names)
@@ -110,7 +110,7 @@ def csv_of_table(table: pa.Table) -> bytes:
 
 
 def parquet_of_table(table: pa.Table) -> bytes:
-    """Write a table as Parquet."""
+    """Return a table as Parquet."""
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression='zstd')
     return bytes(sink.getvalue().to_pybytes())
@@ -120,7 +120,7 @@ def _value(value: Any, kind: pa.DataType) -> Any:
     if value is None or value == '' or isinstance(value, float) and math.isnan(value):
         return None
     if kind == TEXT:
-        # Half a pair of UTF-16 is no character, and NUL ends texts in most readers.
+        # A lone surrogate is not a character, and NUL ends texts in most readers.
         text = value.encode('utf-16', 'surrogatepass').decode('utf-16', 'replace')
         return text.replace('\0', '\N{REPLACEMENT CHARACTER}')
     if kind == NUMBER:
@@ -129,7 +129,7 @@ def _value(value: Any, kind: pa.DataType) -> Any:
 
 
 def _spelled(column: pa.ChunkedArray) -> list[Any]:
-    """Return a column's values as the tables of `crgame export` have them in CSV."""
+    """Return a column's values in the CSV form of `crgame export`."""
     values: list[Any] = column.to_pylist()
     if column.type == NUMBER:
         return [NOT_A_NUMBER if value is None else value for value in values]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a trial was true to the clock: table I and the input's delay, against bounds."""
+"""Checks the timing of a trial: table I and the input latency against bounds."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -10,7 +10,7 @@ from typing import Any
 @dataclass(frozen=True)
 class TimingBounds:
     """
-    Beyond which the timing of a trial is told.
+    The bounds beyond which the timing of a trial is reported.
 
     :param max_cumulative_error_s: of the greatest cumulative error [s]
     :param timeout_ratio: of the share of cycles that took longer than a step.
@@ -28,7 +28,7 @@ class TimingBounds:
     input_delay_s: float = 0.1
 
     def as_dict(self) -> dict[str, float]:
-        """Return them as JSON does."""
+        """Return their JSON form."""
         return asdict(self)
 
 
@@ -45,9 +45,9 @@ _WORDS = {
 
 def timing_faults(row: Mapping[str, Any], bounds: TimingBounds = BOUNDS) -> list[str]:
     """
-    Return what of a trial's timing is beyond the bounds, one text each; none if all is within.
+    Return one text for each value of a trial's timing beyond its bound.
 
-    :param row: values by the bounds' names; what is missing is not judged.
+    :param row: values by the bounds' names; missing ones are not checked.
     """
     found = []
     for name, (words, unit, factor, digits) in _WORDS.items():
@@ -63,7 +63,7 @@ def timing_faults(row: Mapping[str, Any], bounds: TimingBounds = BOUNDS) -> list
 
 
 def bounds_told(bounds: TimingBounds = BOUNDS) -> list[tuple[str, str]]:
-    """Return each bound for people: what of, and how much."""
+    """Return each bound as text: its quantity and its value."""
     return [(words, f'{"at least" if name == "real_time_ratio_final" else "at most"} '
                     f'{factor * getattr(bounds, name):g}{f" {unit}" if unit else ""}')
             for name, (words, unit, factor, _) in _WORDS.items()]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of trials: a row is a trial that counts, with everything that is known of it."""
+"""The table of trials: one row for each trial that counts, with all its values."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, UTC
@@ -93,7 +93,7 @@ _DRIVE = (
     Column('game_file', TEXT, '', 'the game as it was driven', empty='there is none'),
     Column('run', TEXT, '', 'its name in the tables in runs/', empty=UNMEASURED),
     Column('problem', TEXT, '', 'why it has no measures', empty='it has some'))
-# Of the table of runs.
+# Columns of the table of runs.
 _RUN_COLUMNS = ('benchmark_id', 'scenario_sha256', 'game_sha256', 'duration_s',
                 'contacts', 'violations', 'final_error_s', 'mean_step_error_s',
                 'max_cumulative_error_s', 'timeout_ratio', 'real_time_ratio_final',
@@ -167,8 +167,8 @@ class TrialsTable:
         """
         Return the row of a trial.
 
-        :param run: its measures; None where there are none.
-        :param problem: why there are none.
+        :param run: its measures; None without any.
+        :param problem: the reason for missing measures.
         """
         trial = attempt.trial
         row = {**_identity(record, trial), **{
@@ -228,13 +228,13 @@ class TrialsTable:
 
 
 def utc(at_s: float) -> str:
-    """Write a time as ISO 8601 does, to the millisecond."""
+    """Return a time in ISO 8601, to the millisecond."""
     return datetime.fromtimestamp(at_s, UTC).isoformat(timespec='milliseconds').replace(
         '+00:00', 'Z')
 
 
 def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Tell of what was shown longest of what a seat's page told."""
+    """Return the columns of the view that was shown longest, from a seat's periods."""
     if not periods:
         return {}
     longest = max(periods, key=lambda period: period['to_s'] - period['from_s'])
@@ -262,7 +262,7 @@ def _apart(columns: list[Column], taken: set[str]) -> list[Column]:
     """
     Return the columns of questions.
 
-    :raises InputError: if one of them is called like another column.
+    :raises InputError: if one of them has the name of another column.
     """
     known = set(taken)
     for column in columns:

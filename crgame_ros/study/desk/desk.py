@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The desk of a session: what participant and experimenter may do now, and who has to know."""
+"""The desk of a session: the actions of participant and experimenter, and their watchers."""
 
 from collections.abc import Callable, Mapping
 import logging
@@ -17,34 +17,34 @@ from crgame_ros.study.trial_plan import PlannedTrial
 
 class Drives(Protocol):
     """
-    Drives the items of a session that are driven: trials and practice.
+    Conducts the drives of a session: trials and practice.
 
-    It starts, finishes and aborts them in the session itself; the desk does all other items.
+    It starts, finishes and aborts these items in the session; the desk handles all others.
     """
 
     @property
     def state(self) -> DriveState:
-        """Tell of the drive that goes on or comes next."""
+        """Return the state of the present or next drive."""
 
     def watch(self, changed: Callable[[], None]) -> None:
-        """Name who is told, on the event loop, whenever the state or the session has changed."""
+        """Set the callback, run on the event loop, for changes of the state or the session."""
 
     def wake(self) -> None:
-        """Say that the session has moved on: another item may have to be driven."""
+        """Report that the session has advanced: another item may have to be driven."""
 
     def ready(self, item: str) -> None:
-        """Take the participant's word that the drive of an item may begin."""
+        """Report that the participant is ready for the drive of an item."""
 
     def record(self, kind: str, text: str) -> None:
-        """Let the recording that goes on, if one does, keep a note or marker at this moment."""
+        """Add a note or marker to the present recording, if there is one."""
 
     def abort(self, reason: str) -> None:
-        """End the drive that goes on; it counts for nothing and comes again."""
+        """End the present drive; it does not count and is repeated."""
 
 
-# Why a session ends that nobody has agreed to.
+# The reason for ending a session without consent.
 DECLINED = 'consent was not given'
-# While a drive is in one of these nothing else can come before it.
+# During these phases of a drive no other item can come first.
 UNDER_WAY = (DrivePhase.COUNTDOWN, DrivePhase.DRIVING, DrivePhase.ENDED)
 
 _log = logging.getLogger(__name__)
@@ -52,24 +52,24 @@ _log = logging.getLogger(__name__)
 
 class Desk:
     """
-    Takes what both pages ask for, and tells whoever watches when anything has changed.
+    Handles the requests of both pages, and calls the watcher after each change.
 
     :param session: of the participant.
-    :param drives: lets the participant drive.
+    :param drives: conducts the drives.
     :param clock_s: seconds since 1970.
     """
 
     def __init__(self, session: ParticipantSession, drives: Drives, *,
                  clock_s: Callable[[], float] = time.time) -> None:
         self.session, self.drives, self.clock_s = session, drives, clock_s
-        # Why the session ends as soon as its drive is over; empty while it goes on.
+        # The reason for ending the session after its present drive; empty otherwise.
         self.ending = ''
         self._watchers: list[Callable[[], None]] = []
         drives.watch(self._drive_changed)
         self._begin_break()
 
     def watch(self, changed: Callable[[], None]) -> None:
-        """Name who is told of every change."""
+        """Set the callback for every change."""
         self._watchers.append(changed)
 
     @property
@@ -102,7 +102,7 @@ class Desk:
 
     @property
     def break_left_s(self) -> float:
-        """Return how long the present break lasts at least [s]; 0 where there is none."""
+        """Return the minimum time left of the present break [s]; 0 without a break."""
         item = self.session.next_item
         if item is None or not isinstance(item.what, Break):
             return 0.0
@@ -112,26 +112,26 @@ class Desk:
         at = self.clock_s() if began is None else began['at']
         return max(0.0, at + 60.0 * item.what.minutes - self.clock_s())
 
-    # What the participant does.
+    # Actions of the participant.
 
     def choose_language(self, language: str) -> None:
-        """Take the participant's language."""
+        """Set the participant's language."""
         self.session.choose_language(language)
         self._moved()
 
     def finish(self, item: str, answers: Mapping[str, Any] | None = None,
                agreed: bool | None = None, **told: Any) -> None:
         """
-        Take what the participant says to an item that is not driven.
+        Finish an item that is not driven, with the participant's answers.
 
-        Nothing happens if it is not the present one, or the experimenter holds the session: a
-        second click, or another page, does nothing twice.
+        Nothing happens if it is not the present item, or if the experimenter holds the session, so
+        a second click or another page has no effect.
 
-        :param item: id of it.
+        :param item: id of the item.
         :param answers: to its questions.
         :param agreed: to a consent; False ends the session.
         :param told: when it was shown and answered, and how long it took.
-        :raises InputError: if an answer cannot be taken, or it is too early.
+        :raises InputError: if an answer is refused, or a break is not over yet.
         """
         now = self.session.next_item
         if now is None or now.id != item or self.waits or self.ending or is_driven(now):
@@ -148,34 +148,34 @@ class Desk:
         self._moved()
 
     def ready(self, item: str) -> None:
-        """Take the participant's word that a drive may begin."""
+        """Report that the participant is ready for a drive."""
         state = self.drives.state
         if state.phase == DrivePhase.READY and state.item == item and not self.waits \
                 and not self.ending:
             self.drives.ready(item)
 
-    # What the experimenter does.
+    # Actions of the experimenter.
 
     def note(self, text: str) -> None:
-        """Keep a remark, with the run and its clock."""
+        """Record a note, with the run and its clock."""
         self.session.note(text, **self.moment())
         self.drives.record('note', text)
         self._notify()
 
     def mark(self, name: str) -> None:
-        """Set a marker, with the run and its clock."""
+        """Record a marker, with the run and its clock."""
         self.session.mark(name, **self.moment())
         self.drives.record('marker', name)
         self._notify()
 
     def repeat(self, item: str, reason: str) -> None:
-        """Let a finished item come again, now."""
+        """Repeat a finished item now."""
         self._refuse_while_driving()
         self.session.repeat(item, reason)
         self._moved()
 
     def skip(self, item: str, reason: str) -> None:
-        """Leave the present item out."""
+        """Skip the present item."""
         self._refuse_while_driving()
         now = self.session.next_item
         if now is None or now.id != item:
@@ -184,7 +184,7 @@ class Desk:
         self._moved()
 
     def abort(self, item: str, reason: str) -> None:
-        """End the drive that is under way; it comes again."""
+        """End the present drive; it is repeated."""
         if not self.is_driving or self.drives.state.item != item:
             raise InputError('is not driven now', item[:60], 'look at what is')
         if not self.can_abort:
@@ -193,7 +193,7 @@ class Desk:
         self._notify()
 
     def end(self, reason: str) -> None:
-        """End the session; a drive that is under way is aborted first."""
+        """End the session; a present drive is aborted first."""
         if self.session.next_item is None:
             raise InputError('is over already', 'the session', '')
         self.ending = reason
@@ -202,7 +202,7 @@ class Desk:
         self._drive_changed()
 
     def hold(self, held: bool) -> None:
-        """Hold the session before the next item, or let it go on."""
+        """Hold the session before the next item, or release it."""
         self.session.hold(held)
         self._moved()
 
@@ -219,7 +219,7 @@ class Desk:
             raise InputError('is under way', 'a drive', 'wait for its end, or abort it first')
 
     def _drive_changed(self) -> None:
-        """Go on with what had to wait for the end of a drive, and tell those who watch."""
+        """Do what had to wait for the end of a drive, and call the watcher."""
         if self.ending and not self.is_driving and self.session.next_item is not None:
             self.session.end(self.ending)
             self.drives.wake()
@@ -232,7 +232,7 @@ class Desk:
         self._notify()
 
     def _begin_break(self) -> None:
-        """Start the clock of a break once, when nothing keeps it from beginning."""
+        """Start the clock of a break once, when it may begin."""
         item = self.session.next_item
         if item is None or not isinstance(item.what, Break) or self.waits:
             return
@@ -251,5 +251,5 @@ class Desk:
 
 
 def is_driven(item: SessionItem) -> bool:
-    """Return whether an item is a drive, or several."""
+    """Return whether an item consists of drives."""
     return isinstance(item.what, PlannedTrial | PracticeDrives)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the desk's pages say: JSON of strangers in, checked values or one clear error out."""
+"""Parses the messages of the desk's pages: untrusted JSON to checked values or an error."""
 
 from collections.abc import Callable, Mapping
 import json
@@ -10,7 +10,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 
-# A page of questions with long texts; every character may take four bytes.
+# Enough for a page of questions with long texts, at four bytes per character.
 MAX_BYTES = 4 * 2 ** 20
 MAX_ANSWERS = 500
 MAX_CHOICES = 500
@@ -27,8 +27,8 @@ def parse_participant(text: str) -> dict[str, Any]:
     Check a message of the participant's page.
 
     :param text: one JSON object of at most `MAX_BYTES`.
-    :return: its `type` and the fields of that type; others are left out.
-    :raises InputError: if it is anything else.
+    :return: its `type` and the fields of that type; others are dropped.
+    :raises InputError: if it is malformed.
     """
     return _parse(text, _PARTICIPANT)
 
@@ -73,7 +73,7 @@ def _item(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _finish(message: Mapping[str, Any]) -> dict[str, Any]:
-    """Read answers, what was agreed to or found, and the times: all by the wall clock."""
+    """Read answers, consent, findings and times by the wall clock."""
     read: dict[str, Any] = {**_item(message), 'answers': _answers(message.get('answers', {})),
                             'times': _times(message)}
     if 'agreed' in message:
@@ -101,7 +101,7 @@ def _answer(value: Any) -> Any:
 
 
 def _times(message: Mapping[str, Any]) -> dict[str, Any]:
-    """Read when an item was shown and answered, and after which time each question was."""
+    """Read when an item was shown and answered, and the time of each question's answer."""
     shown_at, answered_at = (_within(message.get(name), name, 0.0, _LATEST_S)
                              for name in ('shown_at', 'answered_at'))
     after_s = message.get('after_s', {})
@@ -216,5 +216,5 @@ def _refuse_constant(name: str) -> float:
 
 
 def _wrong(field: str, what: str) -> InputError:
-    # What was sent is not repeated: it may be long, and others may read the log.
+    # The sent value is not repeated: it may be long, and others may read the log.
     return InputError(what, field)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of a study: Markdown in, a tree of what is on the page out, without any HTML of theirs."""
+"""Converts a study's Markdown pages to trees of page elements, without any raw HTML."""
 
 from collections.abc import Iterator
 import hashlib
@@ -20,7 +20,7 @@ MOST_BYTES = 1_000_000
 MOST_PICTURE_BYTES = 20_000_000
 PICTURES = {'.png': 'image/png', '.jpg': 'image/jpeg', '.jpeg': 'image/jpeg',
             '.gif': 'image/gif', '.webp': 'image/webp'}
-# What a page may consist of; the page's own script makes these elements and no other.
+# The elements of a page; the page's script creates only these.
 TAGS = {'heading', 'paragraph', 'bullet_list', 'ordered_list', 'list_item', 'blockquote', 'hr',
         'em', 'strong', 's', 'table', 'thead', 'tbody', 'tr', 'th', 'td'}
 Node = str | dict[str, Any]
@@ -50,7 +50,7 @@ def read_tree(study: StudyFile, page: Page, language: str) -> tuple[Node, ...]:
 
 def pictures_of(study: StudyFile) -> tuple[str, ...]:
     """
-    Name the pictures of all pages that are there, relative to the study's folder.
+    Return the pictures of all existing pages, relative to the study's folder.
 
     :raises InputError: if a page cannot be read.
     """
@@ -70,7 +70,7 @@ def pictures_of(study: StudyFile) -> tuple[str, ...]:
 
 def picture(study: StudyFile, name: str) -> PageFile | None:
     """
-    Read a picture that lies beside a study's pages, or in a folder below.
+    Read a picture beside a study's pages, or in a folder below.
 
     :param name: relative to the study's folder.
     :return: None if there is none.
@@ -88,7 +88,7 @@ def picture(study: StudyFile, name: str) -> PageFile | None:
 
 
 def _parser() -> MarkdownIt:
-    # Without HTML: what looks like it is text.
+    # HTML is off: it is shown as text.
     return MarkdownIt('commonmark', {'html': False}).enable(['table', 'strikethrough'])
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The pages that are open at a desk: what each is sent, and which of them the participant uses."""
+"""The open pages of a desk: their documents, and the page that the participant uses."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -22,9 +22,9 @@ STANDARD = 'en'
 
 def words_of(study: StudyFile, language: str) -> dict[str, str]:
     """
-    Return the words in a language; English ones where it has none.
+    Return the words of the pages in a language; missing ones in English.
 
-    :param study: `words.fr.yaml` beside its file is that for French, or goes before ours.
+    :param study: `words.fr.yaml` beside its file adds or overrides the French words.
     :return: by their key.
     :raises InputError: if a file of words cannot be read.
     """
@@ -49,7 +49,7 @@ def _read(file: Path) -> dict[str, str]:
     return given
 
 
-# The run's clock changes with every cycle: nobody reads it faster.
+# The run's clock changes with every cycle; faster updates are not readable.
 TOLD_EVERY_S = 0.2
 
 _log = logging.getLogger(__name__)
@@ -57,9 +57,9 @@ _log = logging.getLogger(__name__)
 
 class DeskPages:
     """
-    Sends documents to pages, and gives what they say to the desk.
+    Sends documents to pages, and passes their messages to the desk.
 
-    Of several pages of the participant the one that was opened last is used, the others say so.
+    If the participant has several pages open, only the last one is used; the others say so.
 
     :param desk: whose pages they are.
     """
@@ -67,7 +67,7 @@ class DeskPages:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self._participants: dict[Client, str] = {}
-        # In which language each has the words of the page.
+        # The language of the words sent to each page.
         self._worded: dict[Client, str] = {}
         self._experimenters: set[Client] = set()
         self._used: Client | None = None
@@ -77,7 +77,7 @@ class DeskPages:
         desk.watch(self._changed)
 
     def joined(self, client: Client, *, experimenter: bool) -> None:
-        """Take in a page; that of a participant is sent nothing before its hello."""
+        """Add a page; a participant's page gets nothing before its hello."""
         if experimenter:
             self._experimenters.add(client)
             client.put_document('desk', self._experimenter_text())
@@ -85,7 +85,7 @@ class DeskPages:
             self._participants[client] = ''
 
     def left(self, client: Client) -> None:
-        """Forget a page."""
+        """Remove a page."""
         self._experimenters.discard(client)
         self._participants.pop(client, None)
         self._worded.pop(client, None)
@@ -101,7 +101,7 @@ class DeskPages:
 
     @property
     def page(self) -> dict[str, Any]:
-        """Return what is known of the participant's page: connected, delays [ms], seat."""
+        """Return the state of the participant's page: connected, delays [ms], seat."""
         return {'connected': self._used is not None, 'open': len(self._participants),
                 **self._told}
 
@@ -115,14 +115,14 @@ class DeskPages:
 
     @property
     def is_due(self) -> bool:
-        """Return whether something has changed since the experimenter's pages were told."""
+        """Return whether the experimenter's pages lack a change."""
         return self._is_due
 
     def participant_says(self, client: Client, message: Mapping[str, Any]) -> None:
         """
-        Take a message of a participant's page.
+        Process a message of a participant's page.
 
-        :raises CrgameError: if the session cannot take it.
+        :raises CrgameError: if the session refuses it.
         """
         kind = message['type']
         if kind in ('hello', 'here'):
@@ -145,11 +145,11 @@ class DeskPages:
             except InputError as error:
                 client.put_event(_text({'type': 'refused', 'item': message.get('item', ''),
                                         'text': str(error)}))
-        # Also after a stale one: the page learns where the session is.
+        # Also after an outdated message, so that the page learns the session's state.
         self._send_participant(client)
 
     def experimenter_says(self, client: Client, message: Mapping[str, Any]) -> None:
-        """Take a message of an experimenter's page, and answer it."""
+        """Process and answer a message of an experimenter's page."""
         if message['type'] == 'ping':
             client.put_event(_text({'type': 'pong', 't': message['t'],
                                     'at': self.desk.clock_s()}))
@@ -201,7 +201,7 @@ class DeskPages:
             self._send_participant(client)
 
     def _send_words(self, client: Client) -> None:
-        """Send the words of the page before whatever is shown with them."""
+        """Send the words of the page before its content."""
         language = self.desk.language
         if self._worded.get(client) != language:
             self._worded[client] = language
@@ -215,7 +215,7 @@ class DeskPages:
             self._send_words(client)
             document = participant_document(self.desk)
         except CrgameError as error:
-            # A page of the study that is not there: the experimenter has to mend it.
+            # A page of the study is missing: the experimenter has to add it.
             _log.error('%s', error)
             self._told = {**self._told, 'error': str(error)}
             document = {'show': 'wait', 'why': 'failed', 'item': '',
@@ -231,5 +231,5 @@ class DeskPages:
 
 
 def _text(message: Mapping[str, Any]) -> bytes:
-    # Lone surrogates, which a page may send, are no UTF-8: they stay escaped.
+    # A page may send lone surrogates, which UTF-8 cannot encode: they stay escaped.
     return json.dumps(message, allow_nan=False).encode()

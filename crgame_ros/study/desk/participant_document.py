@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the participant's page shows now, as it is sent there."""
+"""Builds the documents that the pages of participant and experimenter show."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -32,8 +32,8 @@ def participant_document(desk: Desk) -> dict[str, Any]:
     """
     Describe the page.
 
-    :return: `show` names what is there: language, wait, questions, page, break, device, drive or
-        over; `item` is the id that goes with every answer. Texts are in the page's language.
+    :return: `show` names the view: language, wait, questions, page, break, device, drive or over;
+        `item` is the id to send with every answer. Texts are in the page's language.
     :raises InputError: if a page or questionnaire of the study cannot be read.
     """
     session, language = desk.session, desk.language
@@ -54,7 +54,7 @@ def participant_document(desk: Desk) -> dict[str, Any]:
 
 
 def how_over(desk: Desk) -> str:
-    """Return how a session is over: done, declined or ended."""
+    """Return how a session ended: done, declined or ended."""
     ended = next((entry for entry in reversed(desk.session.journal.entries)
                   if entry['entry'] == SessionEvent.ENDED), None)
     if ended is None and not desk.ending:
@@ -71,7 +71,7 @@ def _progress(desk: Desk) -> dict[str, int]:
 
 
 def _repeats(desk: Desk, item: SessionItem) -> int:
-    """Count how often an item that was done came anew."""
+    """Return how often a finished item was repeated."""
     return sum(entry['entry'] == SessionEvent.REPEATED and entry['item'] == item.id
                for entry in desk.session.journal.entries)
 
@@ -113,7 +113,7 @@ def _drive(desk: Desk, item: SessionItem) -> dict[str, Any]:
 
 
 def practised(desk: Desk, item: SessionItem) -> int:
-    """Count the practice drives of an item since it was last to be done anew."""
+    """Return the number of practice drives of an item since its last repeat."""
     assert is_driven(item)
     count = 0
     for entry in desk.session.journal.entries:
@@ -152,7 +152,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, Any]) -> dict[str, Any]
     """
     Describe the page.
 
-    :param page: what is known of the participant's: connected, delays, seat.
+    :param page: state of the participant's page: connected, delays, seat.
     """
     session, state = desk.session, desk.drives.state
     item = session.next_item
@@ -194,7 +194,7 @@ def _items(desk: Desk) -> list[dict[str, Any]]:
 
 
 def kind_of(item: SessionItem) -> str:
-    """Return in a few words what an item is."""
+    """Return a short description of an item."""
     what = item.what
     if isinstance(what, PlannedTrial):
         return f'drive {what.number}'
@@ -212,7 +212,7 @@ def kind_of(item: SessionItem) -> str:
 
 
 def _log(desk: Desk) -> list[dict[str, Any]]:
-    """Return the last entries of the journal, without answers: the file has them."""
+    """Return the last entries of the journal, without answers, which only the file holds."""
     return [{name: value[:LONGEST] if isinstance(value, str) else value
              for name, value in entry.items()
              if name not in ('answers', 'items', 'after_s') and not isinstance(value, dict)}

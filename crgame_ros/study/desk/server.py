@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The web server of a desk: its two pages, their files and sockets, who is let in."""
+"""The web server of a desk: its two pages, their files and sockets, and access control."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -44,10 +44,10 @@ _log = logging.getLogger(__name__)
 
 class DeskSocket:
     """
-    Reads a page's messages; a page that talks nonsense, or too much, is dropped.
+    Reads a page's messages; a page that sends malformed or too many messages is disconnected.
 
     :param pages: of the desk.
-    :param experimenter: whose page it is.
+    :param experimenter: whether it is an experimenter's page.
     """
 
     def __init__(self, pages: DeskPages, *, experimenter: bool) -> None:
@@ -90,7 +90,7 @@ class DeskSocket:
         return self.socket
 
     async def close(self, code: int, reason: str) -> None:
-        """Close the connection within a second, whatever its other end does."""
+        """Close the connection within a second, even if the other end does not respond."""
         with contextlib.suppress(TimeoutError, ConnectionError):
             async with asyncio.timeout(2 * CLOSE_S):
                 await self.socket.close(code=code, message=reason.encode()[:123])
@@ -132,13 +132,13 @@ class DeskSocket:
 
 
 def _end_with(writer: asyncio.Task[None], client: Client) -> None:
-    """Drop a client that nothing can be sent to any more."""
+    """Drop a client after its writer has ended."""
     if not writer.cancelled() and writer.exception() is not None:
         client.drop('cannot be sent to')
 
 
 PACKAGE = Path(__file__).resolve().parents[2]
-# Modules name each other by their place in the package.
+# JavaScript modules import each other by their path in the package.
 SHARED = ('cockpit/page', 'study/desk/page')
 PAGES = {'/': 'study/desk/page/participant.html',
          '/experimenter': 'study/desk/page/experimenter.html'}
@@ -151,11 +151,11 @@ _LOOPBACK = ('127.0.0.1', 'localhost')
 
 def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> web.Application:
     """
-    Make the server's application.
+    Build the server's application.
 
     :param desk: whose pages are served.
-    :param access: who is let in as the participant.
-    :param experimenters: links by which alone experimenters are let in, one browser each.
+    :param access: access control for participants.
+    :param experimenters: links that admit experimenters, one browser each.
     :raises CrgameError: if the pages are not installed.
     """
     keeper, pages = Doorkeeper(), DeskPages(desk)
@@ -198,12 +198,12 @@ def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> w
 async def serve_desk(desk: Desk, access: Access, private: Path
                      ) -> tuple[web.AppRunner, list[str]]:
     """
-    Serve a desk until the runner that is given back is cleaned up.
+    Serve a desk until the returned runner is cleaned up.
 
     :param access: with the address, and the first port to try.
-    :param private: folder where what lets experimenters in is kept: links of an earlier process
-        of the same session stay good.
-    :return: the runner, and the lines that tell where the pages are.
+    :param private: folder of the experimenters' keys, so that links of an earlier process of the
+        same session stay valid.
+    :return: the runner, and lines with the addresses of the pages.
     :raises InputError: if no port can be used.
     """
     experimenters = Invitations(private / LINKS)
@@ -287,12 +287,12 @@ def _cookie_name(request: web.Request) -> str:
 
 
 def _frames(request: web.Request, desk: Desk) -> str:
-    """Name where the cockpit's page may come from: this machine, at a port not known yet."""
+    """Return the allowed origins of the cockpit's frame: this machine, at any port."""
     if request.path != '/':
         return "'none'"
     host = urlsplit(f'//{request.host}').hostname or ''
     names = dict.fromkeys((host, *(_LOOPBACK if is_loopback(host) else ())))
-    # A literal of IPv6 has no wildcard of ports.
+    # An IPv6 literal does not allow a wildcard port.
     allowed = [f'{scheme}://{name}:*' for name in names if name and ':' not in name
                for scheme in ('http', 'https')]
     link = urlsplit(desk.drives.state.link)
@@ -302,7 +302,7 @@ def _frames(request: web.Request, desk: Desk) -> str:
 
 
 def _telling(pages: DeskPages) -> Callable[[web.Application], AsyncIterator[None]]:
-    """Yield experimenters what has changed, some times a second, and drop who never reads."""
+    """Update experimenters' pages several times a second, and drop pages that do not read."""
     async def notify() -> None:
         loop = asyncio.get_running_loop()
         checked_s = loop.time()

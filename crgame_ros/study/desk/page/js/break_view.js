@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** A break, with the time that it lasts at least. */
+/** A break with its minimum duration. */
 
 import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
 import { button } from './page_view.js';
@@ -9,7 +9,7 @@ import { button } from './page_view.js';
 /** @import { Words } from './words.js' */
 
 /**
- * Make it.
+ * Build the view.
  *
  * @param {BreakDocument} shown
  * @param {Words} words

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The WebSocket to the desk's server: it comes back by itself, and knows the server's clock. */
+/** The WebSocket to the desk's server: it reconnects and estimates the server's clock. */
 
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 2000;
@@ -10,7 +10,7 @@ const LONGEST_TOLD_MS = 60_000;
 /**
  * @typedef {{opened: (again: boolean) => void, lost: () => void,
  *   received: (message: any) => void, pinged?: () => Record<string, unknown>}} Listener
- *   `pinged` gives what goes along with each ping
+ *   `pinged` returns the data to send with each ping
  */
 
 /** One page's connection. */
@@ -23,7 +23,7 @@ export class DeskConnection {
   #opened = false;
   #offset_s = 0;
   #best_ms = Infinity;
-  /** The way there and back [ms]; NaN before it is known. */
+  /** The round-trip time [ms]; NaN before it is known. */
   round_trip_ms = NaN;
 
   /**
@@ -39,7 +39,7 @@ export class DeskConnection {
     setInterval(() => this.#ping(), PING_EVERY_MS);
   }
 
-  /** The server's clock now [s since 1970], as well as the page knows it. */
+  /** The server's clock now [s since 1970], by the page's estimate. */
   get now_s() {
     return (performance.timeOrigin + performance.now()) / 1000 + this.#offset_s;
   }
@@ -89,7 +89,7 @@ export class DeskConnection {
     }
     const now_ms = performance.now();
     this.round_trip_ms = now_ms - message.t;
-    // The shortest way says most about the other clock.
+    // The shortest round trip gives the best estimate of the other clock.
     if (this.round_trip_ms <= this.#best_ms) {
       this.#best_ms = this.round_trip_ms;
       this.#offset_s = message.at

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the participant's page and the desk's server say to each other.
+ * The messages between the participant's page and the desk's server.
  *
  * @typedef {number|string|string[]|null} Answer
  *
@@ -18,12 +18,12 @@
  * @typedef {LikertQuestion|SliderQuestion|ChoiceQuestion|NumberQuestion|TextQuestion} Question
  *
  * @typedef {string|{tag: string, children?: PageNode[], href?: string, src?: string,
- *   alt?: string}} PageNode  what a page of Markdown consists of
+ *   alt?: string}} PageNode  an element of a Markdown page
  *
  * @typedef {{done: number, of: number, drives_done: number, drives: number}} Progress
  * @typedef {{type: 'desk', study: string, participant: string, language: string,
  *   languages: string[], item: string, again: number,
- *   progress?: Progress}} Always  `again` tells how often the item has come anew
+ *   progress?: Progress}} Always  `again` is the number of repeats of the item
  * @typedef {Always & {show: 'language'|'elsewhere'}} PlainDocument
  * @typedef {Always & {show: 'wait', why: 'held'|'preparing'|'failed'}} WaitDocument
  * @typedef {Always & {show: 'over', how: 'done'|'declined'|'ended'}} OverDocument

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The device check: each control is moved once, as this page sees it. */
+/** The device check: the participant moves each control once, and the page detects it. */
 
 import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
 import { CalibrationDialog } from '../../../../cockpit/page/js/driving/calibration.js';
@@ -17,15 +17,15 @@ import { button } from './page_view.js';
 /** @typedef {'left'|'right'|'throttle'|'brake'} Movement */
 
 export const MOVEMENTS = /** @type {Movement[]} */ (['left', 'right', 'throttle', 'brake']);
-// So much of its travel counts as moved.
+// This share of its travel counts as moved.
 const MOVED = 0.6;
-// So far from where it was first seen an axis is moved by somebody.
+// An axis this far from its first position was moved by the participant.
 const TOUCHED = 0.4;
 const PREFIX = 'crgame.gamepad.';
 const KEYBOARD = 'keyboard';
 
 /**
- * Give the calibrations that this browser keeps, for the stage, whose address has another port.
+ * Return this browser's stored calibrations for the stage, whose address has another port.
  *
  * @returns {Record<string, string>} JSON of a profile, by the device's name
  */
@@ -39,7 +39,7 @@ export class DeviceCheck {
   #words;
   #finish;
   #chosen = KEYBOARD;
-  // Whether somebody has said with what they drive: then nothing that is touched says it.
+  // Whether the participant has chosen the device, so that touching one no longer chooses it.
   #told = false;
   /** @type {Map<string, number[]>} where the axes were first, by the device */
   #rest = new Map();
@@ -107,7 +107,7 @@ export class DeviceCheck {
   }
 
   /**
-   * Who moves a wheel or presses its button drives with it, unless the keys are through already.
+   * Choose a wheel or gamepad that is moved or pressed, unless the check of the keys is complete.
    *
    * @param {Gamepad[]} pads
    */
@@ -167,7 +167,7 @@ export class DeviceCheck {
   #press(event) {
     const movement = MOVEMENTS.find((name) => name === ACTIONS[event.code]);
     const { target } = event;
-    // Arrows choose in a group, and the space bar presses a button, as everywhere.
+    // Arrows choose in a group, and the space bar presses a button, as in any browser.
     const used = (target instanceof HTMLInputElement && event.code.startsWith('Arrow'))
       || (target instanceof HTMLButtonElement && event.code === 'Space');
     if (this.#chosen === KEYBOARD && movement && !used) {
@@ -198,7 +198,7 @@ export class DeviceCheck {
         done ? element('span', { class: 'unseen', text: ` (${this.#words.of('done')})` }) : null);
     }));
     const complete = this.#moved.size === MOVEMENTS.length;
-    // From then on the device's buttons choose and confirm here, too.
+    // From then on the device's buttons also choose and confirm here.
     setAttribute(this.node, 'data-complete', complete);
     if (complete) {
       setText(this.#problem, '');

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What has been answered but is not kept by the server yet: a reload loses nothing of it. */
+/** Answers that are not on the server yet, stored so that a reload loses nothing. */
 
 /** @import { Answer, DeskDocument } from './desk_messages.js' */
 
@@ -46,7 +46,7 @@ export class Draft {
     this.#write();
   }
 
-  /** Give when the item was shown and is answered, and after which time each question was. */
+  /** Return when the item was shown and answered, and the time of each question's answer. */
   times() {
     const now_s = this.#clock_s();
     return { shown_at: this.#state.shown_at, answered_at: now_s, taken_s: this.#since(now_s),
@@ -64,7 +64,7 @@ export class Draft {
 }
 
 /**
- * Name the draft of what is shown: an item that comes again is asked anew.
+ * Return the name of the shown item's draft; a repeated item gets a new one.
  *
  * @param {DeskDocument} shown
  */
@@ -73,7 +73,7 @@ export function draftName({ study, participant, item, again }) {
 }
 
 /**
- * Forget all drafts but one: what was asked before is with the server.
+ * Remove all drafts but one: earlier answers are on the server.
  *
  * @param {string} name of the one that stays
  */

@@ -13,7 +13,7 @@ import { button } from './page_view.js';
 
 const LOOPBACK = ['127.0.0.1', 'localhost'];
 
-/** The frame and what lies over it. */
+/** The frame and the gate over it. */
 export class DriveFrame {
   #root;
   #words;
@@ -31,7 +31,7 @@ export class DriveFrame {
   #gate;
 
   /**
-   * @param {HTMLElement} root the element that fills the page while somebody drives
+   * @param {HTMLElement} root the element that fills the page during a drive
    * @param {Words} words
    * @param {() => void} ready told that the participant is ready
    */
@@ -46,7 +46,7 @@ export class DriveFrame {
     window.addEventListener('message', (event) => this.#hear(event));
   }
 
-  /** What the stage has told last; nothing before. */
+  /** The last state from the stage; empty before the first. */
   get state() {
     return this.#state;
   }
@@ -73,7 +73,7 @@ export class DriveFrame {
     }
   }
 
-  /** Hide it behind whatever else is shown; the stage stays loaded. */
+  /** Hide it behind other content; the stage stays loaded. */
   hide() {
     this.#root.hidden = true;
     this.#phase = '';
@@ -81,7 +81,7 @@ export class DriveFrame {
 
   #showGate() {
     const ready = this.#phase === 'ready';
-    // Without a stage there is nothing to wait for.
+    // Without a stage the page does not wait.
     const { seated, rides, connected } = this.#state;
     const loaded = this.#link === '' || Boolean((seated || rides) && connected);
     const was = this.#button.disabled;
@@ -91,7 +91,7 @@ export class DriveFrame {
     setAttribute(this.#button, 'disabled', !loaded);
     if (this.#frame) {
       this.#frame.inert = ready;
-      // Before it is seated it shows the parts of a page that is not there yet.
+      // Before it has a seat, the stage shows parts of an incomplete page.
       this.#frame.classList.toggle('loads', ready && !loaded);
     }
     if (ready && was && loaded) {
@@ -163,11 +163,11 @@ export class DriveFrame {
 }
 
 /**
- * Give the stage's address as this page has to name it: cookies are those of one host.
+ * Return the stage's address with this page's host name, because cookies belong to one host.
  *
  * @param {string} link
  * @param {{hostname: string}} location of this page
- * @returns {URL|null} null for what is no address of a page
+ * @returns {URL|null} null if the link is not a page's address
  */
 export function stageAddress(link, location) {
   if (!URL.canParse(link)) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The experimenter's page: it shows where the session is, and takes orders. */
+/** The experimenter's page, which shows the session's state and sends orders. */
 
 import { element, part, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
 import { DeskConnection } from './desk_connection.js';

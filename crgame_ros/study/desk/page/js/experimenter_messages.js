@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the server tells the experimenter's page.
+ * The messages from the server to the experimenter's page.
  *
  * @typedef {{id: string, kind: string, attempts: number, condition: string, trial: number|null,
  *   outcome: string, state: 'now'|'to come'|'finished'|'skipped'}} ItemRow

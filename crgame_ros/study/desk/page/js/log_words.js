@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Entries of the journal in a line each. */
+/** Journal entries as one line each. */
 
 /** @import { LogEntry } from './experimenter_messages.js' */
 
 /**
- * Say what an entry says.
+ * Return an entry as text.
  *
  * @param {LogEntry} entry
  * @returns {string}
@@ -31,7 +31,7 @@ export function entryWords(entry) {
 }
 
 /**
- * Give the time of day.
+ * Return the time of day.
  *
  * @param {number} at seconds since 1970
  * @returns {string}

@@ -23,7 +23,7 @@ export class PadNavigation {
   #frame = 0;
 
   /**
-   * @param {HTMLElement} sheet what is answered
+   * @param {HTMLElement} sheet the element with the questions
    * @param {HTMLElement} drive the gate before a drive
    */
   constructor(sheet, drive) {
@@ -43,7 +43,7 @@ export class PadNavigation {
       this.#pressed.set(pad.index, now);
       now.forEach((pressed, i) => {
         const order = (pad.mapping === 'standard' ? STANDARD : WHEEL)[i];
-        // The press that made the pad appear is no order.
+        // The press that made the pad appear does not count as an order.
         if (pressed && before && !before[i] && order) {
           this.#take(order);
         }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** A page to read, made of the elements that Markdown knows and no other. */
+/** A page to read, made of Markdown elements only. */
 
 import { element } from '../../../../cockpit/page/js/dom.js';
 
@@ -12,7 +12,7 @@ const TAGS = /** @type {const} */ (['h1', 'h2', 'h3', 'h4', 'h5', 'h6', 'p', 'ul
   'code', 'pre', 'span']);
 
 /**
- * Make the nodes of a page.
+ * Build the nodes of a page.
  *
  * @param {PageNode[]} tree
  * @returns {Node[]}
@@ -36,7 +36,7 @@ export function pageNodes(tree) {
 }
 
 /**
- * Make a page with its way on.
+ * Build a page with its button to continue.
  *
  * @param {PageDocument} shown
  * @param {Words} words

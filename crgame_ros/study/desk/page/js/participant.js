@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The participant's page: it shows what the server says, and tells it what the person does. */
+/** The participant's page, which shows the server's documents and sends the answers. */
 
 import { element, part, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
 import { breakView } from './break_view.js';
@@ -27,7 +27,7 @@ class ParticipantPage {
   #shown = null;
   /** @type {DeviceCheck|null} */
   #check = null;
-  // What has been sent and not been answered.
+  // The message that was sent but not answered yet.
   #sent = '';
   #drive = new DriveFrame(part(document.body, 'drive'), this.#words,
     () => this.#connection.send({ type: 'ready', item: this.#shown?.item ?? '' }));
@@ -60,7 +60,7 @@ class ParticipantPage {
     switch (message.type) {
       case 'words':
         this.#words.take(message.words);
-        // Whatever is shown is told in other words.
+        // Redraw the present content in the new words.
         if (this.#shown !== null) {
           this.#show(this.#shown, true);
         }
@@ -83,7 +83,7 @@ class ParticipantPage {
 
   /**
    * @param {DeskDocument} shown
-   * @param {boolean} [anew] also where the same is shown already
+   * @param {boolean} [anew] also if the same is shown already
    */
   #show(shown, anew = false) {
     const before = this.#shown;
@@ -93,7 +93,7 @@ class ParticipantPage {
     document.body.dataset.show = shown.show;
     setText(part(document.body, 'study'), shown.study);
     this.#showProgress(shown);
-    // Without an item, as where another tab is used, it may be the same one that comes back.
+    // A document without an item, as in an unused tab, may be followed by the same item again.
     if (shown.item !== '' || shown.show === 'over') {
       forgetOtherDrafts(draftName(shown));
     }
@@ -103,7 +103,7 @@ class ParticipantPage {
       return;
     }
     this.#drive.hide();
-    // The same once more, because a page came or went: what is typed stays.
+    // The same document again, because a page came or went: typed text stays.
     const same = !anew && before !== null && keyOf(before) === keyOf(shown);
     if (!same) {
       this.#sent = '';
@@ -124,7 +124,7 @@ class ParticipantPage {
   #focus(moved) {
     const first = this.#sheet.querySelector('input:not([type=checkbox]), textarea');
     const fits = this.#sheet.scrollHeight <= window.innerHeight;
-    // Never a button: a key that is still held would agree, or go on, unread.
+    // Never focus a button: a key that is still held would agree or continue without reading.
     const target = first instanceof HTMLElement && (fits || !moved) ? first : this.#sheet;
     target.focus({ preventScroll: true });
   }
@@ -151,7 +151,7 @@ class ParticipantPage {
    */
   #view(shown) {
     const words = this.#words;
-    // What is only waited for has not been shown yet.
+    // An item that the page waits for has not been shown yet.
     const draft = !ANSWERED.includes(shown.show) ? null
       : new Draft(draftName(shown), () => this.#connection.now_s);
     /** @param {Partial<Told>} told */
@@ -210,7 +210,7 @@ function notice(title, text, waits = false) {
 }
 
 /**
- * Say what is shown, so far as it makes another page.
+ * Return a key of the shown document that changes if another page has to be built.
  *
  * @param {DeskDocument} shown
  */

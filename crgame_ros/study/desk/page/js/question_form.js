@@ -10,12 +10,12 @@ import { QuestionView } from './question_view.js';
 /** @import { Words } from './words.js' */
 
 /**
- * Make the form.
+ * Build the form.
  *
  * @param {QuestionsDocument} shown
  * @param {Words} words
  * @param {Draft} draft
- * @param {(told: Told) => void} finish told the answers when all can be taken
+ * @param {(told: Told) => void} finish called with the answers once all are valid
  * @returns {HTMLElement}
  */
 export function questionForm(shown, words, draft, finish) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** One question on the page: its controls, its answer, and what is wrong with it. */
+/** One question on the page: its controls, its answer and its error. */
 
 import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
 import { sliderControls } from './slider.js';
@@ -200,7 +200,7 @@ function option(type, name, value, label, changed) {
  * @returns {Controls}
  */
 function number({ low, high, whole, unit }, words, id, changed) {
-  // Text, so that what is no number is told, and no wheel of a mouse changes it.
+  // A text field, so that non-numbers are reported and the mouse wheel does not change the value.
   const input = element('input', { id, type: 'text', inputmode: whole && low >= 0 ? 'numeric'
     : 'decimal', autocomplete: 'off', class: 'number', on: { input: changed } });
   const given = () => input.value.trim().replace(',', '.');
@@ -250,7 +250,7 @@ function text({ longest }, words, id, changed) {
       input.value = typeof answer === 'string' ? answer : '';
     },
     refusal: () => {
-      // As the server counts: an emoji is one character.
+      // Count as the server does: an emoji is one character.
       const count = [...input.value].length;
       return count <= longest ? '' : words.of('text_long', { longest, count });
     },

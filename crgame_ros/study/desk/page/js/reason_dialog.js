@@ -5,11 +5,11 @@
 import { element } from '../../../../cockpit/page/js/dom.js';
 
 /**
- * Ask.
+ * Show the dialog and return the reason.
  *
  * @param {string} title
  * @param {string} text
- * @param {string} yes on the button that goes on
+ * @param {string} yes text of the button that confirms
  * @param {boolean} [reasoned] whether a reason is asked for
  * @returns {Promise<string|null>} the reason, empty where none is asked for; null for no
  */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** A line on which nothing is marked before the person does. */
+/** A line without a mark until the participant sets one. */
 
 import { element, setAttribute } from '../../../../cockpit/page/js/dom.js';
 
@@ -9,7 +9,7 @@ import { element, setAttribute } from '../../../../cockpit/page/js/dom.js';
 /** @import { Words } from './words.js' */
 
 /**
- * Make the controls of such a question.
+ * Build the controls of a slider question.
  *
  * @param {SliderQuestion} question
  * @param {Words} words
@@ -31,8 +31,8 @@ export function sliderControls({ low, high, step, left, right }, words, id, chan
     changed();
   };
   input.addEventListener('input', mark);
-  // A click at the very middle changes no value, and yet it is an answer; so are these keys.
-  // A finger's tap there is no click.
+  // A click in the exact middle does not change the value but is an answer, as are these keys.
+  // A finger's tap there causes no click event.
   for (const kind of ['click', 'pointerup']) {
     input.addEventListener(kind, () => {
       if (!marked) {

@@ -15,10 +15,10 @@ export class Words {
   }
 
   /**
-   * Give a text.
+   * Return a text.
    *
    * @param {string} key
-   * @param {Record<string, string|number>} [values] for what stands in braces
+   * @param {Record<string, string|number>} [values] for the placeholders in braces
    * @returns {string}
    */
   of(key, values = {}) {
