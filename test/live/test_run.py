@@ -111,22 +111,27 @@ def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> No
     with BagReader(finished.out / 'bag') as reader:
         told = {status.name for item in reader.decoded(['/diagnostics'])
                 for status in item.message.status}
-    first = int(live[0, 1])
-    assert sorted(set(live[:, 1].tolist())) == list(range(first, STEPS + 1, STEPS_PER_TICK))
+    first, last = int(live[0, 1]), int(live[-1, 1])
+    # Without a gap; how soon it begins and how far it gets is a matter of the machine.
+    assert sorted(set(live[:, 1].tolist())) == list(range(first, last + 1, STEPS_PER_TICK))
     assert np.isfinite(live[:, COLUMNS.index('min_distance')]).all()
     blocks: list[NDArray[np.float64]] = []
     log = read_trajectories(finished.out / 'bag')
     measure_log(log, on_tick=lambda it: blocks.append(criticality_rows(it, 0, it.n)))
     again = np.concatenate(blocks)
     # Others' accelerations, differences from step to step, are known from its second step on.
-    assert np.array_equal(live[live[:, 1] > first], again[again[:, 1] > first], equal_nan=True)
+    compared = (again[:, 1] > first) & (again[:, 1] <= last)
+    assert last > first and again[-1, 1] == STEPS
+    assert np.array_equal(live[live[:, 1] > first], again[compared], equal_nan=True)
     assert {'criticality_node: hv0', 'criticality_node: av0'} <= told
 
 
 @pytest.mark.clock
 def test_criticality_begins_within_a_second(finished: Launcher) -> None:
     """Its subscriptions know the simulation by then; none waits for it, as for planners."""
-    assert live_criticality(finished)[0, 1] <= 1.0 / DT_S
+    live = live_criticality(finished)
+    assert live[0, 1] <= 1.0 / DT_S
+    assert live[-1, 1] == STEPS
 
 
 @pytest.mark.exhaustive

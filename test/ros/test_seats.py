@@ -166,7 +166,7 @@ def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
     class Flood:
         """A slot that is never empty."""
 
-        def take(self) -> object:
+        def pop(self) -> object:
             """Return another command."""
             nonlocal asked
             asked += 1

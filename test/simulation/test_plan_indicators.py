@@ -96,7 +96,7 @@ def test_avs_are_looked_at_one_by_one_each_half_second(
         driven=False, uses_no_plan=False, state=av.state, setup=av,
         plan_age_steps=lambda n: 1, planned_state=lambda n: None) for av in setup.avs]
     looks: dict[PlanIndicator, list[int]] = {}
-    monkeypatch.setattr(PlanIndicator, 'take', lambda self, poses: looks.setdefault(
+    monkeypatch.setattr(PlanIndicator, 'update', lambda self, poses: looks.setdefault(
         self, []).append(n))
     indicators = PlanIndicators(setup)
     for n in range(1, round(10.0 * rate_hz) + 1):

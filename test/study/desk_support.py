@@ -126,7 +126,7 @@ class DrivesWithoutGraph:
             self._to(DrivePhase.COUNTDOWN, attempt=attempt, time_s=0.0)
             asyncio.get_running_loop().call_later(self.step_s, self._drive)
 
-    def tell(self, kind: str, text: str) -> None:
+    def record(self, kind: str, text: str) -> None:
         """Nothing is recorded here."""
 
     def abort(self, reason: str) -> None:
