@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
     add('--humans', type=int, default=1, metavar='N', help='seats for people (default: 1)')
     add('--driver', default='cockpit', metavar='SOURCE',
-        help='who drives each of them (default: cockpit, somebody at a page)')
+        help='the driver of each (default: cockpit, a person at a page)')
     add('--at', choices=('lanes', 'problems'), default='lanes',
         help='where they start (default: lanes)')
     add('--planner', metavar='NAME', help='planner of the AVs')

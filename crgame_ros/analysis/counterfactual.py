@@ -115,7 +115,7 @@ def _drive_inputs(setup: Setup, latency_steps: int,
                   inputs: RecordedInputs | None) -> OfflineResult:
     drivers, intervals_s = inputs or recorded_inputs(setup)
     if intervals_s is None:
-        raise InputError('nobody in it is driven by a recording', 'driver', 'give replay:BAG')
+        raise InputError('no vehicle in it is driven by a recording', 'driver', 'give replay:BAG')
     return run_offline(setup, duration_s=len(intervals_s) * setup.scheduler.dt_s,
                        latency_steps=latency_steps, drivers=drivers, intervals_s=intervals_s,
                        clock_s=time.perf_counter)

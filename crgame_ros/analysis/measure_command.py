@@ -86,7 +86,7 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
             yield (f'  {name:<13}{worst["value"]:9.2f} {worst["unit"]:<6} {worst["of"]} at '
                    f'{worst["time_s"]:.1f} s{CRITICAL if critical else ""}')
         if not near:
-            yield '  nobody was near'
+            yield '  no other was near'
         yield (f'  tet          {vehicle["tet_s"]:9.2f} s      with a ttc below '
                f'{limits["ttc_s"]:g} s')
         yield f'  tit          {vehicle["tit_s2"]:9.2f} s^2    what it was below that, over time'

@@ -104,7 +104,7 @@ class JobProcess:
         try:
             while not (await asyncio.wait([exchange], timeout=LOOK_S))[0]:
                 if unwanted():
-                    raise CrgameError('nobody waits for it any more')
+                    raise CrgameError('its client has gone')
             return exchange.result()
         finally:
             exchange.cancel()

@@ -163,7 +163,7 @@ class MessageFrames:
             return None
         numbers = rows[:, 2:4]
         if not ((numbers >= 0) & (numbers < len(self.columns))).all() or rows[0, 1] < 0:
-            raise InputError('names somebody who takes no part', CRITICALITY_TOPIC)
+            raise InputError('names a vehicle that is not in the game', CRITICALITY_TOPIC)
         return Frame('criticality', frames.encode_criticality(
             *self.place(int(rows[0, 1])), most_critical_rows(rows)))
 

@@ -251,7 +251,7 @@ def _id(message: Mapping[str, Any]) -> int:
 def _matching(message: Mapping[str, Any], field: str, pattern: re.Pattern[str]) -> str:
     value = message.get(field)
     if not isinstance(value, str) or pattern.fullmatch(value) is None:
-        raise _wrong(field, 'names nobody')
+        raise _wrong(field, 'names no client')
     return value
 
 

@@ -61,7 +61,7 @@ class Rights:
             # A driver may say that they are ready: who asks more is refused where it is known.
             return ''
         if kind == 'runs' and not (self.directs or self.drives):
-            return f'only who drives or directs can look at past runs; you are a {self.role}'
+            return f'only a driver or a director can look at past runs; you are a {self.role}'
         if kind in (*_DIRECTS, 'load', 'invite', 'delete') and not self.directs:
             return f'only a director can {deed}; you are a {self.role}'
         if kind in _DRIVES and not self.drives:

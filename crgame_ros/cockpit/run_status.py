@@ -124,7 +124,7 @@ class RunStatus:
                 fallbacks=_number(values.get('fallbacks')))
         elif node == 'sim_node' and rest == 'seat':
             self.seats_lost[vehicle] = level != OK
-            self._alarm('lost_device', vehicle, level != OK, 'nobody drives', t)
+            self._alarm('lost_device', vehicle, level != OK, 'not driven', t)
         elif node == 'criticality_node':
             self.criticality[vehicle] = _criticality(level, values)
         elif node == 'driver_node' and rest == 'driver':

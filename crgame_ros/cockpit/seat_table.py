@@ -107,7 +107,7 @@ class SeatTable:
         self._known(seat)
         holder = self.held.get(seat)
         if holder is not None and holder.holder != client:
-            raise InputError(f'{names.get(holder.holder, "somebody")} has the seat', seat,
+            raise InputError(f'{names.get(holder.holder, "another person")} has the seat', seat,
                              'ask for it')
         if holder is None:
             self._check_tenant(seat, person, may_displace, now_s)
@@ -118,7 +118,7 @@ class SeatTable:
         tenant = self.tenants.get(seat)
         if tenant is None or tenant.person.id == person or self.seats[seat]['source'] != COCKPIT:
             return
-        name = tenant.person.name or 'somebody'
+        name = tenant.person.name or 'another person'
         if seat not in self.absent_s:
             raise InputError(f'{name} drives in another cockpit', seat, 'ask them')
         left_s = self.kept_for(seat, now_s)
@@ -138,9 +138,9 @@ class SeatTable:
         entry = self._known(seat)
         holder = self.held.get(seat)
         if holder is not None and holder.holder != client:
-            raise InputError('somebody else has the seat', seat, 'ask for it')
+            raise InputError('another person has the seat', seat, 'ask for it')
         if holder is None and entry.get('source') != COCKPIT:
-            raise InputError('nobody here has the seat', seat)
+            raise InputError('no person at this cockpit has the seat', seat)
         if holder is None and seat in self.tenants and seat not in self.absent_s:
             raise InputError(f'{self.tenants[seat].person.name} drives in another cockpit', seat)
         return self.held.pop(seat, None)

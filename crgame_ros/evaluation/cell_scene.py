@@ -99,7 +99,8 @@ def scene_of_run(path: Path, store: ContentStore) -> CellScene:
     bag = recording_in(path)
     recorded = read_recorded_game(bag, other_planners=True)
     if not recorded.game.humans:
-        raise InputError('nobody drove in it', str(path), 'name its game or scenario instead')
+        raise InputError('no vehicle was driven in it', str(path),
+                         'name its game or scenario instead')
     inputs = replay_inputs(bag)
     game = with_recorded_events(recorded.game, read_run_events(bag).fired)
     humans = tuple(replace(human, driver='idle') for human in game.humans)

@@ -111,7 +111,7 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('game', nargs='?', type=Path, metavar='GAME.yaml', help='game file (scenarios/*.yaml)')
     add('--scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
     add('--driver', action='append', default=[], metavar='[hvN=]SOURCE', dest='drivers',
-        help="who drives the first human's vehicle, or that of hvN; may be given again")
+        help="driver of the first human's vehicle, or that of hvN; may be given again")
     add('--planner', action='append', default=[], metavar='NAME', dest='planners',
         help='planner of the AVs; give it again for the next AV')
     add('--problem', action='append', type=int, default=[], metavar='ID', dest='problems',
@@ -127,8 +127,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--port', type=_port, default=8080, metavar='P',
         help='port of the page (default: 8080, or the next free one)')
     add('--listen', metavar='ADDRESS',
-        help='serve the page to other machines too, for instance on 0.0.0.0; who comes needs the '
-        'token in the printed address')
+        help='serve the page to other machines too, for instance on 0.0.0.0; each browser needs '
+        'the token in the printed address')
     add('--token', action='store_true',
         help='ask for the token in the printed address on this machine too, where others work on '
         'it')
@@ -147,8 +147,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--countdown', type=_countdown, default=3.0, metavar='S', dest='countdown_s',
         help='seconds from when all drivers at pages are ready to the start (default: 3)')
     add('--start-paused', action='store_true',
-        help='begin nothing until somebody starts it in the page or by /sim/start, neither this '
-        'game nor those chosen later (default: only who drives in the page is waited for)')
+        help='begin nothing until it is started in the page or by /sim/start, neither this '
+        'game nor those chosen later (default: only drivers in the page are waited for)')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--namespace', type=_namespace, default='/', metavar='/NAME',

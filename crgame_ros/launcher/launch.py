@@ -86,7 +86,7 @@ def announce(plan: RunPlan) -> None:
     planners = ', '.join(f'{av.id} planned by {av.spec.planner}' for av in setup.avs)
     print_now(f'{setup.game.title or setup.loaded.benchmark_id}: '
               + ('; '.join(text for text in (drivers, planners) if text)
-                 or 'nobody drives, traffic is alone'))
+                 or 'no driven vehicle, only traffic'))
     for notice in setup.notices:
         print_now(f'note: {notice}')
     reach = 'open network' if network_is_open() else 'this machine only'

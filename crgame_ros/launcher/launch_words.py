@@ -27,7 +27,7 @@ class LaunchArgument(NamedTuple):
 LAUNCH_ARGUMENTS = {
     'game': LaunchArgument('', 'game file; the cut-in game if it is empty'),
     'scenario': LaunchArgument('--scenario', "CommonRoad file instead of the game's"),
-    'driver': LaunchArgument('--driver', "who drives the first human's vehicle"),
+    'driver': LaunchArgument('--driver', "driver of the first human's vehicle"),
     'planners': LaunchArgument('--planner', 'planners of the AVs, separated by commas; one '
                                'serves all'),
     'duration': LaunchArgument('--duration', "simulated seconds; the game's if it is empty"),

@@ -220,7 +220,7 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
 def _check_run(request: RunRequest, setup: Setup) -> None:
     recorded_inputs(setup)
     if request.headless and any(human.driver == COCKPIT for human in setup.humans):
-        raise InputError('nobody can take a seat in the browser', '--headless',
+        raise InputError('there is no page in which to take a seat', '--headless',
                          'leave it out, or name another driver')
     for av in setup.avs:
         _check_planner(av.spec)

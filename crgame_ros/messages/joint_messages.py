@@ -99,8 +99,8 @@ class JointReader:
                                      'name the joints as msg_defs/interfaces.yaml has them')
             if len(place) > len(self._wanted):
                 other = next(name for name in key if name not in self._wanted)
-                raise InputError(f'names the joint {other[:60]} of somebody who takes no part',
-                                 self._where)
+                raise InputError(f'names the joint {other[:60]} of a vehicle that is not in '
+                                 'the game', self._where)
             # What runs send never differs; others may send what they like.
             self._orders = {key: [place[name] for name in self._wanted]}
         return self._orders[key]

@@ -74,8 +74,8 @@ class ProblemWriter:
         self.humans = (*(item.id for item in log.vehicles if item.role is Role.HUMAN),
                        *self._played)
         if unused := sorted(self._known.keys() - set(numbers.values())):
-            notices.append('nobody drove planning problem '
-                           f'{", ".join(map(str, unused))}: left out')
+            notices.append('not driven and left out: planning problem '
+                           f'{", ".join(map(str, unused))}')
 
     def text(self, rows: NDArray[np.float64]) -> str:
         """
@@ -95,8 +95,8 @@ class ProblemWriter:
         parts += [self._write(name, _initial_row(self._known[number]), self._goals(number, name))
                   for name, number in self._idle.items()]
         if _NOBODY in self.ids:
-            self._notices.append('nobody drove, and the scenario has no planning problem: the '
-                                 'file gets one that every state meets')
+            self._notices.append('no vehicle was driven and the scenario has no planning problem: '
+                                 'a placeholder, whose goal every state meets, is written')
             goal = goal_state((0, len(self._log.ks) - 1), '')
             parts.append(self._write(_NOBODY, self._road_start(), [goal]))
         return ''.join(parts)

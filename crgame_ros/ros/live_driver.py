@@ -56,7 +56,7 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
         return IdleDriver()
     device = open_evdev(source.argument)
     if source.kind == 'auto' and device.problem is not None:
-        say(f'{vehicle_id}: nobody drives: {device.problem}')
+        say(f'{vehicle_id}: not driven: {device.problem}')
         device.close()
         return IdleDriver()
     # A device that is named may be plugged in later: until then the seat's watchdog stops the car.

@@ -88,5 +88,5 @@ class GameAwaited:
             return
         self._told = True
         self._node.get_logger().warning(
-            f'a run is heard of, but nobody publishes its /scenario/game: {self._what}; a '
+            f'a run is heard, but its /scenario/game is not published: {self._what}; a '
             'recording tells it at its beginning (play it without --start-offset)')

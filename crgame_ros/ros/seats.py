@@ -225,7 +225,7 @@ class Seats:
         sits = None if seat.tenant is None else seat.tenant.person
         taker = demand.person
         if sits is not None and (taker is None or sits.id not in (taker.id, demand.displaced)):
-            raise InputError(f'{sits.name or "somebody"} has {seat.id}', ORDER_TOPIC,
+            raise InputError(f'{sits.name or "another person"} has {seat.id}', ORDER_TOPIC,
                              'ask for it')
         if seat.source != COCKPIT:
             self._assign(seat, COCKPIT, now_ns)
@@ -238,7 +238,7 @@ class Seats:
         """Take what is said of the person in a seat."""
         tenant = seat.tenant
         if tenant is None:
-            raise InputError(f'nobody has {seat.id}', ORDER_TOPIC, 'claim it')
+            raise InputError(f'no person has {seat.id}', ORDER_TOPIC, 'claim it')
         if demand.left is not None and demand.left == tenant.person.id:
             self._settle(seat, replace(tenant, here=False, ready=False))
         elif demand.person is not None and demand.person.id == tenant.person.id:

@@ -90,8 +90,8 @@ def _free_problems(named: list[Part],
         if number in taken:
             continue
         if number in loaded.human_problems:
-            notices.append(f'planning problem {number} was that of a human, who plays back as '
-                           f'obstacle {loaded.human_problems[number]}')
+            notices.append(f'planning problem {number} belonged to a recorded human, now replayed '
+                           f'as obstacle {loaded.human_problems[number]}: no AV gets it')
             continue
         rival = next((other for other in (*taken.values(), *free)
                       if _on_one_spot(problem, other)), None)

@@ -54,8 +54,8 @@ class Contact:
     def verdict(self) -> str:
         """Return which participants could have avoided it, as text."""
         if self.n == 0:
-            return 'nobody: they touch from the start'
-        able = ' or '.join(self.avoidable_by) or 'nobody by braking'
+            return 'not avoidable: they touch from the start'
+        able = ' or '.join(self.avoidable_by) or 'not avoidable by braking'
         if self.other_id in self.avoidable_by and self.other_role in _DO_NOT_REACT:
             able += f' ({self.other_role.value}: does not react)'
         return able

@@ -237,7 +237,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     check_changes(game, loaded.source, () if setup.traffic is None else [
         item.id for item in setup.traffic.descriptions])
     if not setup.descriptions:
-        raise InputError('nobody takes part: no human, no planning problem, no traffic and no '
+        raise InputError('the game is empty: no human, no planning problem, no traffic and no '
                          'obstacle', loaded.source, 'add one of them to the game')
     refuse_unwritable(loaded, setup.obstacles.descriptions,
                       [av.planning_problem.planning_problem_id for av in avs])

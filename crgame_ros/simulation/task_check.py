@@ -31,7 +31,7 @@ def check_tasks(tasks: Sequence[TaskSpec], events: Sequence[EventSpec], where: s
             raise InputError('an event of the game has the same name', place, 'rename one of them')
         if not vehicles or task_seat(spec, vehicles) not in vehicles:
             raise InputError(f'there is no vehicle "{spec.seat}"' if spec.seat
-                             else 'nobody drives in this game', place, _listed(vehicles))
+                             else 'the game has no driven vehicle', place, _listed(vehicles))
         for condition in (spec.when, spec.until):
             named: Sequence[str] = ()
             if isinstance(condition, OnEvent):

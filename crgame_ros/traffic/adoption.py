@@ -11,9 +11,9 @@ import numpy as np
 
 ADOPTED_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'taxi',
                            'priorityVehicle'})
-# Whoever covers less than this in the whole recording is parked [m].
+# An obstacle that covers less than this in the whole recording is parked [m].
 PARKED = 2.0
-# Who points elsewhere than its lane by more than this does not drive on it [rad].
+# An obstacle whose heading differs from its lane's by more than this is not driving on it [rad].
 ASTRAY = 0.8
 
 
@@ -38,8 +38,8 @@ def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNe
     """
     Return whether a recorded obstacle can become an agent.
 
-    Vehicles and cyclists that move and at some time drive along a lane for cars can;
-    pedestrians, parked and static ones cannot.
+    Vehicles and cyclists can if they move and drive along a lane for cars at some time.
+    Pedestrians, parked and static obstacles cannot.
 
     :param poses: (n, 3) of its centre over the recording; NaN where absent [m, rad]
     """
@@ -54,7 +54,7 @@ def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNe
 
 
 def fits(network: RoadNetwork, lane: int, pose: FloatArray) -> bool:
-    """Return whether a pose is that of somebody who drives along a lane for cars."""
+    """Return whether a pose is that of a vehicle that drives along a lane for cars."""
     lanelet = network.lanelet_ids[lane]
     if not network.is_for_cars(lanelet):
         return False

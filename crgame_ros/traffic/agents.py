@@ -13,21 +13,22 @@ from crgame_ros.traffic.lane_table import FloatArray, IntArray
 import numpy as np
 from numpy.typing import NDArray
 
-# Share of its length by which a vehicle's axles are apart, and its rear axle from its centre.
+# The wheelbase, and the distance from rear axle to centre, as shares of a vehicle's length.
 WHEELBASE = 0.6
 REAR_TO_CENTER = 0.3
 BoolArray = NDArray[np.bool_]
 
 NOBODY = -1
-# Waits for nobody; others are -1 and below.
+# The agent has no leader, or no blocker; -1 and below are other objects.
 FREE = -2**62
-# What vehicles of a type are allowed at most wherever, in Germany [m/s]; bicycles: what they do.
+# The highest speed allowed for a type of vehicle on any road in Germany; for bicycles and
+# pedestrians their usual speed [m/s].
 TOP_SPEED = {'truck': 80.0 / 3.6, 'bus': 100.0 / 3.6, 'bicycle': 5.5, 'pedestrian': 1.4}
 
 
 class AgentTable:
     """
-    What is known of agents (A), each in a slot of its own.
+    The state of agents (A), each in a slot of its own.
 
     :param length, width: [m]
     :param wheelbase: [m]; `rear_to_center` from the rear axle to the centre [m].
@@ -38,24 +39,26 @@ class AgentTable:
     :param destination: row of `Routes`.
     :param factor: desired speed over speed limit; `top` its own limit, of its type [m/s].
     :param aggressivity: 0 to 1, of the driver (Hidas 2005).
-    :param source: lane that it is leaving, or -1; from_s: where in its lane that began [m];
-        curve (A, 6): polynomial of the change (FS 4); span: its length [m].
-    :param calm_until: tick before which it does not think of changing lanes again;
+    :param source: lane that it is leaving, or -1; from_s: s in its new lane where the change
+        began [m]; curve (A, 6): polynomial of the change (FS 4); span: its length [m].
+    :param calm_until: tick before which it does not consider another lane change;
         `content_until` the same for changes for speed alone.
     :param waits: ticks for which it has been standing.
-    :param grant: tick at which it was let into a junction, or -1; until: the lane with which that
-        one ends; grant_left: how far away that is; grant_hold: where one waits before it [m].
-    :param before: tick at which it was let into what it is in, while it has been let into the next
-        junction as well, or -1; before_until: the lane with which that ends.
+    :param grant: tick at which it was let into a junction, or -1; until: last lane of that
+        junction; grant_left: distance to the junction's end [m]; grant_hold: distance to the
+        place to wait before it [m].
+    :param before: tick at which it was let into the junction that it is in, while it has been let
+        into the next one as well, or -1; before_until: last lane of the junction that it is in.
     :param previous: lane before its present one, or -1.
     :param side: 1 while it changes to the left, -1 to the right.
     :param relief: how much of its desired gap it forgoes for now [m].
     :param free_at: tick from which an empty slot may be taken.
-    :param leader: who is next ahead, -1 - n for the n-th of the others, or `FREE`.
+    :param leader: the agent next ahead, -1 - n for the n-th of the others, or `FREE`.
     :param blocker: the agent that it waits for, -1 - n for the n-th of the others, or `FREE`.
-    :param insists_until: tick until which it goes first, having been found in a circle.
-    :param late: whether it sees late that it has to yield; sees: whether it has, at the junction
-        that comes next.
+    :param insists_until: tick until which it goes first, after it was chosen to open a circle of
+        agents that wait for each other.
+    :param late: whether it notices late that it has to yield; sees: whether it has noticed at the
+        next junction.
     :param stops: whether it has decided to halt at a light ahead.
     """
 
@@ -104,12 +107,12 @@ class AgentTable:
 
 
 def empty_table(count: int) -> AgentTable:
-    """Make a table of agents that are not there: one structured array, a record per agent."""
+    """Return a table of absent agents: one structured array, a record per agent."""
     kinds: dict[Any, str] = {FloatArray: 'f8', IntArray: 'i8', BoolArray: '?'}
     table = np.zeros(count, dtype=[
         (name, kinds[kind], 6) if name == 'curve' else (name, kinds[kind])
         for name, kind in AgentTable.__annotations__.items()])
-    # Columns are attributes of records in compiled code, and of no interest elsewhere.
+    # Compiled code reads the columns as attributes of records; other code does not need them.
     return cast(AgentTable, table)
 
 
@@ -152,12 +155,12 @@ def states_of(agents: AgentTable) -> tuple[FloatArray, FloatArray]:
 
 class Agents(AgentTable):
     """
-    The agents (A): who may be on the road; each has a slot of its own.
+    The agents (A) that may be on the road, each in a slot of its own.
 
-    :param descriptions: what each looks like.
+    :param descriptions: type and shape of each agent.
 
-    The columns of `table` are attributes, and so are `type_top` (A), the first `top`, and `share`
-    (A), the desired speed over that of an average driver.
+    The columns of `table` are attributes. Further attributes are `type_top` (A), the first `top`,
+    and `share` (A), the desired speed over that of an average driver.
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
@@ -214,6 +217,6 @@ class Agents(AgentTable):
             none[slot] = NOBODY
 
     def remove(self, slots: IntArray, k: int) -> None:
-        """Take agents off the road; their slots are free again after a tick of absence."""
+        """Remove agents from the road; their slots are free again after a tick of absence."""
         self.active[slots] = False
         self.free_at[slots] = k + 2

@@ -21,21 +21,21 @@ START = 0.2
 # The guard begins at this share of the hardest deceleration and demands all of it at 1: steady
 # following needs less, and so do the gaps that are short by agreement after a lane change.
 GUARD_SHARE = 0.8
-# What the guard leaves between bumpers, as a share of the gap at standstill.
+# The gap that the guard leaves between bumpers, as a share of the gap at standstill.
 GUARD_GAP = 0.5
 LEAST_ROOM = 0.01
-# While a leader is known not to brake harder than this the guard asks for no more than that, or
-# what is needed [m/s^2].
+# While a leader is known not to brake harder than BRAKES_HARD, the guard demands no more than
+# GUARD_DECELERATION or the needed deceleration, whichever is greater [m/s^2].
 BRAKES_HARD, GUARD_DECELERATION = -2.0, 3.0
-# What is needed is braked with at once and a little harder, so that less is needed then.
+# Agents brake a little harder than needed at once, so that less is needed later.
 FORESIGHT = 1.05
-# Behind what is slower, far ahead, nobody brakes harder than this, or than it takes [m/s^2].
+# Behind a slower leader far ahead, an agent brakes no harder than this, or than needed [m/s^2].
 PATIENT = 3.5
 
 
 @compiled
 def _spared_of(relief: float, desired_gap: float, gap: float, standstill_gap: float) -> float:
-    """Return what of a relief counts: nearer than the gap at standstill nobody is patient [m]."""
+    """Return the part of a relief that counts: it fades below the gap at standstill [m]."""
     patience = min(max(2.0 * gap / standstill_gap - 1.0, 0.0), 1.0)
     return min(relief, max(desired_gap - gap, 0.0)) * patience
 
@@ -49,11 +49,11 @@ def _spared(relief: float, desired_gap: float, gap: float, standstill_gap: float
 def _guard_of(speed: float, gap: float, lead_speed: float, standstill_gap: float,
               hardest: float) -> float:
     """
-    Return the braking without which it would soon be too late, whatever the law wants [m/s^2].
+    Return the braking that avoids contact in an emergency, whatever the law wants [m/s^2].
 
     Behind a leader that brakes its hardest, b_max, to a stop, constant braking with
     v^2 / (2 (gap - s0 / 2 + v_leader^2 / (2 b_max))) just avoids contact, as in Gipps (1981).
-    What is demanded rises from 0 where that is 0.8 b_max to b_max where it is b_max.
+    The demand rises from 0 where that is 0.8 b_max to b_max where it is b_max.
     """
     stopping = gap - GUARD_GAP * standstill_gap + max(lead_speed, 0.0)**2 / (2.0 * hardest)
     share = speed**2 / (2.0 * hardest * max(stopping, LEAST_ROOM))
@@ -64,10 +64,10 @@ def _guard_of(speed: float, gap: float, lead_speed: float, standstill_gap: float
 def needed_deceleration(speed: float, room: float, lead_speed: float,
                         lead_acceleration: float) -> float:
     """
-    Return the constant braking that just avoids contact, if the leader goes on as it does.
+    Return the constant braking that just avoids contact if the leader keeps its acceleration.
 
-    :param room: that may be used up [m]
-    :param lead_acceleration: where it brakes, it may do so to a stop [m/s^2]
+    :param room: distance that may be used up [m]
+    :param lead_acceleration: a leader that brakes may do so to a stop [m/s^2]
     :return: 0 or above [m/s^2]
     """
     room, lead_speed = max(room, LEAST_ROOM), max(lead_speed, 0.0)
@@ -81,7 +81,7 @@ def needed_deceleration(speed: float, room: float, lead_speed: float,
 def _limited_of(wanted: float, speed: float, gap: float, lead_speed: float,
                 lead_acceleration: float, patience: float, standstill_gap: float, most: float,
                 hardest: float) -> float:
-    """Limit what a law wants, and brake as hard as the guard demands."""
+    """Return the acceleration that a law wants, limited, with the braking of the guard."""
     guard = _guard_of(speed, gap, lead_speed, standstill_gap, hardest)
     if lead_acceleration > BRAKES_HARD:
         demanded = FORESIGHT * needed_deceleration(
@@ -107,8 +107,8 @@ class CarFollowing(ABC):
     """
     A law for the acceleration of an agent behind its leader.
 
-    The law proper is a subclass's `follow`. This class adds what every one of them needs to share
-    a road with people: limits, an emergency guard and a standstill that doesn't creep.
+    The law itself is a subclass's `follow`. This class adds what each law needs on a road with
+    people: limits, an emergency guard and a standstill that doesn't creep.
 
     :param standstill_gap: gap behind a standing leader s0, bumper to bumper [m]
     :param max_acceleration: of a driver in no hurry [m/s^2]
@@ -141,17 +141,17 @@ class CarFollowing(ABC):
         """
         Return the acceleration for the next decision interval.
 
-        A mover integrates it with v = max(0, v + a dt): a standing agent that should wait is held
-        by a negative value.
+        It is integrated with v = max(0, v + a dt): a negative value holds a standing agent that
+        should wait.
 
         :param speed: (A,) of the agents, at least 0 [m/s]
         :param desired_speed: (A,) on a free road [m/s]
         :param gap: (A,) to the leader, bumper to bumper; inf where there is none [m]
         :param lead_speed: (A,) of the leader along the lane; any value where there is none [m/s]
-        :param relief: (A,) by how much the desired gap may be missed for now (`courtesy`); the
-            guard against collisions looks at the true gap [m]
-        :param lead_acceleration: (A,) of the leader; without it, it may brake its hardest at any
-            moment [m/s^2]
+        :param relief: (A,) by how much the gap may fall short of the desired one for now
+            (`courtesy`); the guard against collisions uses the true gap [m]
+        :param lead_acceleration: (A,) of the leader; by default the leader may brake its hardest
+            at any moment [m/s^2]
         :return: (A,) [m/s^2]
         """
         lead_speed = np.where(np.isposinf(gap), speed, lead_speed)
@@ -163,7 +163,7 @@ class CarFollowing(ABC):
 
     def patience(self, speed: Array, gap: Array) -> Array:
         """
-        Return how hard the law may brake where physics asks for less [m/s^2].
+        Return how hard the law may brake where less braking is needed [m/s^2].
 
         :param gap: to a leader that is known not to brake hard [m]
         """
@@ -174,7 +174,7 @@ class CarFollowing(ABC):
 def _cruise_of(speed: float, desired: float, gap: float, lead_speed: float, time_gap: float,
                h: float, gain: float, standstill_gap: float, comfortable: float,
                speed_time: float) -> float:
-    """FS 3 with timely braking, or the approach to the desired speed if that is less."""
+    """Return FS 3 with timely braking, or the approach to the desired speed if that is less."""
     error = standstill_gap + time_gap * speed - gap
     following = -(speed - lead_speed + gain * error) / h
     room = max(gap - standstill_gap, 0.5 * standstill_gap)
@@ -197,7 +197,7 @@ def _cruise_behind(speed: float, desired: float, gap: float, lead_speed: float, 
                    lead_acceleration: float, time_gap: float, h: float, gain: float,
                    standstill_gap: float, comfortable: float, speed_time: float, most: float,
                    hardest: float) -> float:
-    """Do what `CarFollowing.acceleration` does with this law, in one loop."""
+    """Return the result of `CarFollowing.acceleration` with this law, computed in one loop."""
     if gap == math.inf:
         lead_speed = speed
     spared = gap + _spared_of(relief, standstill_gap + time_gap * speed, gap, standstill_gap)
@@ -210,7 +210,7 @@ def _cruise_behind(speed: float, desired: float, gap: float, lead_speed: float, 
 
 class AdaptiveCruise(CarFollowing):
     """
-    Keep a constant time gap (FS 3; Rajamani 2011, chapter 6).
+    The law of a constant time gap (FS 3; Rajamani 2011, chapter 6).
 
     S_desired = l_lead + T v, S_actual = x_lead - x_host, delta = S_desired - S_actual,
     a = -(1 / h) (-dS_actual/dt + lambda delta). Taken between centres, l_lead is their distance
@@ -220,20 +220,20 @@ class AdaptiveCruise(CarFollowing):
 
     A vehicle answers its leader's motion with (s + lambda) / (h s^2 + (1 + lambda T) s + lambda).
     Its gain is nowhere above 1, and a platoon string stable, if and only if
-    h <= T + lambda T^2 / 2. With h = T, the default, it is 1 / (T s + 1): no overshoot either,
-    the speed of a follower is a plain average of its leader's.
+    h <= T + lambda T^2 / 2. With h = T, the default, it is 1 / (T s + 1): there is no overshoot
+    either, and the speed of a follower is a plain average of its leader's.
 
-    FS 3 brakes late and hard for what is much slower: v / T and lambda alone say when. Here an
-    agent begins as soon as it takes its comfortable deceleration all the way,
-    (v - v_leader)^2 / (2 (gap - s0)), and keeps to that (ours); a platoon never comes near it.
+    FS 3 brakes late and hard for a much slower leader, because only v / T and lambda decide when.
+    Here an agent begins as soon as the constant deceleration (v - v_leader)^2 / (2 (gap - s0))
+    reaches its comfortable one, and keeps to that (ours). A platoon never comes near it.
 
     :param time_gap: T; drivers keep 1 to 2 s, the usual advice is at least 1.5 s (ours) [s]
     :param h: None is T [s]
-    :param gain: lambda, with which spacing errors decay (ours) [1/s]
-    :param standstill_gap: s0, as Treiber et al. (2000) have it [m]
+    :param gain: lambda, the rate at which spacing errors decay (ours) [1/s]
+    :param standstill_gap: s0, as in Treiber et al. (2000) [m]
     :param max_acceleration: [m/s^2]
-    :param comfortable_deceleration: with which an excess of speed is shed, and braking for what is
-        slower begins (ours) [m/s^2]
+    :param comfortable_deceleration: used to slow down to the desired speed, and from which braking
+        for a slower leader begins (ours) [m/s^2]
     :param max_deceleration: [m/s^2]
     :param speed_time: time constant of approaching the desired speed (ours) [s]
     """
@@ -275,9 +275,9 @@ class AdaptiveCruise(CarFollowing):
 
     def patience(self, speed: Array, gap: Array) -> Array:
         """
-        Return what the missing distance alone asks for.
+        Return the braking for the missing distance alone, but at least `PATIENT`.
 
-        The difference of speeds, v / h in FS 3, makes nobody brake harder than it takes.
+        The difference of speeds, which FS 3 divides by h, makes no agent brake harder than needed.
         """
         missing = self.desired_gap(speed) - gap
         return np.asarray(np.maximum(PATIENT, self.gain * missing / self.h))
@@ -289,7 +289,7 @@ class AdaptiveCruise(CarFollowing):
 
 class IntelligentDriver(CarFollowing):
     """
-    Follow with the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000).
+    The Intelligent Driver Model (Treiber, Hennecke and Helbing 2000).
 
     The defaults are those of the planner of the same name; the paper has T = 1.6 s, a = 0.73 and
     b = 1.67 m/s^2 on a motorway.

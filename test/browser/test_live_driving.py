@@ -84,7 +84,7 @@ def test_the_run_waits_for_a_person_and_shows_what_will_be_driven(only_page: Liv
     page.wait_for_run('paused')
     x, y, yaw, speed = page.vehicle(0)[:4]
     assert (x, y, abs(yaw), speed) == pytest.approx((560.0, 1.75, np.pi, 0.0), abs=1e-6)
-    assert 'Waits for somebody' in page.text('li[data-seat="hv0"]')
+    assert 'Waits for a driver' in page.text('li[data-seat="hv0"]')
     page.claim('hv0')
     assert 'You drive' in page.text('li[data-seat="hv0"]')
     page.order('start')

@@ -131,10 +131,10 @@ def test_an_order_in_vain_is_not_repeated() -> None:
 def test_release_gives_back(table: SeatTable) -> None:
     """By the holder; of a seat that was left, by anybody; never of somebody else's."""
     table.claim('c1', 'hv0', NAMES)
-    with pytest.raises(InputError, match='somebody else has the seat'):
+    with pytest.raises(InputError, match='another person has the seat'):
         table.release('c2', 'hv0')
     assert table.release('c1', 'hv0').id == 'hv0'  # type: ignore[union-attr]
-    with pytest.raises(InputError, match='nobody here has the seat'):
+    with pytest.raises(InputError, match='no person at this cockpit has the seat'):
         table.release('c1', 'hv0')
     table.update({'hv0': {'source': 'cockpit', 'driver': 'idle'}})
     assert table.release('c2', 'hv0') is None

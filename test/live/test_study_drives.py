@@ -155,7 +155,7 @@ def test_each_trial_is_finished_once_or_skipped(journal: list[dict[str, Any]]) -
     assert 'killed' in reasons[0]
     assert reasons[1] == 'a telephone rang'
     # Whoever else can reach the graph has made no half a trial.
-    assert reasons[3:] == ['somebody stopped the run', 'somebody began the run anew']
+    assert reasons[3:] == ['the run was stopped by hand', 'the run was started again by hand']
 
 
 def test_what_is_finished_was_driven_to_its_end(journal: list[dict[str, Any]]) -> None:

@@ -61,7 +61,7 @@ test('words tell of nobody whom fog hides', () => {
   const others = [body('car 1', 50), body('car 2', 70), body('car 3', 120)];
   const text = (range) => describeAround(body('hv0', 0), others, true, range);
   assert.match(text(60), /Around: car 1 50 m ahead, standing\.$/);
-  assert.match(text(40), /Nobody within 40 m\.$/);
+  assert.match(text(40), /No other within 40 m\.$/);
   assert.match(text(30000), /car 1 50 m .*; car 2 70 m /);
   assert.doesNotMatch(text(undefined), /car 3/);
 });

@@ -92,7 +92,7 @@ test('who drives a seat', () => {
   assert.equal(say({ holder: 'c1', holder_name: 'Ada' }), 'You drive');
   assert.equal(say({ holder: 'c2', holder_name: 'Ada' }), 'Driven by Ada in a cockpit');
   assert.equal(say({ holder: 'c2', holder_name: '' }), 'Driven by c2 in a cockpit');
-  assert.equal(say({ source: 'cockpit', driver: 'cockpit' }), 'Waits for somebody in a cockpit');
+  assert.equal(say({ source: 'cockpit', driver: 'cockpit' }), 'Waits for a driver in a cockpit');
   assert.equal(say({ source: 'cockpit' }), 'Left by its driver in a cockpit');
   assert.equal(say({ source: 'replay' }), 'Driven as in the recording');
   assert.equal(say({ source: 'autopilot' }), 'Driven by the source autopilot');

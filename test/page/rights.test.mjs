@@ -50,5 +50,5 @@ test('a kept seat says for whom and for how long', () => {
   assert.equal(describeSeat({ ...seat, kept: { name: 'Anna', for_s: 42 } }, 'human', '', 'c1'),
     'Kept for Anna for 42 s');
   assert.equal(describeSeat({ ...seat, kept: null }, 'human', '', 'c1'),
-    'Waits for somebody in a cockpit');
+    'Waits for a driver in a cockpit');
 });

@@ -31,7 +31,7 @@ def test_planning_problems(runs: Any, tmp_path: Path) -> None:
     _, problems = runs.read_back(exported)
     assert exported.problem_ids['av0'] == 101
     assert set(problems.planning_problem_dict) == set(exported.problem_ids.values())
-    assert exported.notices == ('nobody drove planning problem 100: left out',)
+    assert exported.notices == ('not driven and left out: planning problem 100',)
     for column, item in enumerate(log.vehicles):
         state = problems.planning_problem_dict[exported.problem_ids[item.id]].initial_state
         row = log.vehicle_states[0, column]

@@ -53,5 +53,5 @@ def test_a_run_without_a_human_is_refused(recorder: Any, tmp_path: Path) -> None
     setup = build_setup(replace(load_game(scenarios_directory() / 'two_avs.yaml'), humans=()))
     recorder.ours(tmp_path / 'run' / 'bag', recorder.messages(run_offline(setup, duration_s=0.5)))
     plan = parse_plan({'humans': [str(tmp_path / 'run')]}, 'plan', tmp_path)
-    with pytest.raises(InputError, match='nobody drove in it'):
+    with pytest.raises(InputError, match='no vehicle was driven in it'):
         make_grid(plan, ContentStore(tmp_path / 'files'))

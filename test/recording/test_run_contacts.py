@@ -81,7 +81,7 @@ def test_what_humans_touch_without_an_av(tmp_path: Path, recorder: Any) -> None:
         ('hv0', 'rear'), ('hv1', 'front')}
     # 25 m of gap at 15 m/s: braking with 8 m/s^2 after 1 s needs 15 + 14 m, all of it counted
     # from where the other came into the way at the start.
-    assert {item['avoidable_by'] for item in report['contacts']} == {'nobody by braking'}
+    assert {item['avoidable_by'] for item in report['contacts']} == {'not avoidable by braking'}
 
 
 def test_contacts_without_the_motion_that_led_to_them(tmp_path: Path, recorder: Any) -> None:

@@ -69,5 +69,5 @@ def test_a_contact_that_nobody_at_the_wheel_could_avoid(tmp_path: Path) -> None:
     result, (contact,) = drive(path)
     assert contact.side == 'right'
     assert 'av0' not in contact.avoidable_by
-    assert contact.verdict == 'nobody by braking'
+    assert contact.verdict == 'not avoidable by braking'
     assert abs(result.states_of('av0')[:, 1]).max() < 0.05

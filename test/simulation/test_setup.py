@@ -136,7 +136,7 @@ def test_step_of_the_run_divides_the_scenarios(cut_in: LoadedScenario) -> None:
 
 def test_run_without_anybody_is_refused(cut_in: LoadedScenario) -> None:
     """No human, no planning problem, no traffic, no obstacle: nothing would move."""
-    with pytest.raises(InputError, match='nobody takes part'):
+    with pytest.raises(InputError, match='the game is empty'):
         support.setup_of(replace(cut_in, planning_problems=()))
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Nobody drives over a stop line at red, whatever the movement and the light."""
+"""No agent drives over a stop line at red, whatever the movement and the light."""
 
 from pathlib import Path
 from typing import NamedTuple

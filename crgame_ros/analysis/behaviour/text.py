@@ -73,7 +73,7 @@ def _lane_change(change: LaneChangeGap) -> Iterator[str]:
             yield _line(f'gap_accepted_{role}', neighbour.time_gap_s,
                         f'{getattr(change, role)} in {neighbour.gap:.1f} m, {where}')
     if not told:
-        yield f'  lane change {where}: nobody near'
+        yield f'  lane change {where}: no vehicle near'
 
 
 def _take_over_lines(take_over: TakeOver) -> Iterator[str]:

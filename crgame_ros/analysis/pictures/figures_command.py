@@ -152,8 +152,8 @@ def _frames(run: 'FigureRun', values: argparse.Namespace, times_s: list[float] |
                                       columns=values.columns), f'{run.label} at {values.at} s'
         return
     if not run.moments:
-        print(f'note: nobody came near anybody in {run.path}: no frames; --at names times',
-              file=sys.stderr)
+        print(f'note: no driven vehicle came near another object in {run.path}: no frames; '
+              '--at names times', file=sys.stderr)
     for number, moment in enumerate(run.moments[:values.moments], 1):
         ks = panel_steps(scene, moment.time_s, values.panels, values.spacing)
         yield (f'frames_{number}',

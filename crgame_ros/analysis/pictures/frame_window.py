@@ -131,7 +131,7 @@ def _focus(log: RunTrajectories, vehicles: Sequence[str]) -> int:
     order += sorted(driven.values(),
                     key=lambda i: log.descriptions[i].role is not Role.AUTONOMOUS)
     if not order:
-        raise InputError('nobody drives in it', log.game.benchmark_id,
+        raise InputError('it has no driven vehicle', log.game.benchmark_id,
                          'frames are made around a driven vehicle')
     return order[0]
 

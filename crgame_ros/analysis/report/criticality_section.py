@@ -26,15 +26,15 @@ def criticality_section(run: ReportRun) -> Section:
     """Show what was critical."""
     limits = run.criticality.thresholds
     measured = run.criticality.report()
-    html = note('Each row is the most critical value of the whole run, of whom, and when; the '
-                'time leads to the picture of that moment. Bold and ‼ mark what is beyond a '
+    html = note('Each row is the most critical value of the whole run, with which other, when; '
+                'the time leads to the picture of that moment. Bold and ‼ mark what is beyond a '
                 f'threshold: TTC below {limits.ttc_s:g} s, DRAC above {limits.drac:g} m/s², '
                 f'PET below {limits.pet_s:g} s.')
     for vehicle in measured:
         rows = list(_worst(run, vehicle, limits))
         caption = f'Worst values of {named(run, vehicle.vehicle_id)}'
         html += table(caption, ('measure', 'worst', 'unit', 'against', 'at [s]'), rows,
-                      'numbers worst') if rows else f'<p>{caption}: nobody was near.</p>'
+                      'numbers worst') if rows else f'<p>{caption}: no other was near.</p>'
     html += table('Time below the threshold of TTC', (
         'vehicle', f'TTC below {limits.ttc_s:g} s [s]', 'integral below it [s²]'), [
             (named(run, vehicle.vehicle_id), number(vehicle.tet_s), number(vehicle.tit))

@@ -94,7 +94,7 @@ def input_section(run: ReportRun) -> Section | None:
         'vehicle', 'throttle on', 'brake on', 'hardest brake', 'in reverse', 'driven'), rows,
         'numbers') if rows else note('Nobody gave any input: planners drove all the time.')
     if spans:
-        html += table('Reverse gear, and AVs that somebody drove', (
+        html += table('Reverse gear, and AVs driven by hand', (
             'what', 'from [s]', 'to [s]'), [
                 (span.label, number(span.start_s), number(span.end_s)) for span in spans],
             'numbers')

@@ -23,7 +23,7 @@ def run_section(run: ReportRun) -> Section:
                                      'planning problem', 'sees'), _vehicles(run), 'vehicles')
     people = list(_people(run))
     if people:
-        html += table('Who drove', ('vehicle', 'who', 'took part as', 'device', 'browser',
+        html += table('Drivers', ('vehicle', 'driver', 'took part as', 'device', 'browser',
                                     'steps', 'input delay [ms]'), people, 'people')
     if run.notices:
         items = ''.join(f'<li>{free(text)}</li>' for text in run.notices)

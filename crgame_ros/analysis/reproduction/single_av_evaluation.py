@@ -70,7 +70,7 @@ def _behind(found: Encounter) -> Finding:
 def no_contact(found: Encounter) -> Finding:
     """Find contacts of the AV with anybody."""
     if found.contacts is None:
-        return Finding(False, 'nobody looked for contacts')
+        return Finding(False, 'contacts were not checked')
     near = '' if found.least_distance is None else f', {found.least_distance:.2f} m at least'
     return Finding(found.contacts == 0, f'{found.contacts} contacts{near}')
 
@@ -107,7 +107,7 @@ def _same(found: SameHuman) -> Finding:
 
 
 NO_CONTACT = Expectation(
-    'no contact', 'The AV touches nobody: both planners are said to keep clear.',
+    'no contact', 'The AV touches no other: both planners are said to keep clear.',
     'to maintain a safe gap (fig. 8); closer and more dynamic interaction (IV-A2)', no_contact)
 IDM_EXPECTATIONS: tuple[Expectation[Encounter], ...] = (
     Expectation('stays in its lane', f'The AV comes no farther than {IN_LANE} m from the middle '
@@ -206,7 +206,7 @@ def _reacts(found: MultiAvRun) -> Finding:
 def _no_contact(found: MultiAvRun) -> Finding:
     contacts = found.run.contacts
     if contacts is None:
-        return Finding(False, 'nobody looked for contacts')
+        return Finding(False, 'contacts were not checked')
     return Finding(not contacts, '; '.join(
         f'{item["vehicle"]} with {item["with"]}' for item in contacts) or '0 contacts')
 
@@ -225,7 +225,7 @@ MULTI_AV_EXPECTATIONS: tuple[Expectation[MultiAvRun], ...] = (
     Expectation('each AV reacts', f'Each AV gets more than {REACTS} m from where it is in the '
                 'same game without the human: each has a planner of its own, and sees the human.',
                 'each AV is controlled by an independent planner instance (IV-B)', _reacts),
-    Expectation('no contact', 'Nobody touches anybody.',
+    Expectation('no contact', 'No vehicle touches another.',
                 'shown as frames (fig. 12)', _no_contact),
     Expectation('one time line without a jump', 'Every vehicle has a state at every scenario '
                 f'step, and a step is as long as its speeds say, within {JUMP} m.',

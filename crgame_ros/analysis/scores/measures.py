@@ -26,7 +26,7 @@ class ScoreMeasure(NamedTuple):
 _NUPLAN = 'nuplan-devkit, closed loop'
 _OURS = 'crgame_ros'
 _SHORT = 'the run has fewer than 5 time steps'
-_NO_PLANS = 'it has no planner, or nobody recorded it'
+_NO_PLANS = 'it has no planner, or its plans were not recorded'
 MEASURES = {
     'nuplan_score': ScoreMeasure('1', 'product of the multipliers times the weighted mean',
                                  _NUPLAN, _SHORT),
@@ -56,7 +56,8 @@ MEASURES = {
                           'road: union of the lanelets; of a human the goal is where its drive '
                           'ended', ''),
     'feasible': ScoreMeasure('', 'whether the model KS can make every transition',
-                             'the checker, 2 cm and 0.03 rad, at 0.1 s', 'nobody could be asked'),
+                             'the checker, 2 cm and 0.03 rad, at 0.1 s',
+                             'the checker was not available'),
     'accepted_share': ScoreMeasure('1', 'answers accepted that are no fallback, of all answers',
                                    _OURS, f'{_NO_PLANS}, or it never answered'),
     'latency_ms': ScoreMeasure('ms', 'time from a request to its plan', _OURS, _NO_PLANS),

@@ -21,7 +21,7 @@ def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> E
     :raises InputError: if nobody drives in it, or in another scenario or at other times.
     """
     if not expert.vehicles:
-        raise InputError('nobody drives in it', name, 'give a run with a human')
+        raise InputError('it has no driven vehicle', name, 'give a run with a human')
     if expert.game.scheduler.time_step_s != log.game.scheduler.time_step_s:
         raise InputError('its time steps are not as long as those of the run', name,
                          'give a run of the same scenario')

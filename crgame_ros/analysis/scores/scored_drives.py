@@ -30,7 +30,8 @@ def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
     :raises InputError: if nobody drives in the run.
     """
     if not log.vehicles:
-        raise InputError('nobody drives in it', 'the run', 'score a run with a human or an AV')
+        raise InputError('it has no driven vehicle', 'the run',
+                         'score a run with a human or an AV')
     run = _Drives(log, expert)
     vehicles, ends = [], first_ends(log, put_back or {})
     for number, item in enumerate(log.vehicles):

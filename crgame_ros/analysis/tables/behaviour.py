@@ -42,7 +42,7 @@ VEHICLE_BEHAVIOUR = TablePart((
     *(Column(f'drive_{name}', NUMBER, column.unit, column.definition, column.reference_point,
              column.variant, column.empty)
       for name in _PER_VEHICLE for column in (_column(
-          name, 'there was nothing to measure, or nobody drove it by hand'),))), _vehicles)
+          name, 'there was nothing to measure, or it was not driven by hand'),))), _vehicles)
 
 _OF = (RUN, Column('vehicle', TEXT, '', 'id of the vehicle'))
 REACTIONS = TableDeclaration(
@@ -61,7 +61,7 @@ LANE_CHANGES = TableDeclaration(
          _column(f'gap_to_{who}', 'there was none'),
          _column(f'gap_accepted_{who}', 'there was none')))))
 TAKE_OVERS = TableDeclaration(
-    'take_overs', 'somebody driving an AV', ('run', 'vehicle', 'seat_s'),
+    'take_overs', 'a period in which a person drives an AV', ('run', 'vehicle', 'seat_s'),
     (*_OF, Column('seat_s', NUMBER, 's', f'first command that the AV obeyed, {_SINCE_START}'),
      Column('end_s', NUMBER, 's', f'last such command, {_SINCE_START}'),
      Column('request', TEXT, '', '`order` of the seat, or the name of the event or task asking',

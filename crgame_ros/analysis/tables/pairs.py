@@ -49,7 +49,7 @@ def measure_column(name: str, prefix: str = '', empty: str = '') -> Column:
 
 
 PAIRS = TableDeclaration(
-    'pairs', f'a driven vehicle and somebody within {NEAR:g} m of it, at a scenario time step',
+    'pairs', f'a driven vehicle and another object within {NEAR:g} m, at a scenario time step',
     ('run', 'k', 'subject', 'other'), (
         RUN, *step_columns('the measurement, of states as they were published'),
         Column('subject', TEXT, '', 'id of the driven vehicle'),

@@ -56,7 +56,7 @@ PLANS = TableDeclaration(
                'and limits', variant='made again from the recording; not known are a refusal for '
                'leaving the road and one for coming after a newer plan',
                empty='the request was not recorded'),
-        Column('refusal', TEXT, '', 'why it does not', empty='it does, or nobody knows'),
+        Column('refusal', TEXT, '', 'why it does not', empty='it does, or it is not known'),
         *(Column(f'{end}_{name}', NUMBER, unit, f'{what} of its {end} state', REAR_AXLE,
                  'as planned, in the frame map', NO_PLAN)
           for end, _ in ENDS for name, unit, what, _ in STATE_COLUMNS),

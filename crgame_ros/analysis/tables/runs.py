@@ -102,5 +102,5 @@ RUN_PARTS = (
         Column('violations', INTEGER, '1', 'collisions and departures from the road that began',
                variant='of all driven vehicles, each as often as it began', empty=UNTOLD),
         Column('contacts', INTEGER, '1', 'first contacts of driven vehicles with something',
-               empty=f'{UNTOLD}, or nobody can name them')), _timing))
+               empty=f'{UNTOLD}, or they cannot be named')), _timing))
 RUNS = declare('runs', 'a run', ('run',), RUN_PARTS)

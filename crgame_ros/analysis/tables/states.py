@@ -31,9 +31,9 @@ import pyarrow as pa
 FloatArray = NDArray[np.float64]
 
 REAR_AXLE, CENTER = 'rear axle', 'center'
-OF_OBJECTS = 'of objects, which nobody drives in this run'
+OF_OBJECTS = 'of objects, which are not driven in this run'
 OFF_ROAD = 'off the road'
-UNCONSUMED = 'nobody drove it: of objects, of AVs on their plans, at the start, unrecorded cycles'
+UNCONSUMED = 'not driven by hand: objects, AVs on their plans, at the start, unrecorded cycles'
 UNLIT = 'it has none: objects, humans at the start, unrecorded cycles, AVs of early versions'
 IN_LANE = 'nearest point of the centre line, whose heading is interpolated between its vertices'
 
@@ -42,7 +42,7 @@ STATES = TableDeclaration(
     ('run', 'k', 'id'), (
         RUN, *step_columns('the state, which is that of its own motion then'),
         Column('id', TEXT, '', 'of the vehicle or object: hv0, av0, o<obstacle id>, t0, …'),
-        Column('role', TEXT, '', 'who moves it', values=tuple(role.value for role in Role)),
+        Column('role', TEXT, '', 'what moves it', values=tuple(role.value for role in Role)),
         Column('type', TEXT, '', 'CommonRoad obstacle type, as its XML spells it'),
         Column('length', NUMBER, 'm', 'extent along its heading'),
         Column('width', NUMBER, 'm', 'extent across its heading'),

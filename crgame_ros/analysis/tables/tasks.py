@@ -21,7 +21,7 @@ from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import TableRows
 from crgame_ros.game.events import ACTIONS
 
-UNKNOWN = 'the game does not know the event: a vehicle touched somebody, or was put back'
+UNKNOWN = 'the game does not know the event: a vehicle touched another object, or was put back'
 
 
 def _fired(run: TableRun) -> Mapping[str, Sequence[Any]]:
@@ -45,7 +45,7 @@ EVENT_PARTS = (
         Column('name', TEXT, '', 'of the event in the game'),
         Column('kind', TEXT, '', 'what it does', empty=UNKNOWN, values=tuple(ACTIONS)),
         Column('label', TEXT, '', 'text for people', empty=UNKNOWN),
-        Column('by', TEXT, '', 'whether somebody triggered it, its condition came true, a driver '
+        Column('by', TEXT, '', 'whether a person triggered it, its condition came true, a driver '
                'had the vehicle put back, or a contact stopped it',
                values=('trigger', 'condition', 'driver', 'contact')),
         Column('object', TEXT, '', 'id of the obstacle that it changes or puts',
@@ -98,7 +98,7 @@ TAKE_OVER_REQUESTS = TableDeclaration(
      Column('duration_s', NUMBER, 's', 'until the vehicle was driven or the request disappeared'),
      _DELAY, _PICTURE,
      Column('first_input_s', NUMBER, 's', 'from the onset to the first input', 'consumed command',
-            'of an AV hands on, as in take_overs; of a vehicle that somebody drives already the '
+            'of an AV hands on, as in take_overs; of a vehicle that is driven by hand already the '
             'first response of reactions', 'there was none'),
      Column('outcome', TEXT, '', 'whether there was a first input', values=('taken', 'none'))))
 TASK_SPANS = TableDeclaration(

@@ -19,7 +19,7 @@ import numpy as np
 
 REAR_AXLE = 'rear axle'
 AT_STEPS = 'at the scenario steps'
-NOBODY = 'it was never defined: nobody was near'
+NOBODY = 'it was never defined: no other was near'
 HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
 # Of `timing.json`, with what each counts.
 COUNTS = {
@@ -79,7 +79,7 @@ def _worst_columns() -> list[Column]:
         value = measure_column(name, 'worst_', NOBODY)
         columns += [
             value,
-            Column(f'{value.name}_of', TEXT, '', f'id of whom the worst {name} is of',
+            Column(f'{value.name}_of', TEXT, '', f'id of the other one at the worst {name}',
                    empty=NOBODY),
             Column(f'{value.name}_time_s', NUMBER, 's', f'time of the worst {name}, since the '
                    'start of the run', variant='the first such moment', empty=NOBODY)]
@@ -107,7 +107,7 @@ def _planning(run: TableRun) -> Mapping[str, Sequence[Any]]:
 VEHICLE_PARTS = (
     TablePart((
         RUN, Column('id', TEXT, '', 'of the vehicle'),
-        Column('role', TEXT, '', 'who drives it', values=('human', 'autonomous')),
+        Column('role', TEXT, '', 'kind of its driver', values=('human', 'autonomous')),
         Column('driver', TEXT, '', "the game's driver of a human, or the AV's planner",
                empty='the game does not say'),
         Column('vehicle_model', TEXT, '', 'name of its vehicle type'),
@@ -134,7 +134,7 @@ VEHICLE_PARTS = (
                FOOTPRINTS, 'rectangles of a scenario step'),
         Column('crossings', INTEGER, '1', 'rows of crossings with it'),
         Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
-               empty='it crossed nobody')), _criticality),
+               empty='it crossed no other path')), _criticality),
     TablePart((
         *(Column(f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key, INTEGER,
                  '1', what, variant='as the engine told last', empty=UNRECORDED)

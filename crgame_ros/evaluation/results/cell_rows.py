@@ -26,8 +26,8 @@ _FACTORS = (
            'id'),
     Column('game', TEXT, '', "name of the game's file", empty='it is a scenario without a game'),
     Column('human', TEXT, '', 'name of the recorded run whose humans drive',
-           empty='nobody recorded drives'),
-    Column('planner', TEXT, '', 'label of who drives the AVs'),
+           empty='no recorded human drives'),
+    Column('planner', TEXT, '', 'label of the planner or driver of the AVs'),
     Column('perception', TEXT, '', 'label of how AVs perceive'),
     Column('traffic', TEXT, '', 'label of the traffic'),
     Column('seed', INTEGER, '1', 'of everything random'))
@@ -36,7 +36,7 @@ CELLS = TableDeclaration('cells', 'a cell', ('cell',), (
     _KEY, *_FACTORS,
     Column('status', TEXT, '', 'how it ended', values=STATUSES),
     Column('reason', TEXT, '', 'why it failed, in a line', empty='it did not'),
-    Column('traceback', TEXT, '', 'where it failed', empty='it did not, or nobody knows'),
+    Column('traceback', TEXT, '', 'where it failed', empty='it did not fail, or it is not known'),
     Column('simulated_s', NUMBER, 's', 'how long the run was', empty=FAILED),
     Column('state_hash', TEXT, '', 'SHA-256 over all states of the driven vehicles',
            empty=FAILED),
@@ -54,7 +54,7 @@ VEHICLES_OF_CELLS = TableDeclaration('vehicles', 'a driven vehicle of a cell', (
     'cell', 'vehicle'), (_KEY, *_FACTORS, Column('vehicle', TEXT, '', 'id of the vehicle'),
                          *_OUTCOME, *_PARTS))
 WORK = TableDeclaration('work', 'the computing of a cell', ('cell',), (
-    _KEY, Column('worker', TEXT, '', 'address of who computed it'),
+    _KEY, Column('worker', TEXT, '', 'address of the worker that computed it'),
     Column('wall_s', NUMBER, 's', 'time that it took'),
     Column('computing_s', NUMBER, 's', 'processor time that it took', empty=FAILED),
     Column('peak_bytes', INTEGER, '1', 'largest resident memory of the process so far',

@@ -131,8 +131,8 @@ def _means(summary: Summary) -> SummaryTable:
                if place not in known]
     notes = [
         'means over the n AVs with a value in cells that ended well (of the share that failed: '
-        'over all cells); what is not defined, such as the TTC of who has nobody ahead, is left '
-        'out', f'95 % intervals: percentile bootstrap, {summary.resamples} resamples, seed '
+        'over all cells); what is not defined, such as the TTC of a vehicle with none ahead, is '
+        'left out', f'95 % intervals: percentile bootstrap, {summary.resamples} resamples, seed '
         f'{summary.seed}', *_drawn(summary.groups)]
     bounds = [f'{measure.label} {measure.most:g} {measure.unit}' for _, measure
               in known_measures(summary) if math.isfinite(measure.most)]

@@ -274,7 +274,7 @@ class LiveBackend:
 
     def _announce(self, actor: Client | None, deed: str) -> None:
         """Tell the others, and the recording, who has done what."""
-        name = 'somebody without a page' if actor is None else actor.name
+        name = 'a client without a page' if actor is None else actor.name
         self._endpoints.diagnostics.publish(
             'cockpit_node: order', DiagnosticStatus.OK, f'{name} {deed}',
             {'person': '' if actor is None else actor.person})

@@ -115,7 +115,7 @@ class StartGate:
             self._outputs.publish_clock(self._simulation.scheduler.stamp_ns(self._result.n))
         if self._seats and now_ns - self._connected_ns > DRIVER_PATIENCE_NS:
             self._say('starting without a command for ' + ', '.join(sorted(self._seats))
-                      + ': nobody drives until one comes')
+                      + ': these vehicles are not driven until one arrives')
             self._forget(self._seats)
             self._seats.clear()
 

@@ -139,7 +139,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run = what.add_parser('run', help='lead a participant through a session')
     run.add_argument('file', type=Path, help='study file')
     run.add_argument('--participant', required=True, metavar='ID',
-                     help='anonymous id, such as P07; one who has begun goes on where they were')
+                     help='anonymous id, such as P07; a session that has begun is continued')
     run.add_argument('--out', type=Path, metavar='DIR',
                      help="folder of the study's data (default: studies/NAME)")
     run.add_argument('--place', type=int, metavar='N',

@@ -21,7 +21,7 @@ from crgame_ros.whole_file import write_whole
 # Reasons of complete runs: end of the duration, or the vehicle's own drivability.
 TIME, DRIVABILITY = 'duration', 'drivability of '
 RESET = 'reset'
-_CUT_SHORT = {'stop': 'somebody stopped the run', RESET: 'somebody began the run anew',
+_CUT_SHORT = {'stop': 'the run was stopped by hand', RESET: 'the run was started again by hand',
               'signal': 'the programs were asked to end', 'silence': 'the simulation fell silent'}
 # Shorter pauses of the machine count as load, not as sleep [s].
 SLEEP_S = 0.5
@@ -35,7 +35,7 @@ def cut_short(reason: str) -> str:
     """
     if reason == TIME or reason.startswith(DRIVABILITY):
         return ''
-    return _CUT_SHORT.get(reason, f'the run ended: {reason or "nobody knows why"}')
+    return _CUT_SHORT.get(reason, f'the run ended: {reason or "for an unknown reason"}')
 
 
 def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:

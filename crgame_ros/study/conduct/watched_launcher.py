@@ -17,5 +17,5 @@ from crgame_ros.ros.node_main import PR_SET_PDEATHSIG
 if __name__ == '__main__':
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != int(sys.argv[1]):
-        sys.exit('whoever started this is gone')
+        sys.exit('the parent process has ended')
     sys.exit(main(sys.argv[2:]))

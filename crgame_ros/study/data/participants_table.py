@@ -16,7 +16,7 @@ from crgame_ros.study.session_script import Fields
 
 _FIXED = (
     PARTICIPANT, Column('place', INTEGER, '1', 'among all participants, from 1 on'),
-    Column('language', TEXT, '', 'that was chosen', empty='nobody told'),
+    Column('language', TEXT, '', 'that was chosen', empty='not reported'),
     Column('begun', TEXT, '', 'when the session began, ISO 8601, UTC'),
     Column('begun_s', NUMBER, 's', 'when the session began', variant=WALL),
     Column('ended', TEXT, '', 'when its last entry was made, ISO 8601, UTC'),
@@ -47,7 +47,7 @@ class ParticipantsTable:
             taken.add(name)
             self._fields[question.name] = question_column(question, name, study.language)
         self.declaration = TableDeclaration(
-            'participants', 'somebody who has begun', ('participant',),
+            'participants', 'a participant who has begun', ('participant',),
             (*_FIXED, *self._fields.values(), *answers))
 
     @property

@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # A slow import that other commands do not need.
     pass
 
 
-_WHOSE = (Column('participant', TEXT, '', 'anonymous id of who drove'),
+_WHOSE = (Column('participant', TEXT, '', 'anonymous id of the driver'),
           Column('trial', INTEGER, '1', 'number of the trial'),
           Column('condition', TEXT, '', 'of the trial'))
 DECLARATIONS = tuple(TableDeclaration(table.name, table.row, table.key, (*_WHOSE, *table.columns))

@@ -38,7 +38,7 @@ def comparison_declaration() -> TableDeclaration:
         ('participant', 'trial', 'vehicle', 'planner'), (
             PARTICIPANT, TRIAL, Column('condition', TEXT, '', 'of the trial'),
             Column('vehicle', TEXT, '', 'id of the vehicle'),
-            Column('role', TEXT, '', 'who drives it', values=('human', 'autonomous')),
+            Column('role', TEXT, '', 'kind of its driver', values=('human', 'autonomous')),
             Column('recorded_planner', TEXT, '', 'planner of the AVs when it was driven'),
             Column('planner', TEXT, '', 'label of the planner of the AVs now'),
             Column('random_seed', INTEGER, '1', 'of everything random'),
@@ -85,7 +85,7 @@ def _can_be_repeated(trial: CountedTrial, say: Callable[[str], object]) -> bool:
     """Return whether all inputs of a trial's driver are known; print the reason if not."""
     reason = trial.row['problem']
     if trial.run is not None and not trial.run.summary['humans']:
-        reason = 'nobody drove in it'
+        reason = 'no vehicle was driven in it'
     elif trial.run is not None and trial.row['vehicle'] not in trial.run.summary['humans']:
         reason = 'the participant sat in an AV'
     elif trial.run is not None and not trial.run.summary['planners']:

@@ -179,23 +179,24 @@ class Desk:
         self._refuse_while_driving()
         now = self.session.next_item
         if now is None or now.id != item:
-            raise InputError('is not on now', item[:60], 'look at what is')
+            raise InputError('is not the present item', item[:60],
+                             'see the list for the present one')
         self.session.skip(reason)
         self._moved()
 
     def abort(self, item: str, reason: str) -> None:
         """End the present drive; it is repeated."""
         if not self.is_driving or self.drives.state.item != item:
-            raise InputError('is not driven now', item[:60], 'look at what is')
+            raise InputError('is not being driven', item[:60], 'see the list for the present one')
         if not self.can_abort:
-            raise InputError('has ended', item[:60], 'repeat it once it is recorded')
+            raise InputError('has ended already', item[:60], 'repeat it once it is recorded')
         self.drives.abort(reason)
         self._notify()
 
     def end(self, reason: str) -> None:
         """End the session; a present drive is aborted first."""
         if self.session.next_item is None:
-            raise InputError('is over already', 'the session', '')
+            raise InputError('has already ended', 'the session', '')
         self.ending = reason
         if self.is_driving:
             self.drives.abort(reason)
@@ -247,7 +248,7 @@ class Desk:
             try:
                 changed()
             except CrgameError:
-                _log.exception('somebody who watches the desk')
+                _log.exception('an observer of the desk')
 
 
 def is_driven(item: SessionItem) -> bool:

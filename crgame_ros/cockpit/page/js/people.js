@@ -23,7 +23,7 @@ class People {
   #role = element('select', { id: 'my-role', on: { change: () => this.#choose() } });
   #roleRow = element('p', { class: 'people-role' },
     element('label', { for: 'my-role', text: 'You take part as' }), this.#role);
-  #whom = element('select', { 'aria-label': 'For whom the link is' });
+  #whom = element('select', { 'aria-label': 'Role that the link gives' });
   #link = element('input', { type: 'text', readonly: true, hidden: true,
     'aria-label': 'The link', on: { focus: () => this.#link.select() } });
   #error = element('p', { class: 'field-error', role: 'alert' });

@@ -60,7 +60,7 @@ class Seats {
     const seats = element('section', { class: 'drive-section', 'aria-labelledby': 'seats-title' },
       element('h2', { id: 'seats-title', text: 'Seats' }), this.#news, this.#list);
     const replay = element('p', { class: 'drive-note', hidden: true,
-      text: 'This is a recording: nobody can take a seat. Click a vehicle to follow it.' });
+      text: 'This is a recording: its seats cannot be taken. Click a vehicle to follow it.' });
     const name = new NameField(store, connection).node;
     this.#live = [name, seats, driving.devices];
     this.#replay = replay;

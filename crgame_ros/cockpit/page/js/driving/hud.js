@@ -227,7 +227,7 @@ function buildParts(keyboard) {
   const parts = {
     kmh: span('kmh', 'Speed'), ms: span('ms', 'Signed speed'), gear: span('gear', 'Gear'),
     acceleration: span('acceleration', 'Acceleration'), who: span('who'), device: span('device'),
-    seen: span('seen', 'Of those within reach of its sensors: whom its planner is told of'),
+    seen: span('seen', 'How many of the objects within sensor range its planner is told of'),
     angle: span('angle', 'Angle of the front wheels, positive to the left'),
     command: span('command', 'Steering command, positive to the left'),
     limit: element('span', { class: 'hud-limit', role: 'img', title: 'Speed limit' }),

@@ -8,7 +8,7 @@
 const GAME_DRIVERS = {
   auto: () => 'Driven by a device on the simulation machine, if one is there',
   evdev: (name) => (name ? `Driven by the device ${name}` : 'Driven by a device'),
-  idle: () => 'Nobody drives',
+  idle: () => 'Not driven',
   joy: (file) => (file ? `Driven by the script ${file}` : 'Driven by a ROS joy node'),
   keys: (file) => `Driven by the script ${file}`,
   replay: (bag) => `Replays the recording ${bag}`,
@@ -32,7 +32,7 @@ export function describeSeat(seat, role, planner, me) {
     return `Kept for ${seat.kept.name || 'its driver'} for ${seat.kept.for_s} s`;
   }
   if (seat.source === 'cockpit') {
-    return seat.driver === 'cockpit' ? 'Waits for somebody in a cockpit'
+    return seat.driver === 'cockpit' ? 'Waits for a driver in a cockpit'
       : 'Left by its driver in a cockpit';
   }
   if (seat.source === 'replay') {

@@ -61,7 +61,7 @@ const ROWS = [
 export function createCriticality(root, store) {
   const tables = element('div', {});
   const plots = element('div', { class: 'history' });
-  const hint = element('p', { class: 'hint', text: 'Nobody is near.' });
+  const hint = element('p', { class: 'hint', text: 'No other is near.' });
   root.append(plots, hint, tables);
   const panel = new HistoryPanel(plots, store, QUANTITIES);
   /** @type {Map<string, VehicleTable>} */

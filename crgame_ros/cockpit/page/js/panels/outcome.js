@@ -364,7 +364,7 @@ class Outcome {
 /** @param {Awaiting} facts */
 function driverText({ seat, run, holder, holderName, me }) {
   if (holder === null) {
-    return run === 'waiting' ? `The run begins as soon as somebody drives ${seat}.`
+    return run === 'waiting' ? `The run begins as soon as a driver takes ${seat}.`
       : `${seat} waits for its driver.`;
   }
   const whose = holder === me ? 'your hands are' : `the hands of ${oneLine(holderName)} are`;

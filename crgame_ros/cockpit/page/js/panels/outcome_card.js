@@ -40,7 +40,7 @@ export function why({ reason, t, contacts = [] }) {
   const [kind, , vehicle] = (reason ?? '').split(' ');
   switch (kind) {
     case 'duration': return over(`Its duration of ${after} is over.`);
-    case 'stop': return over(`Somebody stopped it after ${after}.`);
+    case 'stop': return over(`It was stopped by hand after ${after}.`);
     case 'signal': return over(`It was ended at the terminal after ${after}.`);
     case 'drivability': {
       const hit = contacts.findLast((item) => [item.vehicle, item.with].includes(vehicle));
@@ -61,7 +61,7 @@ export function table(facts) {
     ['Contacts', told(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
       (item) => item.part)],
     ['Off the road', told(facts.departures, (item) => item.vehicle)],
-  ] : [['Driven', 'by nobody: traffic was alone']];
+  ] : [['Driven', 'no vehicle: traffic was alone']];
   for (const { id, name, accepted, refused, fallbacks } of facts.planners) {
     rows.push([`${id}${name ? ` · ${oneLine(name)}` : ''}`, [
       `${plural(accepted, 'plan')} accepted`, `${refused} refused`,

@@ -9,7 +9,7 @@ import { baseName } from './event_words.js';
 
 /** @type {Record<string, string>} */
 const DRIVERS = {
-  auto: "this machine's wheel, gamepad or keyboard", idle: 'nobody', cockpit: 'a cockpit page',
+  auto: "this machine's wheel, gamepad or keyboard", idle: 'no driver', cockpit: 'a cockpit page',
   evdev: 'a wheel or gamepad at this machine', joy: 'messages on the joy topic',
 };
 

@@ -14,7 +14,7 @@ const ENTRIES = {
 };
 
 // Instead of the first while the planner has not been told of anybody for a while.
-const UNKNOWN = 'whom $ sees is not known now';
+const UNKNOWN = 'what $ sees is not known now';
 
 /** A small table over the map. */
 export class Legend {

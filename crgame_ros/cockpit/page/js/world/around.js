@@ -38,7 +38,7 @@ export function describeAround(own, others, driven, range = Infinity) {
     `${other.id} ${Math.round(distance)} m ${directionOf(own, other)}, ${pace(other.speed)}`));
   const more = near.length - told.length;
   return [`${driven ? 'You drive' : 'Watching'} ${own.id}, ${pace(own.speed)}.`,
-    told.length === 0 ? `Nobody within ${Math.round(reach)} m.`
+    told.length === 0 ? `No other within ${Math.round(reach)} m.`
       : `Around: ${told.join('; ')}${more > 0 ? `; and ${more} more` : ''}.`].join(' ');
 }
 
