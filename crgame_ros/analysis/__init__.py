@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Looking at finished runs."""
+"""Analysis of finished runs."""

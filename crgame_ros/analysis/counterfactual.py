@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded human again, against another planner: what came of it, and what differs when."""
+"""Repeats a recorded human against another planner, and compares the result to the recording."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,17 +35,19 @@ class Alternative:
     """
     A run of a recorded human against a planner.
 
-    :param planner: as it was asked for.
+    :param planner: its name, as given by the user.
     :param log: the run on the scenario's grid.
-    :param criticality: of it.
-    :param human_differs_s: when a human first is elsewhere than in the recording; None: never [s]
-    :param others_differ_s: when anybody but the driven vehicles first is: what reacts to the AV
-        makes a world in which the human's inputs may no longer fit; None: never [s]
-    :param accepted_ratio: by AV the share of its planner's answers that were accepted and no
-        fallback; None where it is not known.
+    :param criticality: measured in this run.
+    :param human_differs_s: first time at which a human's pose differs from the recording; None:
+        never [s]
+    :param others_differ_s: first time at which the pose of an object that is not driven differs:
+        objects that react to the AV change the scene, and the human's inputs may no longer fit
+        it; None: never [s]
+    :param accepted_ratio: by AV, the share of its planner's answers that were accepted and are
+        no fallback; None where it is unknown.
     :param contacts: the first contact of each pair, as entries of `timing.json`; None where they
-        are not known.
-    :param result: of an offline run; None of a live one.
+        are unknown.
+    :param result: result of an offline run; None for a live one.
     """
 
     planner: str
@@ -63,7 +65,7 @@ class Alternative:
         return None if self.result is None else self.result.state_hash
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what came of it, as JSON has it."""
+        """Return the result as a JSON-compatible dictionary."""
         return {
             'planner': self.planner, 'state_hash': self.state_hash,
             'human_differs_s': self.human_differs_s, 'others_differ_s': self.others_differ_s,
@@ -77,15 +79,15 @@ def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency
     """
     Drive a recorded human against the planner of a setup, for as long as was recorded.
 
-    The same inputs over the same intervals, the same seeds of perception and traffic.
+    Inputs, their intervals, and the seeds of perception and traffic are those of the recording.
 
     :param planner: its name, for people.
-    :param setup: of the recorded game, its human's driver the recording, with that planner.
+    :param setup: the recorded game, with the recording as its human's driver and that planner.
     :param recorded: the run that was recorded.
     :param latency_steps: simulation steps between a request and its plan.
-    :param traces: recorded states by vehicle (`recorded_states`), which the humans take instead of
-        being driven; an AV that somebody had taken over follows its planner then.
-    :param inputs: of the humans; None for those of the recording that the setup names.
+    :param traces: recorded states by vehicle (`recorded_states`), which the humans follow instead
+        of being driven by inputs; an AV that a human had taken over then follows its planner.
+    :param inputs: inputs of the humans; None for those of the recording that the setup names.
     :raises InputError: if the recording's inputs cannot be used in the setup.
     """
     result = _drive_inputs(setup, latency_steps, inputs) if traces is None \

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def export(values: argparse.Namespace) -> int:
-    """Write the tables of some runs, and say how many rows there are."""
+    """Write the tables of some runs, and print how many rows each has."""
     from crgame_ros.analysis.tables.run_tables import write_tables
     from crgame_ros.analysis.tables.table_run import tabulated_runs
     from crgame_ros.recording.progress import Progress

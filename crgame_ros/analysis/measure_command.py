@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame measure`: how critical a recorded run was and how it was driven, also as JSON."""
+"""`crgame measure`: print how critical a recorded run was and how people drove, also as JSON."""
 
 import argparse
 from collections.abc import Iterator
@@ -12,9 +12,9 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 
-# Behind what is beyond its threshold.
+# Printed after a value that is beyond its threshold.
 CRITICAL = '   <- critical'
-# Of longer times nothing is told: they come of speeds that are almost equal.
+# Longer times [s] are not printed: they result from speeds that are almost equal.
 TOLD_S = 100.0
 
 DESCRIPTION = """\
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def measure(values: argparse.Namespace) -> int:
-    """Measure a run, and print what was found."""
+    """Measure a run, and print the results."""
     from crgame_ros.analysis.behaviour.text import behaviour_lines, detection_lines
     from crgame_ros.analysis.run_measures import check_requests, measure_run
     from crgame_ros.recording.progress import Progress

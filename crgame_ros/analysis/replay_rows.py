@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What came of a recorded human against several planners, as rows of texts."""
+"""Rows of text that compare runs of a recorded human against several planners."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -14,9 +14,10 @@ HEAD = ('planner', 'vehicle', 'gap [m]', 'ttc [s]', 'a_req [m/s^2]', 'distance [
 
 def replay_rows(found: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
     """
-    Yield a row for each planner and vehicle, as `HEAD` names its cells.
+    Yield a row for each planner and vehicle, with the cells that `HEAD` names.
 
-    :param found: entries of `Alternative.as_dict`; of what was recorded without the comparison.
+    :param found: entries of `Alternative.as_dict`; the entry of the recorded run itself lacks the
+        comparison.
     """
     for each in found:
         for vehicle_id, vehicle in each['criticality']['vehicles'].items():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What `crgame measure` measures of a run: how critical it was, and how people drove."""
+"""The measures of `crgame measure`: how critical a run was, and how people drove."""
 
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
@@ -29,7 +29,7 @@ class RunMeasures(NamedTuple):
     detection: tuple[DetectionScore, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as `crgame measure --json` does."""
+        """Return the dictionary that `crgame measure --json` writes."""
         return {**self.criticality.as_dict(),
                 'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour},
                 **({'detection_response': [each.as_dict() for each in self.detection]}
@@ -44,9 +44,10 @@ def measure_run(record: RunRecord, thresholds: Thresholds = USUAL,
     Measure a run.
 
     :param thresholds: beyond which a value is critical.
-    :param requests: names of the events that ask to take over an AV, as orders of its seat do.
-    :param critical: is told how much of the criticality has been measured, 0 to 1.
-    :param driven: is told the same of how people drove.
+    :param requests: names of the events that count as requests to take over an AV, as orders of
+        its seat do.
+    :param critical: called with the share of the criticality measured so far, 0 to 1.
+    :param driven: called likewise for how people drove.
     :raises InputError: if a threshold is not positive, as `check_requests`, or if the run's
         scenario cannot be used.
     """
@@ -61,7 +62,7 @@ def check_requests(record: RunRecord, requests: Collection[str], where: str = 'r
     """
     Refuse events that a run does not have.
 
-    :param where: name by which the user knows them.
+    :param where: name of the option or key, for the message.
     :raises InputError: naming the events that it has.
     """
     known = [event.name for event in record.log.game.events]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame score`: how well planners and people drove, for people and as JSON."""
+"""`crgame score`: print how well planners and people drove, as text or JSON."""
 
 import argparse
 from collections.abc import Iterator
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def score(values: argparse.Namespace) -> int:
-    """Score a run or solutions, and print what was found."""
+    """Score a run or solutions, and print the scores."""
     import gc
     if (values.run is None) == (values.scenario is None):
         raise InputError('give a run, or --scenario with --solution', 'crgame score',
@@ -62,7 +62,7 @@ def score(values: argparse.Namespace) -> int:
     if values.scenario is not None and values.expert is not None:
         raise InputError('is for runs', '--expert', 'leave it out')
     found = _score_run(values) if values.run is not None else _score_file(values)
-    # What the checker holds in circles its package would complain of at the end.
+    # Free the checker's reference cycles now: at exit its package warns about what is left.
     gc.collect()
     if values.out is not None:
         _write(found, values.out)
@@ -124,7 +124,7 @@ def _score_solutions(values: argparse.Namespace, scored: 'ScoredScenario') -> 'P
 
 
 def _write(found: 'list[PlannerScores]', out: Path) -> None:
-    """Write the scenario, the solutions of the vehicles of a run, and all numbers."""
+    """Write the scenario, the solutions of a run's vehicles, and all scores."""
     from crgame_ros.analysis.scores.solution_file import dated, solution_name, solution_text
     from crgame_ros.recording.export import prepare_folder, write_text
     prepare_folder(out)

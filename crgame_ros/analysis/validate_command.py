@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command `crgame validate`: whether files are what they should be."""
+"""The command `crgame validate`: check whether files are valid."""
 
 import argparse
 from pathlib import Path
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def validate_files(values: argparse.Namespace) -> int:
-    """Check each file, and say what was found; what is wrong goes to stderr."""
+    """Check each file, and print the verdict; faults go to stderr."""
     from crgame_ros.analysis.validation import parts_of, validate
     from crgame_ros.recording.progress import Progress
     code = 0

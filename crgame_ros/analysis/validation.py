@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether files are what they should be: each kind checked as the program itself checks it."""
+"""Checks whether files are valid, each kind in the way in which the program itself checks it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -32,23 +32,23 @@ from crgame_ros.yaml_text import read_text, read_yaml
 
 STUDY_FILE = Path('study', 'study.yaml')
 _FILES, _WORDS = 'files', re.compile(r'words\..*\.yaml')
-# A line for each thing that happened; answers are long at times [bytes].
+# A journal has a line for each entry, and answers can be long [bytes].
 _LONGEST_JOURNAL = 200_000_000
 
 
 def is_study(path: Path) -> bool:
-    """Return whether a folder is that of a study that people take part in."""
+    """Return whether a folder is that of a study with participants."""
     return (path / STUDY_FILE).is_file()
 
 
 def study_parts(path: Path) -> list[Path]:
-    """Return what is to be checked: study, questionnaires, journals, games, runs, tables."""
+    """Return the files to check: study, questionnaires, journals, games, runs, tables."""
     return list(_parts(path))
 
 
 def _parts(path: Path) -> Iterator[Path]:
     study = (path / STUDY_FILE).parent
-    # What games name may be anything; of that, scenarios can be checked by themselves.
+    # Games may refer to any file; only scenarios among these can be checked by themselves.
     yield from sorted(file for file in study.rglob('*.yaml') if not _WORDS.fullmatch(file.name)
                       and study / _FILES not in file.parents)
     yield from sorted((study / _FILES).rglob('*.xml'))
@@ -66,9 +66,9 @@ def _parts(path: Path) -> Iterator[Path]:
 
 def journal_faults(path: Path) -> tuple[int, list[str]]:
     """
-    Check a journal: whole lines, each an entry with its time; the first begins the session.
+    Check a journal: each whole line is an entry with its time; the first begins the session.
 
-    :return: the number of entries, and what is wrong, one line each.
+    :return: the number of entries, and the faults, one line each.
     :raises InputError: if it cannot be read.
     """
     text = read_text(path, 'journal', max_bytes=_LONGEST_JOURNAL)
@@ -94,11 +94,11 @@ def journal_faults(path: Path) -> tuple[int, list[str]]:
 
 
 Progress = Callable[[float], object]
-# Folder of a run in which its tables are.
+# Folder of a run's tables, within that of the run.
 TABLES = 'tables'
 _RECORDINGS = ('.mcap', '.db3')
 _SHOWN = 20
-# Where the root element of an XML file is looked for [characters].
+# The root element of an XML file is searched for in so many characters.
 _HEAD = 10_000
 _SOLUTION = re.compile('<CommonRoadSolution[ >]')
 
@@ -106,11 +106,11 @@ _SOLUTION = re.compile('<CommonRoadSolution[ >]')
 @dataclass(frozen=True)
 class FileVerdict:
     """
-    What was found in a file.
+    The result of checking a file.
 
-    :param kind: what it is, in a few words.
-    :param faults: what is wrong, one line each; none of a valid file.
-    :param remarks: what is worth knowing of a valid one.
+    :param kind: kind of the file, in a few words.
+    :param faults: one line each; empty for a valid file.
+    :param remarks: notes on a valid file, one line each.
     """
 
     kind: str
@@ -122,8 +122,8 @@ def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
     """
     Check a file, or the folder of a recording, a run or tables.
 
-    :param progress: is told how much has been read, from 0 to 1, where it takes long.
-    :raises InputError: if there is no such file, or it is of no known kind.
+    :param progress: called with the share read so far, 0 to 1, where reading takes long.
+    :raises InputError: if there is no such file, or its kind is unknown.
     """
     if not path.exists():
         raise InputError('no such file or folder', str(path), 'check the name')
@@ -135,7 +135,7 @@ def validate(path: Path, progress: Progress | None = None) -> FileVerdict:
 
 
 def parts_of(path: Path) -> list[Path]:
-    """Return what is to be checked of a path: of the folder of a run or study all its files."""
+    """Return the files to check at a path: for the folder of a run or study, all its files."""
     if is_study(path):
         return study_parts(path)
     if not path.is_dir() or recording_in(path) == path:
@@ -171,7 +171,7 @@ def _name_of(path: Path) -> str:
 
 
 def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
-    """Check a scenario by the schema of its version, where that is known, and by reading it."""
+    """Check a scenario by the schema of its version, if that is known, and by reading it."""
     source = str(path)
     text = guard.read_text(path)
     if _SOLUTION.search(text[:_HEAD]) is not None:
@@ -194,7 +194,7 @@ def _scenario(path: Path, _progress: Progress | None) -> FileVerdict:
 
 def _solution(path: Path, _progress: Progress | None) -> FileVerdict:
     """Check a solution by its schema, and by reading it."""
-    # It loads the drivability checker.
+    # Imported here because it loads the drivability checker.
     from crgame_ros.analysis.scores.solution_file import read_solution, ROOT
     source = str(path)
     root = guard.parse_hardened(guard.read_text(path), source, ROOT)
@@ -214,13 +214,13 @@ def _tables(path: Path, _progress: Progress | None) -> FileVerdict:
 
 
 def _journal(path: Path, _progress: Progress | None) -> FileVerdict:
-    """Check what has happened in a participant's session."""
+    """Check the journal of a participant's session."""
     count, faults = journal_faults(path)
     return FileVerdict(f'journal of a session of {count} entries', tuple(faults[:_SHOWN]))
 
 
 def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
-    """Check a file that users write; a game with its scenario, as before a run."""
+    """Check a file that users write; check a game together with its scenario, as before a run."""
     values = read_yaml(path, 'file')
     file_kind, wrong = _yaml_kind(values, path)
     faults = [str(error) for error in wrong]
@@ -235,7 +235,7 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
 
 
 def _yaml_kind(values: Any, path: Path) -> tuple[FileKind, tuple[InputError, ...]]:
-    """Choose the kind of file that has most of the keys, and least that is wrong with it."""
+    """Choose the kind of file that declares most of the keys and has the fewest faults."""
     shares = {name: len(kind.keys() & values.keys()) if isinstance(values, dict) else 0
               for name, kind in FILE_KINDS.items()}
     most = max(shares.values())
@@ -248,14 +248,14 @@ def _yaml_kind(values: Any, path: Path) -> tuple[FileKind, tuple[InputError, ...
 
 
 def _timing(path: Path, _progress: Progress | None) -> FileVerdict:
-    """Check a timing report by what every one of them has."""
+    """Check a timing report for the keys that every report has."""
     try:
         content = json.loads(read_text(path, 'JSON file'))
     except (ValueError, RecursionError) as error:
         raise InputError(f'is no JSON ({error})', str(path)) from error
     missing = sorted(REPORT_KEYS - content.keys()) if isinstance(content, dict) else ['everything']
     if isinstance(content, dict) and (late := content.get('late_steps')) is not None:
-        # Earlier versions did not tell of them.
+        # Earlier versions did not write these keys.
         missing += [f'late_steps.{key}' for key in sorted(
             LATE_KEYS - late.keys() if isinstance(late, dict) else LATE_KEYS)]
     return FileVerdict('timing report', tuple(
@@ -263,7 +263,7 @@ def _timing(path: Path, _progress: Progress | None) -> FileVerdict:
 
 
 def _recording(path: Path, progress: Progress | None) -> FileVerdict:
-    """Check that a recording is finished, explains itself and misses nothing."""
+    """Check that a recording is finished, describes itself and lacks nothing."""
     bag = recording_in(path)
     info = describe(bag)
     kind = f'recording of {info.duration_s:.1f} s in {info.storage}'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who may talk to the server: the token, the Host header and the Origin header."""
+"""Access control of the server: the token, the Host header and the Origin header."""
 
 from dataclasses import dataclass, replace
 import errno
@@ -24,14 +24,14 @@ _LOOPBACK_NAMES = ('localhost', '127.0.0.1', '[::1]')
 @dataclass(frozen=True)
 class Access:
     """
-    Where the server listens and what it asks of those who come.
+    The address at which the server listens, and what it demands of a client.
 
     :param host: address or name to listen on.
     :param port: the port; `listen` may move to a later one.
-    :param token: secret that everybody has to show; None lets everybody on this machine in.
+    :param token: secret that every client must present; None admits every client of this machine.
     :param tls: None is plain HTTP.
-    :param invitations: links by which alone people are let in; None for the token.
-    :raises InputError: if there is no token where other machines can connect, or it is short.
+    :param invitations: links, the only way to be admitted; None if the token is used.
+    :raises InputError: if other machines can connect and the token is missing or too short.
     """
 
     host: str
@@ -41,7 +41,7 @@ class Access:
     invitations: Invitations | None = None
 
     def __post_init__(self) -> None:
-        """Refuse to be open to other machines without a token."""
+        """Raise InputError if other machines could connect without a token."""
         if self.token is None and self.invitations is None and not is_loopback(self.host):
             raise InputError('is open to other machines without a token', f'address {self.host}',
                              'make it with Access.guarded')
@@ -50,21 +50,21 @@ class Access:
 
     @classmethod
     def guarded(cls, host: str, port: int) -> 'Access':
-        """Ask nothing of this machine, and a new random token where others can connect."""
+        """Return access without a token on loopback, else with a new random token."""
         return cls(host, port, None if is_loopback(host) else new_token())
 
     @property
     def refusal(self) -> str:
-        """Return to somebody without a cookie what to do."""
+        """Return the text that tells a browser without a cookie what to do."""
         return WITH_TOKEN if self.invitations is None else UNKNOWN
 
     def at_port(self, port: int) -> 'Access':
-        """Return the same at another port."""
+        """Return a copy with another port."""
         return replace(self, port=port)
 
     @property
     def asks(self) -> bool:
-        """Whether anything is asked of those who come."""
+        """Return whether a client must present a token or a link."""
         return self.token is not None or self.invitations is not None
 
     @property
@@ -79,7 +79,7 @@ class Access:
         return self.urls[0]
 
     def link(self, token: str) -> str:
-        """Return the address with a token that lets one browser in."""
+        """Return the address with a token that admits one browser."""
         return f'{self._address(reachable_addresses(self.host)[0])}?token={token}'
 
     def _address(self, host: str) -> str:
@@ -90,13 +90,13 @@ class Access:
         """
         Return whether a Host header names this server.
 
-        A page of another site whose name was made to point here (DNS rebinding) sends that name.
+        After DNS rebinding, a page of another site sends the name of that site.
 
         :param host: the header.
-        :param port: at which the request arrived.
+        :param port: the port at which the request arrived.
         """
         if self.asks:
-            # Whoever knows the token was told the address: it may be any name of this machine.
+            # A client with the token was given the address, which may be any name of this machine.
             return bool(host)
         name, _, given = host.lower().rpartition(':') if _has_port(host) else (
             host.lower(), '', '80')
@@ -107,8 +107,8 @@ class Access:
         """
         Return what a browser may do.
 
-        :param cookie: that it shows.
-        :return: None if it is not let in.
+        :param cookie: the cookie that it presents.
+        :return: None if it is not admitted.
         """
         if self.invitations is not None:
             return self.invitations.rights(cookie)
@@ -118,8 +118,8 @@ class Access:
         """
         Exchange the token of an address for a cookie.
 
-        :param cookie: that the browser shows.
-        :raises InputError: with a sentence for people, if it is not let in.
+        :param cookie: the cookie that the browser presents.
+        :raises InputError: with a readable sentence, if the browser is not admitted.
         """
         if self.invitations is not None:
             return self.invitations.exchange(token, cookie)
@@ -128,7 +128,7 @@ class Access:
         return self.token
 
     def knows(self, token: str | None) -> bool:
-        """Return whether a token is the right one, in a time that does not depend on it."""
+        """Return whether a token is the right one, in constant time."""
         if self.token is None:
             return True
         given = (token or '').encode('utf-8', 'surrogatepass')
@@ -137,9 +137,9 @@ class Access:
 
 def is_own_origin(origin: str | None, host: str) -> bool:
     """
-    Return whether a request comes from a page of this server, or from no page at all.
+    Return whether a request comes from a page of this server or from a program.
 
-    :param origin: the Origin header; None if there is none: a program, no browser.
+    :param origin: the Origin header; None if there is none, as from a program.
     :param host: the Host header.
     """
     if origin is None:
@@ -164,10 +164,10 @@ def is_loopback(host: str) -> bool:
 
 def check_address(host: str, port: int) -> None:
     """
-    Find out whether this machine can listen there, before anything is started.
+    Check that this machine can listen at an address, before anything is started.
 
-    :param port: it may be taken: the next free one will do.
-    :raises InputError: if the address is not this machine's or the port is not for everybody.
+    :param port: may be taken; the server then uses the next free one.
+    :raises InputError: if the address is not this machine's or the port is privileged.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
@@ -184,7 +184,7 @@ def check_address(host: str, port: int) -> None:
 
 
 def new_token() -> str:
-    """Make a random token."""
+    """Return a new random token."""
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 

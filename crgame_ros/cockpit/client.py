@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One WebSocket client: what waits to be sent to it, how fast it may talk, when it is dropped."""
+"""One WebSocket client: its send queue, its rate limit and when it is dropped."""
 
 import asyncio
 from collections import deque
@@ -20,7 +20,7 @@ STATE = 'state'
 
 
 class Socket(Protocol):
-    """What a client needs of `aiohttp.web.WebSocketResponse`."""
+    """The part of `aiohttp.web.WebSocketResponse` that a client uses."""
 
     async def send_frame(self, message: bytes, opcode: WSMsgType) -> None:
         """Send one message, and wait until the operating system has taken it."""
@@ -35,9 +35,9 @@ class _Text:
 @dataclass(frozen=True)
 class Sound:
     """
-    What a page lets its person hear and feel.
+    Sound and rumble settings of a page.
 
-    :param on: whether it sounds while the run goes on.
+    :param on: whether sound is played during a run.
     :param volume: 0 to 1.
     :param rumble: strength of its gamepads' motors, 0 to 1.
     """
@@ -62,7 +62,7 @@ class TokenBucket:
         self._filled_s: float | None = None
 
     def try_spend(self, now_s: float) -> bool:
-        """Take one token; tell whether there was one."""
+        """Remove one token if there is one, and return whether there was."""
         if self._filled_s is not None:
             gained = (now_s - self._filled_s) * self._rate
             self._level = min(self._burst, self._level + gained)
@@ -75,43 +75,43 @@ class TokenBucket:
 
 class Client:
     """
-    One page that is open somewhere.
+    One open page.
 
-    Texts are sent in order. Of frames only the newest of each slot is kept, so that a slow client
-    sees less, never later. Nothing here waits but `write`, which is a task of its own.
+    Texts are sent in order. Only the newest frame of each slot is kept, so that a slow client
+    gets fewer frames, never late ones. Only `write` waits; it runs as a task of its own.
 
     :param client_id: c1, c2, …
-    :param name: of the person, for others to read.
-    :param abort: ends the connection without waiting for anything.
-    :param unsent: gives the bytes that the connection holds back.
+    :param name: name of the person, shown to others.
+    :param abort: ends the connection without waiting.
+    :param unsent: returns the number of bytes that the connection has not sent yet.
     """
 
     def __init__(self, client_id: str, name: str, abort: Callable[[], None],
                  unsent: Callable[[], int]) -> None:
         self.id = client_id
         self.name = name
-        # The same whenever the same page comes back: seats are kept for it.
+        # Stays the same when the same page reconnects: seats are kept for it.
         self.person = f'p{secrets.token_hex(8)}'
         self.key = ''
-        # What the link or the address grants, and what of it the page wants to use.
+        # The rights that the link or the address grants, and the part that the page uses.
         self.granted = self.rights = ALL_RIGHTS
         self.browser = ''
         self.address = ''
         self.device = ''
-        # As the page has measured it [ms]; None before.
+        # As measured by the page [ms]; None before.
         self.round_trip_ms: float | None = None
-        # When its last message came, steady clock [s]
+        # Time of its last message, steady clock [s]
         self.heard_s = 0.0
         # Set by the backend: whether the client holds a seat.
         self.drives = False
         self.wants_predictions = False
-        # Whose perception the page shows, empty for nobody's; and whether with its scans.
+        # The vehicle whose perception the page shows, empty for none; and whether with its scans.
         self.perceives_as = ''
         self.wants_scans = False
-        # As the page told it last.
+        # As last reported by the page.
         self.sound = Sound()
         self.view = SeenView()
-        # Least time between two frames of the slot 'state' [s]; 0 sends each.
+        # Least time between two frames of the slot 'state' [s]; 0 sends every frame.
         self.state_period_s = 0.0
         self.dropped = ''
         self._abort = abort
@@ -129,7 +129,7 @@ class Client:
 
     @property
     def waiting(self) -> int:
-        """How many messages wait to be sent."""
+        """Return how many messages are queued."""
         return len(self._texts) + len(self._frames)
 
     def put_document(self, kind: str, text: bytes) -> None:
@@ -147,21 +147,21 @@ class Client:
         self._put(_Text('', text))
 
     def put_frame(self, slot: str, frame: bytes) -> None:
-        """Keep a frame until it is sent or a newer one of its slot comes."""
+        """Keep a frame until it is sent or replaced by a newer one of its slot."""
         if self.dropped:
             return
         self._frames[slot] = frame
         self._wake.set()
 
     def drop(self, reason: str) -> None:
-        """End the connection at once, and forget what waits."""
+        """End the connection at once and clear the queue."""
         if self.dropped:
             return
         self.forget(reason)
         self._abort()
 
     def forget(self, reason: str) -> None:
-        """Let go of everything that waits to be sent, and take nothing more."""
+        """Clear the queue and accept nothing more."""
         self.dropped = self.dropped or reason
         self._texts.clear()
         self._documents.clear()
@@ -172,18 +172,18 @@ class Client:
             self._timer = None
 
     def check_stall(self, now_s: float) -> None:
-        """Drop the client if its connection has taken nothing for `STALL_S`."""
+        """Drop the client if its connection has accepted no data for `STALL_S`."""
         unsent = self._unsent()
         if unsent == 0:
             self._stall = None
-        # More bytes are a ping: only fewer are progress.
+        # A ping adds bytes: only fewer unsent bytes are progress.
         elif self._stall is None or self._stall[0] != self._sent or unsent < self._stall[1]:
             self._stall = (self._sent, unsent, now_s)
         elif now_s - self._stall[2] >= STALL_S:
             self.drop('reads nothing')
 
     async def write(self, socket: Socket) -> None:
-        """Send what waits, for ever: texts first, then the frames."""
+        """Send what is queued, without end: texts first, then frames."""
         loop = asyncio.get_running_loop()
         while True:
             self._wake.clear()
@@ -208,19 +208,19 @@ class Client:
         if self.dropped:
             return
         self._texts.append(text)
-        # Documents are at most one of each kind, and shared with the hub.
+        # There is at most one document of each kind, and the hub shares them.
         if len(self._texts) > MAX_WAITING or self._event_bytes > MAX_WAITING_BYTES:
             self.drop('reads too slowly')
         self._wake.set()
 
     def _next_slot(self, loop: asyncio.AbstractEventLoop) -> str | None:
-        """Choose the frame to send: the longest waiting, unless its time has not come."""
+        """Return the slot to send next: the one queued longest, unless it is not due yet."""
         for slot in self._frames:
             if slot != STATE or self.state_period_s <= 0.0:
                 return slot
             now_s = loop.time()
             if now_s >= self._state_due_s:
-                # From the time it was due: the mean rate is the one asked for.
+                # Counted from the due time, so that the mean rate is the requested one.
                 self._state_due_s = max(self._state_due_s, now_s - self.state_period_s)
                 self._state_due_s += self.state_period_s
                 return slot

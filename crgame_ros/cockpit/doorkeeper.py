@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who may keep a connection open: so many each, and only while something is asked through it."""
+"""Limits on open connections: their number per address, and their idle time."""
 
 import asyncio
 from collections import Counter
@@ -11,7 +11,7 @@ import ssl
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
-# At once, of all and of one address; a browser opens six for a page.
+# Simultaneous connections, in total and of one address; a browser opens six for a page.
 MAX_CONNECTIONS = 256
 MAX_OF_ADDRESS = 128
 # Until the first request, and between two of them [s]
@@ -23,23 +23,23 @@ _log = logging.getLogger(__name__)
 
 
 class Doorkeeper:
-    """Counts the connections of each address and ends those that are kept for nothing."""
+    """Counter of the connections of each address, which closes idle ones."""
 
     def __init__(self) -> None:
         self._of_address: Counter[str] = Counter()
         self._open: dict[asyncio.BaseTransport, _Watched] = {}
 
     def watched(self, make: Callable[[], asyncio.Protocol]) -> Callable[[], asyncio.Protocol]:
-        """Return a factory of protocols that are watched."""
+        """Return a factory of watched protocols."""
         return lambda: _Watched(self, make())
 
     def begins(self, transport: asyncio.BaseTransport | None) -> None:
-        """Take note that a request has come."""
+        """Record that a request has arrived."""
         if transport in self._open:
             self._open[transport].requests += 1
 
     def ends(self, transport: asyncio.BaseTransport | None) -> None:
-        """Take note that a request has been answered."""
+        """Record that a request has been answered."""
         if transport in self._open:
             watched = self._open[transport]
             watched.requests -= 1
@@ -47,7 +47,7 @@ class Doorkeeper:
             watched.patience_s = NEXT_REQUEST_S
 
     def lets_in(self, transport: asyncio.BaseTransport, watched: '_Watched') -> bool:
-        """Count a connection, unless there are too many."""
+        """Count a connection and return True, or return False if there are too many."""
         if len(self._open) >= MAX_CONNECTIONS \
                 or self._of_address[watched.address] >= MAX_OF_ADDRESS:
             return False
@@ -56,7 +56,7 @@ class Doorkeeper:
         return True
 
     def forget(self, transport: asyncio.BaseTransport, watched: '_Watched') -> None:
-        """Take note that a connection has ended."""
+        """Record that a connection has ended."""
         if self._open.pop(transport, None) is not None:
             self._of_address[watched.address] -= 1
             if not self._of_address[watched.address]:
@@ -64,7 +64,7 @@ class Doorkeeper:
 
 
 class _Watched(asyncio.Protocol):
-    """Passes everything on to the protocol of one connection."""
+    """A wrapper that passes everything on to the protocol of one connection."""
 
     def __init__(self, keeper: Doorkeeper, protocol: asyncio.Protocol) -> None:
         self._keeper = keeper
@@ -122,12 +122,12 @@ class _Watched(asyncio.Protocol):
 
 class WatchedSite(web.BaseSite):
     """
-    Where a server listens behind a doorkeeper.
+    A site of the server whose connections a doorkeeper limits.
 
-    :param runner: of the server.
+    :param runner: runner of the server.
     :param host: address or name.
     :param port: 0 for any.
-    :param keeper: counts who comes.
+    :param keeper: counts the connections.
     :param ssl_context: of TLS; None for plain HTTP.
     """
 
@@ -155,7 +155,7 @@ class WatchedSite(web.BaseSite):
 
 
 class _StrangersMistakes(logging.Filter):
-    """Makes one line of what comes of requests that are no HTTP: anybody can send them."""
+    """A filter of log records about requests that are not HTTP, which any client can send."""
 
     def filter(self, record: logging.LogRecord) -> bool:  # noqa: A003
         error = record.exc_info[1] if record.exc_info else None
@@ -163,7 +163,7 @@ class _StrangersMistakes(logging.Filter):
 
 
 def server_log() -> logging.Logger:
-    """Return the log of the HTTP server, in which requests that are no HTTP leave no traceback."""
+    """Return the log of the HTTP server, without tracebacks of requests that are not HTTP."""
     log = logging.getLogger(f'{__name__}.http')
     if not log.filters:
         log.addFilter(_StrangersMistakes())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the cockpit is opened: to this machine, to others with a token, or by links over TLS."""
+"""Modes of exposing the cockpit: to this machine, to others with a token, by links over TLS."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _GIVE = 'install openssl, or give a certificate with --certificate and --key'
 
 def make_certificate(folder: Path, addresses: Sequence[str]) -> tuple[Path, Path]:
     """
-    Make a self-signed certificate for this machine, unless the folder has one.
+    Create a self-signed certificate for this machine, unless the folder has one.
 
     :param folder: only its owner can read it.
     :param addresses: names and IP addresses under which the machine is reached.
@@ -54,9 +54,9 @@ def make_certificate(folder: Path, addresses: Sequence[str]) -> tuple[Path, Path
 
 def tls_context(certificate: Path, key: Path) -> ssl.SSLContext:
     """
-    Make what a server speaks TLS with: version 1.2 or newer.
+    Return the TLS context of a server: version 1.2 or newer.
 
-    :raises InputError: if the files are no certificate and its key.
+    :raises InputError: if the files are not a certificate and its key.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -100,15 +100,15 @@ def _is_ip(text: str) -> bool:
 @dataclass(frozen=True)
 class Exposure:
     """
-    What the command line says of who may come.
+    The access options of the command line.
 
     :param host: address to listen on.
     :param port: the first to try.
-    :param token: whether a token is asked for on this machine too.
-    :param links: whether people are let in by links alone, one browser each, over TLS.
-    :param certificate: PEM file; None makes one where there are links, and is plain HTTP else.
-    :param key: of the certificate.
-    :param private: folder that only its owner can read, where there are links.
+    :param token: whether clients of this machine need a token too.
+    :param links: whether only links admit people, one browser each, over TLS.
+    :param certificate: PEM file; None creates one if there are links, else means plain HTTP.
+    :param key: key of the certificate.
+    :param private: folder that only its owner can read, used if there are links.
     """
 
     host: str
@@ -121,9 +121,9 @@ class Exposure:
 
     def access(self) -> Access:
         """
-        Make what the server asks of those who come.
+        Return the access control of the server.
 
-        :raises CrgameError: if a certificate cannot be made or used.
+        :raises CrgameError: if a certificate cannot be created or used.
         """
         pair = self._certificate()
         tls = None if pair is None else tls_context(*pair)
@@ -135,10 +135,10 @@ class Exposure:
 
     def lines(self, access: Access, seats: Sequence[str]) -> list[str]:
         """
-        Return where the page is, and make the first links.
+        Return lines with the addresses of the page, and create the first links.
 
-        :param access: with the port at which the server listens.
-        :param seats: for each a link is made for its driver.
+        :param access: access control with the port at which the server listens.
+        :param seats: vehicles; each gets a link for its driver.
         """
         first, *others = access.urls
         lines = [f'the cockpit is at {first}']
@@ -171,7 +171,7 @@ class Exposure:
 
 def check_certificate(certificate: Path | None, key: Path | None) -> ssl.SSLContext | None:
     """
-    Find out whether a certificate can be used, before anything is started.
+    Check that a certificate can be used, before anything is started.
 
     :raises InputError: if it cannot.
     """

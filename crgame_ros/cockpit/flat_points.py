@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Points as the page gets them: flat lists of rounded coordinates."""
+"""Points for the page: flat lists of rounded coordinates."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,27 +8,27 @@ import shapely
 
 Points = NDArray[np.float64]
 
-# Lines lose vertices that the eye would not miss [m]; neighbours share theirs, and keep so.
+# Tolerance of line simplification [m], too small to see; neighbours keep shared vertices.
 TOLERANCE = 0.01
 _DECIMALS = 3
 
 
 def flat(points: Points) -> list[float]:
-    """Flatten points (N, D) [m]."""
+    """Return points (N, D) as one flat list [m]."""
     return [rounded(value) for value in np.asarray(points, dtype=np.float64).ravel()]
 
 
 def rounded(value: float) -> float:
-    """Round a coordinate to millimetres [m]."""
+    """Return a coordinate rounded to millimetres [m]."""
     return round(float(value), _DECIMALS)
 
 
 def simplified(vertices: Points) -> Points:
     """
-    Drop the vertices of a polyline without which it is the same within a centimetre.
+    Return a polyline without the vertices that change it by less than a centimetre.
 
-    :param vertices: (N, 2), or (N, 3) of which the heights keep as true [m]
-    :return: those that are left, first and last among them
+    :param vertices: (N, 2), or (N, 3) whose heights stay as exact [m]
+    :return: the vertices that are left, including the first and the last
     """
     points = np.asarray(vertices, dtype=np.float64)
     kept = shapely.get_coordinates(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The binary frames that carry motion to the page: little-endian float64 arrays."""
+"""Encoders of the binary frames that carry motion to the page: little-endian float64 arrays."""
 
 from collections.abc import Sequence
 from enum import IntEnum
@@ -13,18 +13,18 @@ STATE_COLUMNS = 13
 OBJECT_COLUMNS = 6
 PLAN_COLUMNS = 5
 PREDICTION_COLUMNS = 3
-# Of an estimate: x, y, yaw, speed, yaw rate, and the variances xx, xy, yy.
+# Values of an estimate: x, y, yaw, speed, yaw rate, and the variances xx, xy, yy.
 ESTIMATE_WIDTH = 8
-# Of a scan before its ranges: x, y, yaw, first angle, increment, longest range, period.
+# Values of a scan before its ranges: x, y, yaw, first angle, increment, longest range, period.
 SCAN_WIDTH = 7
-# Of a vehicle's criticality: its index, then value and whom it is to, of ten measures.
+# Values of a vehicle's criticality: its index, then value and other object of ten measures.
 CRITICALITY_COLUMNS = 21
 
 _FLOAT = np.dtype('<f8')
 
 
 class FrameKind(IntEnum):
-    """What a frame carries: its first number."""
+    """The kind of a frame, its first number."""
 
     STATE = 1
     OBJECTS = 2
@@ -39,7 +39,7 @@ class FrameKind(IntEnum):
 
 def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> bytes:
     """
-    Write where the driven vehicles are.
+    Encode the states of the driven vehicles.
 
     :param epoch: counts resets.
     :param n: simulation step.
@@ -56,7 +56,7 @@ def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> b
 
 def encode_objects(epoch: int, n: int, k: int, t: float, objects: ArrayLike) -> bytes:
     """
-    Write where all other objects are.
+    Encode the poses of all other objects.
 
     :param epoch: counts resets.
     :param n: simulation step.
@@ -71,7 +71,7 @@ def encode_objects(epoch: int, n: int, k: int, t: float, objects: ArrayLike) -> 
 
 def encode_plan(epoch: int, n: int, k: int, t: float, vehicle: int, points: ArrayLike) -> bytes:
     """
-    Write the plan of an AV.
+    Encode the plan of an AV.
 
     :param epoch: counts resets.
     :param n: simulation step.
@@ -87,14 +87,14 @@ def encode_plan(epoch: int, n: int, k: int, t: float, vehicle: int, points: Arra
 def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence[int],
                       points: ArrayLike) -> bytes:
     """
-    Write what an AV is told about the future of others.
+    Encode the predictions of others that an AV is sent.
 
     :param epoch: counts resets.
     :param n: simulation step.
     :param k: scenario step.
     :param t: time since the start of the run [s].
     :param av: index of the asking AV among the scene's vehicles.
-    :param columns: (Q) who is predicted: 0 to V - 1 are vehicles, objects follow from V.
+    :param columns: (Q) predicted objects: 0 to V - 1 are vehicles, objects follow from V.
     :param points: (Q, P, 3) x, y [m], yaw [rad], one scenario time step apart, from `t`.
     :raises InputError: if the arrays do not fit.
     """
@@ -114,15 +114,15 @@ def encode_prediction(epoch: int, n: int, k: int, t: float, av: int, columns: Se
 def encode_scan(epoch: int, n: int, k: int, t: float, av: int, sensor: int, fan: ArrayLike,
                 ranges: ArrayLike) -> bytes:
     """
-    Write what a sensor's rays have hit.
+    Encode the scan of a sensor.
 
     :param epoch: counts resets.
-    :param n: simulation step at which the sensor looked.
+    :param n: simulation step of the scan.
     :param k: scenario step.
     :param t: time since the start of the run [s].
     :param av: index of its AV among the scene's vehicles.
     :param sensor: its index among the AV's sensors.
-    :param fan: (7) where the sensor was, x, y [m], yaw [rad] in map; angle of the first ray from
+    :param fan: (7) pose of the sensor, x, y [m], yaw [rad] in map; angle of the first ray from
         there, angle from ray to ray [rad], longest range [m], time between two scans [s].
     :param ranges: (R) [m]; inf where nothing was hit.
     :raises InputError: if the arrays do not fit.
@@ -136,7 +136,7 @@ def encode_scan(epoch: int, n: int, k: int, t: float, av: int, sensor: int, fan:
 
 def encode_estimate(epoch: int, n: int, k: int, t: float, av: int, estimate: ArrayLike) -> bytes:
     """
-    Write where an AV takes itself to be.
+    Encode the pose estimate of an AV.
 
     :param epoch: counts resets.
     :param n: simulation step.
@@ -155,14 +155,14 @@ def encode_estimate(epoch: int, n: int, k: int, t: float, av: int, estimate: Arr
 
 def encode_seen(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence[int]) -> bytes:
     """
-    Write of whom the planner of an AV with perception is told.
+    Encode which objects the planner of an AV with perception is told of.
 
     :param epoch: counts resets.
     :param n: simulation step.
     :param k: scenario step.
     :param t: time since the start of the run [s].
     :param av: index of the AV among the scene's vehicles.
-    :param columns: (Q) who is seen or remembered: 0 to V - 1 are vehicles, objects follow from V.
+    :param columns: (Q) seen or remembered: 0 to V - 1 are vehicles, objects follow from V.
     """
     return _flat((FrameKind.SEEN, epoch, n, k, t, av, len(columns)), columns)
 
@@ -170,10 +170,10 @@ def encode_seen(epoch: int, n: int, k: int, t: float, av: int, columns: Sequence
 def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, float],
                      resolution: float, occupied: NDArray[np.bool_]) -> bytes:
     """
-    Write where permanent obstacles are.
+    Encode the map of permanent obstacles.
 
-    After origin, resolution, rows and columns follow bytes, padded to a whole number of values:
-    bit 0 of byte 0 is cell [0, 0], and cells go on by columns.
+    Bytes follow origin, resolution, rows and columns, padded to a whole number of values: bit 0
+    of byte 0 is cell [0, 0], and the column index runs fastest.
 
     :param epoch: counts resets.
     :param n: simulation step.
@@ -182,7 +182,7 @@ def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, 
     :param origin: x, y of the lower left corner in map [m]
     :param resolution: edge of a cell [m]
     :param occupied: (rows, columns); rows grow with y, columns with x.
-    :raises InputError: if the grid has no two dimensions or no size.
+    :raises InputError: if the grid is not two-dimensional or is empty.
     """
     if occupied.ndim != 2 or not (0.0 < resolution < np.inf and np.isfinite(origin).all()):
         raise InputError(f'a grid of shape {occupied.shape} with cells of {resolution} m',
@@ -194,7 +194,7 @@ def encode_occupancy(epoch: int, n: int, k: int, t: float, origin: tuple[float, 
 
 def encode_criticality(epoch: int, n: int, k: int, t: float, rows: ArrayLike) -> bytes:
     """
-    Write what is left to the driven vehicles.
+    Encode the criticality measures of the driven vehicles.
 
     :param epoch: counts resets.
     :param n: simulation step.
@@ -202,7 +202,7 @@ def encode_criticality(epoch: int, n: int, k: int, t: float, rows: ArrayLike) ->
     :param t: time since the start of the run [s].
     :param rows: (S, 21) index of the vehicle; then of gap [m], time_gap, thw, ttc, ttc_a [s],
         drac, a_req [m/s^2], ttc_2d [s], min_distance [m] and pet [s] the most critical value and
-        whom it is to: 0 to V - 1 are vehicles, objects follow from V, -1 is nobody.
+        the other object: 0 to V - 1 are vehicles, objects follow from V, -1 is none.
     :raises InputError: if the array has another width.
     """
     return _rows(FrameKind.CRITICALITY, epoch, n, k, t, (), rows, CRITICALITY_COLUMNS)

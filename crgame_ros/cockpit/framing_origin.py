@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The one other page that may show the cockpit within it, by its origin."""
+"""The origin of the one other page that may frame the cockpit."""
 
 import ipaddress
 import re
@@ -13,12 +13,12 @@ _DEFAULT_PORTS = {'http': '80', 'https': '443'}
 
 def read_origin(text: str) -> str:
     """
-    Read an origin, as browsers write it.
+    Parse an origin, as browsers write it.
 
-    It goes into a header as it is: nothing but scheme, host and port may be in it.
+    It goes into a header unchanged, so only scheme, host and port may be in it.
 
     :param text: such as http://127.0.0.1:8070.
-    :return: in lower case, without the port that the scheme has anyway.
+    :return: in lower case, without the default port of the scheme.
     :raises InputError: if it is anything else, such as an address with a path or a wildcard.
     """
     match = _ORIGIN.fullmatch(text.strip().lower().removesuffix('/'))

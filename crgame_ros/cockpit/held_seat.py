@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A seat that somebody at a page holds, and what their hands do."""
+"""A seat that the driver at a page holds, and the driver's inputs."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,18 +10,18 @@ from crgame_ros.driver.input_delay import InputDelay
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
-# A page repeats its input every 50 ms; silent for longer, it counts as gone [s].
+# A page repeats its input every 50 ms; after this silence it counts as gone [s].
 SILENCE_S = 0.2
-# What the page says of the lever and the horn: which of left, right, hazard and horn are held.
+# The lever and the horn as the page reports them: which of left, right, hazard, horn are held.
 _LIGHTS = LightButtons(*(frozenset({i}) for i in range(4)))
 
 
 class HeldSeat:
     """
-    A seat that somebody in the browser holds.
+    A seat that a driver in the browser holds.
 
-    Keys go through the keyboard filter (CRG 18-19) in simulation time, axes are taken as the
-    page calibrated them (CRG 17).
+    Keys pass the keyboard filter (CRG 18-19) in simulation time. Axes are used as the page
+    calibrated them (CRG 17).
 
     :param seat_id: the vehicle.
     :param holder: id of the client.
@@ -33,7 +33,7 @@ class HeldSeat:
         self.holder = holder
         self.person = person
         self.requests: list[str] = []
-        # To whom the holder wants to give it, until they have answered.
+        # The client to which the holder offers the seat, until it has answered.
         self.offered_to: str | None = None
         self.delay = InputDelay()
         self._cycles = KeyboardCycles()
@@ -46,10 +46,10 @@ class HeldSeat:
 
     def apply_input(self, message: Mapping[str, Any], now_s: float) -> bool:
         """
-        Take an input message of the holder, already checked.
+        Apply a checked input message of the holder.
 
         :param now_s: steady clock [s]
-        :return: whether the hands do something else than before.
+        :return: whether the inputs differ from the ones before.
         """
         self._heard_s = now_s
         before = (self._keys, self._axes)
@@ -69,7 +69,7 @@ class HeldSeat:
         return (self._keys, self._axes) != before
 
     def release(self) -> None:
-        """Take the hands off everything at once."""
+        """Release all controls at once."""
         self.away = True
         self._keys = self._axes = None
         self._put_back = False
@@ -77,12 +77,12 @@ class HeldSeat:
         self._lever.hold(())
 
     def is_silent(self, now_s: float) -> bool:
-        """Return whether the page has not been heard for too long."""
+        """Return whether the page has been silent for too long."""
         return not self.away and now_s - self._heard_s > SILENCE_S
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """
-        Return the command of cycle n; while the seat is empty, released but for the indicators.
+        Return the command of cycle n; an empty seat releases all but the indicators.
 
         :param dt_s: length of a cycle in simulation time [s]
         """

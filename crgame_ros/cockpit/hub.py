@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All clients: the documents that each of them has, events, and the newest frames."""
+"""The hub of all clients: their documents, events and newest frames."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 from crgame_ros.cockpit.shown_paths import without_paths
 
 MAX_CLIENTS = 32
-# Of one address: more would be the room of others.
+# Clients of one address: more would take the room of others.
 MAX_OF_ADDRESS = 16
-# Pages speak every second, hidden ones every minute: who is silent for longer gives way to
-# somebody who comes, or is no page [s].
+# Pages send a message every second, hidden ones every minute. A client that is silent for
+# longer is no page, or gives way to a new client [s].
 GIVES_WAY_S = 5.0
 SILENT_S = 180.0
-# A new scene makes them void.
+# A new scene invalidates them.
 SCENE = 'scene'
 
 
@@ -35,10 +35,10 @@ class _Frame:
 
 class Hub:
     """
-    Everybody who watches. Nothing here waits: a client that reads slowly delays nobody.
+    All connected clients. Nothing here waits, so a client that reads slowly delays no other.
 
     :param mode: live or replay, for `hello`.
-    :param framed_by: origin of the page that may show this one within it, for `hello`.
+    :param framed_by: origin of the page that may frame this one, for `hello`.
     """
 
     def __init__(self, mode: str, framed_by: str = '') -> None:
@@ -51,14 +51,14 @@ class Hub:
 
     @property
     def clients(self) -> Mapping[str, Client]:
-        """Return the clients that are connected now, by their id."""
+        """Return the connected clients by id."""
         return MappingProxyType(self._clients)
 
     def make_room(self, address: str, now_s: float) -> bool:
         """
-        Make sure that one more can be let in: whoever is silent and does not drive gives way.
+        Make room for one more client: a silent client that does not drive gives way.
 
-        :param address: from which somebody comes.
+        :param address: address of the new client.
         :param now_s: steady clock [s].
         :return: false if there is no room.
         """
@@ -74,23 +74,23 @@ class Hub:
         return True
 
     def client_with_key(self, key: str) -> Client | None:
-        """Find the page that has a key."""
+        """Return the client of the page with a key; None if there is none."""
         given = key.encode('utf-8', 'surrogatepass')
         return next((client for client in self._clients.values() if client.key
                      and hmac.compare_digest(client.key.encode(), given)), None)
 
     def identify(self, client: Client, key: str, *, fresh: bool) -> bool:
         """
-        Take a page for the one that had a key before.
+        Recognise a page by the key that it had before.
 
-        :param fresh: whether it is a new tab, which must not be taken for one that is open.
-        :return: whether it is; its older connection is dropped then.
+        :param fresh: whether it is a new tab, which must not be confused with an open one.
+        :return: whether it is recognised; its older connection is then dropped.
         """
         other = self.client_with_key(key)
         accepted = other is None or other is client or not fresh
         if accepted:
             client.key = key
-            # Others are told this, and cannot come back with it.
+            # Others see this id, and cannot come back with it.
             client.person = f'p{hashlib.sha256(key.encode()).hexdigest()[:16]}'
             if other is not None and other is not client:
                 other.key = ''
@@ -103,7 +103,7 @@ class Hub:
         Remember a document and send it to all clients, if it has changed.
 
         :param kind: scene, seats, signals, events, status or alarms.
-        :param content: what JSON can hold; numbers that are not finite become null.
+        :param content: JSON content; numbers that are not finite become null.
         """
         text = _encode(kind, content)
         if self._documents.get(kind) == text:
@@ -117,7 +117,7 @@ class Hub:
     def send_event(self, kind: str, content: Mapping[str, Any],
                    only: Client | None = None) -> None:
         """
-        Send something that is not remembered.
+        Send an event, which is not remembered.
 
         :param kind: notice, reply or pong.
         :param only: the client it is for; None sends it to all.
@@ -127,7 +127,7 @@ class Hub:
             client.put_event(text)
 
     def send_rights(self, client: Client, accepted: bool = True) -> None:
-        """Tell a page what its person may do, and whether it was taken for whom it says."""
+        """Send a page the rights of its person, and whether its identity was accepted."""
         self.send_event('you', {'rights': _rights(client), 'accepted': accepted}, only=client)
 
     def send_frame(self, slot: str, frame: bytes, *,
@@ -145,7 +145,7 @@ class Hub:
                 client.put_frame(slot, frame)
 
     def send_wanted(self, client: Client) -> None:
-        """Give a client the newest of what not everybody gets: it has chosen anew."""
+        """Send a client the newest of the optional frames after it has changed its choice."""
         for slot, frame in self._frames.items():
             if frame.only_if is not None and frame.only_if(client):
                 client.put_frame(slot, frame.data)
@@ -153,12 +153,12 @@ class Hub:
     def add(self, abort: Callable[[], None], unsent: Callable[[], int], *,
             rights: Rights = ALL_RIGHTS, address: str = '', now_s: float = 0.0) -> Client:
         """
-        Let a client in, and give it what the others have.
+        Add a client and send it the documents and frames that the others have.
 
         :param abort: ends its connection at once.
-        :param unsent: gives the bytes that its connection holds back.
-        :param rights: what its person may do.
-        :param address: from which it has come.
+        :param unsent: returns the number of bytes that its connection has not sent yet.
+        :param rights: rights of its person.
+        :param address: address from which it connects.
         :param now_s: steady clock [s].
         """
         self._count += 1
@@ -177,13 +177,13 @@ class Hub:
         return client
 
     def remove(self, client: Client) -> None:
-        """Forget a client."""
+        """Remove a client."""
         client.forget('left')
         del self._clients[client.id]
 
     def check_stalls(self, now_s: float) -> None:
         """
-        Drop the clients whose connections take nothing any more.
+        Drop the clients whose connections accept no more data.
 
         :param now_s: steady clock [s].
         """

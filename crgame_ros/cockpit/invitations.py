@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Links that let one browser in each, and what those who came by them may do."""
+"""Links that admit one browser each, and the rights that they grant."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,7 +21,7 @@ UNKNOWN = 'Open a link that the cockpit printed when it started, or that a direc
 
 @dataclass
 class _Link:
-    """A link: the digest of its token, and of the cookie that it was exchanged for."""
+    """A link: the digests of its token and of the cookie that replaced the token."""
 
     token: str
     role: str
@@ -31,10 +31,10 @@ class _Link:
 
 class Invitations:
     """
-    The links of one cockpit. Only digests are kept, also in the file.
+    The links of one cockpit. Only digests are kept, in memory and in the file.
 
-    :param path: file that a cockpit which is started again reads; made here, for its owner alone.
-    :raises InputError: if there is a file that is no list of links.
+    :param path: file that a restarted cockpit reads; created readable for its owner only.
+    :raises InputError: if the file is not a list of links.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,12 +49,12 @@ class Invitations:
 
     def make(self, role: str, seat: str = '') -> str:
         """
-        Make a link.
+        Create a link.
 
         :param role: direct, drive, watch or all.
-        :param seat: the only one that its driver may take; empty for any.
+        :param seat: the only seat that its driver may take; empty for any.
         :return: its token.
-        :raises CrgameError: if there are too many, or they cannot be kept.
+        :raises CrgameError: if there are too many, or they cannot be saved.
         """
         if len(self._links) >= MAX_LINKS:
             raise CrgameError(f'{MAX_LINKS} links have been made: start the cockpit again')
@@ -67,9 +67,9 @@ class Invitations:
         """
         Exchange a token for a cookie.
 
-        :param cookie: that the browser has already: its own link may be opened again.
+        :param cookie: the browser's cookie, if any: a browser may open its own link again.
         :return: the cookie.
-        :raises InputError: with a sentence for people, if there is no such link or it was used.
+        :raises InputError: with a readable sentence, if there is no such link or it was used.
         """
         link = _find(self._links, 'token', token)
         if link is None:
@@ -84,7 +84,7 @@ class Invitations:
         return cookie
 
     def rights(self, cookie: str | None) -> Rights | None:
-        """Return what the browser with a cookie may do; None if it came by no link."""
+        """Return the rights of the browser with a cookie; None if it used no link."""
         link = _find(self._links, 'cookie', cookie) if cookie else None
         return None if link is None else Rights.for_role(link.role, link.seat)
 
@@ -105,6 +105,6 @@ def _digest(secret: str) -> str:
 
 
 def _find(links: Sequence[_Link], field: str, secret: str) -> _Link | None:
-    # The digests are compared: how long that takes tells nothing of the secret.
+    # Digests are compared, so the time that it takes reveals nothing of the secret.
     digest = _digest(secret)
     return next((link for link in links if getattr(link, field) == digest), None)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The other end of `job_process`: a process that answers jobs until its standard input ends.
+The worker process of `job_process`, which answers jobs until its standard input ends.
 
-Reading can take seconds and much memory; the process that serves the page, and may carry
-somebody's hands on the wheel, has neither. Jobs are JSON objects, one a line, with the name of the
+Reading can take seconds and much memory. The process that serves the page, and may carry a
+driver's inputs, can afford neither. Jobs are JSON objects, one a line, with the name of the
 `job`, a `path` and further arguments; each is answered on the standard output, with one of
 `JobOutcome`.
 """
@@ -28,15 +28,15 @@ from crgame_ros.errors import CrgameError
 HEADER = struct.Struct('<BQ')
 _MAX_MEMORY = 4 * 2 ** 30
 _NICE = 10
-# Of the processor's time that one job may take [s]. The preview of a map of 50,000 lanelets, the
-# most that the guard lets through, would take 33 s and 1.4 GB (docs/measurements.md).
+# Processor time that one job may take [s]. The preview of a map of 50,000 lanelets, the most
+# that the guard allows, would take 33 s and 1.4 GB (docs/measurements.md).
 MOST_CPU_S = 20.0
 
 Job = Callable[..., dict[str, Any]]
 
 
 class JobOutcome(IntEnum):
-    """What became of a job; after one that was given up the process is to be ended."""
+    """The outcome of a job; after an aborted job the process has to end."""
 
     REFUSED = 0
     DONE = 1
@@ -44,29 +44,29 @@ class JobOutcome(IntEnum):
 
 
 class _GivenUpError(CrgameError):
-    """A job has taken more of the processor than it may."""
+    """Error of a job that has exceeded its processor time."""
 
 
 def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_CPU_S) -> None:
     """
     Answer jobs until the standard input ends.
 
-    :param jobs: by name; each is given the path and the other arguments by their names, and gives
-        what JSON can hold.
-    :param subject: what they read, for people.
-    :param most_cpu_s: after which a job is given up [s].
+    :param jobs: functions by name; each gets the path and the other arguments as keywords, and
+        returns JSON content.
+    :param subject: readable name of what they read.
+    :param most_cpu_s: processor time after which a job is aborted [s].
     """
     def stop_job(_number: int, _frame: FrameType | None) -> None:
         raise _GivenUpError(f'the {subject} takes more than {most_cpu_s:g} s to read; choose a '
                             'smaller one')
 
     signal.signal(signal.SIGPROF, stop_job)
-    # Ctrl-C is for the server, which closes the standard input when it ends.
+    # Ctrl-C goes to the server, which closes the standard input when it ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
     resource.setrlimit(resource.RLIMIT_AS, (_MAX_MEMORY, _MAX_MEMORY))
     answers = os.fdopen(os.dup(1), 'wb')
-    # What a library prints must not get into the answers.
+    # The output of a library must not get into the answers.
     os.dup2(2, 1)
     with contextlib.suppress(BrokenPipeError):
         for line in sys.stdin.buffer:
@@ -84,7 +84,7 @@ def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
             signal.setitimer(signal.ITIMER_PROF, 0.0)
         outcome, text = JobOutcome.DONE, json.dumps(result, allow_nan=False, separators=(',', ':'))
     except CrgameError as error:
-        # Names of folders on this machine are nobody's business.
+        # An answer must not reveal the folders of this machine.
         outcome = JobOutcome.GIVEN_UP if isinstance(error, _GivenUpError) else JobOutcome.REFUSED
         text = str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
     except (MemoryError, RecursionError):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A process that reads files for the page: one job at a time, ended when it takes long."""
+"""A process that reads files for the page, one job at a time, with a time limit for each."""
 
 import asyncio
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from crgame_ros.errors import CrgameError, InputError
 
 MAX_QUEUED = 8
 TIMEOUT_S = 60.0
-# Between two looks at whether somebody still waits [s].
+# Interval at which it is checked whether the client still waits [s].
 LOOK_S = 0.25
 
 _PACKAGES = Path(__file__).resolve().parents[2]
@@ -25,11 +25,11 @@ _log = logging.getLogger(__name__)
 
 class JobProcess:
     """
-    Runs jobs of a module that serves them (`job_loop`) in a process, started when first needed.
+    A process with a module that answers jobs (`job_loop`), started at its first job.
 
-    :param module: dotted name.
-    :param subject: what its jobs read, for people: scenario or run.
-    :param timeout_s: after which a job is given up and the process ended [s].
+    :param module: dotted name of the module.
+    :param subject: readable name of what its jobs read: scenario or run.
+    :param timeout_s: time after which a job is aborted and the process ended [s].
     """
 
     def __init__(self, module: str, subject: str, timeout_s: float = TIMEOUT_S) -> None:
@@ -41,7 +41,7 @@ class JobProcess:
         self._process: asyncio.subprocess.Process | None = None
 
     async def start(self) -> None:
-        """Start the process before its first job, which then need not wait for its imports."""
+        """Start the process early, so that its first job need not wait for its imports."""
         async with self._lock:
             await self._running()
 
@@ -51,8 +51,8 @@ class JobProcess:
         Run a job.
 
         :param job: its name.
-        :param unwanted: tells that nobody waits for it any more: then it is ended.
-        :param arguments: its arguments, as JSON can hold them.
+        :param unwanted: returns True once no client waits for the result; the job is then ended.
+        :param arguments: its arguments, as JSON content.
         :return: its result as JSON.
         :raises CrgameError: if it fails, takes too long, is unwanted, or too many wait.
         """
@@ -73,7 +73,7 @@ class JobProcess:
         if process.returncode is None:
             process.kill()
         await process.wait()
-        # Else its pipes would be closed when the loop is already gone.
+        # Else its pipes would be closed after the event loop.
         if process.stdin is not None:
             process.stdin.close()
 
@@ -82,7 +82,7 @@ class JobProcess:
         try:
             async with asyncio.timeout(self._timeout_s):
                 outcome, answer = await self._wanted(job, unwanted)
-            # What was given up leaves half a gigabyte behind.
+            # An aborted job leaves half a gigabyte of memory behind.
             done = outcome is not JobOutcome.GIVEN_UP
         except TimeoutError as error:
             raise CrgameError(f'the {self._subject} takes more than {self._timeout_s:g} s to '
@@ -99,7 +99,7 @@ class JobProcess:
 
     async def _wanted(self, job: dict[str, Any],
                       unwanted: Callable[[], bool]) -> tuple[JobOutcome, bytes]:
-        """Exchange a job for its answer as long as somebody waits for that."""
+        """Return the answer of a job, as long as a client waits for it."""
         exchange = asyncio.create_task(self._exchange(json.dumps(job).encode() + b'\n'))
         try:
             while not (await asyncio.wait([exchange], timeout=LOOK_S))[0]:
@@ -120,7 +120,7 @@ class JobProcess:
     async def _running(self) -> asyncio.subprocess.Process:
         process = self._process
         if process is None or process.returncode is not None:
-            # The very package that asks, and nothing from the working directory.
+            # Use the package of this process, and nothing from the working directory.
             paths = [str(_PACKAGES), *filter(None, [os.environ.get('PYTHONPATH')])]
             process = self._process = await asyncio.create_subprocess_exec(
                 sys.executable, '-P', '-m', self._module,

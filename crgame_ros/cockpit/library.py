@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scenarios and games that the page offers: folders of this machine, and uploads."""
+"""The scenarios and games that the page offers: folders of this machine and uploads."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
@@ -35,12 +35,12 @@ _TIMELINES = ('.keys.yaml', '.joy.yaml')
 @dataclass(frozen=True)
 class Entry:
     """
-    Something that can be chosen.
+    A game or scenario that can be chosen.
 
-    :param id: by which the page names it; says nothing of where it is.
+    :param id: its id on the page, which does not reveal its path.
     :param kind: a game file, a scenario of a folder, or an upload.
-    :param name: of the file.
-    :param title: for people.
+    :param name: name of the file.
+    :param title: readable title.
     :param path: never shown.
     """
 
@@ -54,11 +54,11 @@ class Entry:
 @dataclass(frozen=True)
 class Choice:
     """
-    What somebody wants to run.
+    The game that a client wants to run.
 
-    :param id: of an entry.
-    :param drivers: by human.
-    :param planners: by AV.
+    :param id: id of an entry.
+    :param drivers: driver source by human vehicle.
+    :param planners: planner by AV.
     """
 
     id: str  # noqa: A003
@@ -68,12 +68,12 @@ class Choice:
 
 class Library:
     """
-    Offers the games and scenarios of some folders, and takes uploads.
+    The games and scenarios of some folders, and the uploads.
 
-    :param folders: (name, path) of each; its subfolders are left out.
-    :param uploads: where uploads are kept; made when the first comes.
-    :param games: where the games that are loaded are written.
-    :param reader: runs what takes long.
+    :param folders: (name, path) of each; subfolders are left out.
+    :param uploads: folder of uploads; created at the first one.
+    :param games: folder to which loaded games are written.
+    :param reader: process for long jobs.
     :param max_upload_bytes: size of the largest upload.
     """
 
@@ -81,7 +81,7 @@ class Library:
                  reader: JobProcess | None = None,
                  max_upload_bytes: int = guard.MAX_BYTES) -> None:
         self.max_upload_bytes = max_upload_bytes
-        # A folder that is given twice is shown once, by its first name.
+        # A folder that is given twice is shown once, under its first name.
         names: dict[Path, str] = {}
         for name, path in folders:
             names.setdefault(path.resolve(), name)
@@ -92,11 +92,11 @@ class Library:
         self._entries: dict[str, Entry] = {}
         self._titles: dict[str, str] = {}
         self._uploading = asyncio.Lock()
-        # What was started last: at a reset its file is read again.
+        # The game that was started last: a reset reads its file again.
         self._loaded = ''
 
     async def listing(self) -> dict[str, Any]:
-        """Return the answer of /api/scenarios, as the folders are now."""
+        """Return the answer of /api/scenarios, read anew from the folders."""
         folders = await asyncio.to_thread(self._list)
         self._entries = {entry.id: entry for _, entries in folders for entry in entries}
         return {
@@ -110,9 +110,9 @@ class Library:
     async def preview(self, entry_id: str,
                       unwanted: Callable[[], bool] = lambda: False) -> bytes:
         """
-        Show how an entry begins.
+        Return the preview of an entry.
 
-        :param unwanted: tells that nobody waits for it any more.
+        :param unwanted: returns True once no client waits for it.
         :return: the answer of /api/preview as JSON.
         :raises CrgameError: if there is no such entry, or it cannot be used.
         """
@@ -122,12 +122,12 @@ class Library:
 
     async def upload(self, data: bytes, title: str) -> str:
         """
-        Keep a scenario that somebody sent, if it is one.
+        Store an uploaded file if it is a scenario.
 
         :param data: the file.
-        :param title: what the sender calls it; empty takes its benchmark id.
+        :param title: the sender's title; empty uses the benchmark id.
         :return: its id.
-        :raises CrgameError: if it cannot be used, or too many are kept.
+        :raises CrgameError: if it cannot be used, or too many are stored.
         """
         name = hashlib.sha256(data).hexdigest()[:16]
         path = self._uploads / f'{name}.xml'
@@ -148,8 +148,8 @@ class Library:
         """
         Delete an upload.
 
-        :return: what was done, for people.
-        :raises CrgameError: if it is no upload, is in use, or cannot be removed.
+        :return: readable text of what was done.
+        :raises CrgameError: if it is not an upload, is in use, or cannot be removed.
         """
         entry = await self._entry(entry_id)
         if entry.kind != 'upload':
@@ -181,12 +181,12 @@ class Library:
         return await asyncio.to_thread(self._store_game, text)
 
     def is_upload(self, entry_id: str) -> bool:
-        """Return whether somebody has sent an entry."""
+        """Return whether an entry is an upload."""
         entry = self._entries.get(entry_id)
         return entry is not None and entry.kind == 'upload'
 
     async def close(self) -> None:
-        """End what still runs."""
+        """Stop the running job."""
         await self._reader.close()
 
     async def _entry(self, entry_id: str) -> Entry:
@@ -205,7 +205,7 @@ class Library:
         try:
             paths = sorted(path for path in folder.iterdir() if path.is_file())[:MAX_ENTRIES]
         except OSError:
-            # Not made yet, or taken away: nothing to offer.
+            # The folder is not created yet or was removed: it offers nothing.
             return []
         entries = []
         for path in paths:
@@ -249,7 +249,7 @@ def _entry_id(path: Path) -> str:
 
 
 def _game_title(path: Path) -> str:
-    """Return the title of a game file, empty if the file is no game."""
+    """Return the title of a game file; empty if the file is not a game."""
     try:
         values = read_yaml(path, 'game file')
     except InputError:
@@ -261,7 +261,7 @@ def _game_title(path: Path) -> str:
 
 
 def _scenario_title(path: Path) -> str:
-    """Return the benchmark id, without reading more than the file's beginning."""
+    """Return the benchmark id from the beginning of the file."""
     try:
         with path.open('rb') as stream:
             found = _BENCHMARK.search(stream.read(4096))

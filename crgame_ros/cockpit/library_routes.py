@@ -27,11 +27,11 @@ Answer = Callable[[web.Request], Awaitable[web.StreamResponse]]
 def add_routes(app: web.Application, library: Library | None, backend: Backend,
                hub: Hub) -> None:
     """
-    Add /api/scenarios, preview, upload, upload/delete and load.
+    Add the routes /api/scenarios, preview, upload, upload/delete and load.
 
     :param library: None answers that there is nothing to choose.
-    :param backend: takes the game that is loaded.
-    :param hub: knows the pages that ask.
+    :param backend: loads the chosen game.
+    :param hub: all clients.
     """
     if library is None:
         for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('POST', 'upload'),
@@ -58,7 +58,7 @@ class _Routes:
         self._hub = hub
         self._library = library
         self._backend = backend
-        # Two bodies in memory at most: this and the one that is being read for check.
+        # At most two bodies in memory: this one and the one that is being checked.
         self._receiving = asyncio.Semaphore(2)
 
     async def scenarios(self, request: web.Request) -> web.Response:
@@ -93,7 +93,7 @@ class _Routes:
 
 
 def refusable(handler: Answer) -> Answer:
-    """Make a handler answer with one line of JSON where it fails."""
+    """Wrap a handler so that a failure answers with one line of JSON."""
     async def answer(request: web.Request) -> web.StreamResponse:
         try:
             return await handler(request)
@@ -113,7 +113,7 @@ def refusable(handler: Answer) -> Answer:
 
 
 def asker_gone(request: web.Request) -> Callable[[], bool]:
-    """Return a function that tells whether nobody waits for the answer any more."""
+    """Return a function that returns True once the client has gone."""
     def gone() -> bool:
         return request.transport is None or request.transport.is_closing()
     return gone
@@ -121,7 +121,7 @@ def asker_gone(request: web.Request) -> Callable[[], bool]:
 
 def asked_id(body: bytes) -> str:
     """
-    Read the `id` that a request names.
+    Return the `id` that a request names.
 
     :raises InputError: if it names none.
     """

@@ -8,7 +8,7 @@ from pathlib import Path
 import socket
 import struct
 
-# Asks Linux for the IPv4 address of an interface.
+# The request to Linux for the IPv4 address of an interface.
 _SIOCGIFADDR = 0x8915
 _IF_INET6 = Path('/proc/net/if_inet6')
 _GLOBAL = '00'
@@ -16,10 +16,10 @@ _GLOBAL = '00'
 
 def reachable_addresses(host: str) -> tuple[str, ...]:
     """
-    Return the addresses that others can open when a server listens on one.
+    Return the addresses at which other machines reach a server that listens on one.
 
     :param host: an address, or `0.0.0.0` or `::` for all of this machine.
-    :return: of all, those of its interfaces, loopback left out unless there is nothing else.
+    :return: for all, those of the interfaces; loopback only if there is no other.
     """
     if host == '0.0.0.0':
         return _version_4() or ('127.0.0.1',)
@@ -36,7 +36,7 @@ def _version_4() -> tuple[str, ...]:
             try:
                 answer = fcntl.ioctl(probe.fileno(), _SIOCGIFADDR, request)
             except OSError:
-                # An interface without such an address.
+                # The interface has no such address.
                 continue
             found[socket.inet_ntoa(answer[20:24])] = None
     return tuple(item for item in found if not ipaddress.ip_address(item).is_loopback)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The messages of a run as frames of the page: the same live and out of a recording."""
+"""Conversion of a run's messages to frames of the page, alike for live runs and recordings."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -30,14 +30,14 @@ from crgame_ros.vehicle.state import STATE_WIDTH, StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
-# Of a plan or a prediction: more would hold up everything else.
+# Most points of a plan or a prediction: more would delay everything else.
 MAX_POINTS = 1000
 
 FloatArray = NDArray[np.float64]
 
 
 class Frame(NamedTuple):
-    """A frame, and the slot of which a page needs but the newest."""
+    """A frame and its slot; a page needs only the newest frame of a slot."""
 
     slot: str
     data: bytes
@@ -45,15 +45,15 @@ class Frame(NamedTuple):
 
 class MessageFrames:
     """
-    Turns the messages of one run into frames.
+    A converter of the messages of one run into frames.
 
-    Whatever somebody sends in another form than the contract's raises InputError, for the caller
-    to tell or to count.
+    A message that breaks the interface contract raises InputError, which the caller reports or
+    counts.
 
-    :param game: of the run.
-    :param descriptions: of everything that can appear.
-    :ivar columns: of everything that can appear, by id; driven vehicles first.
-    :ivar mounts: of the AVs' sensors, and where the vehicles have been.
+    :param game: game of the run.
+    :param descriptions: descriptions of everything that can appear.
+    :ivar columns: column of everything that can appear, by id; driven vehicles first.
+    :ivar mounts: mounts of the AVs' sensors, and past states of the vehicles.
     """
 
     def __init__(self, game: GameDocument, descriptions: Iterable[ObjectDescription]) -> None:
@@ -65,41 +65,41 @@ class MessageFrames:
         self.forget()
 
     def forget(self) -> None:
-        """Forget where the vehicles have been: another part of the run comes next."""
+        """Clear the past states of the vehicles before another part of the run."""
         self.mounts = SensorMounts(self._game.avs, self.columns, self._game.scheduler.dt_s)
 
     def place(self, n: int) -> Place:
-        """Return where in the run a simulation step is."""
+        """Return the place of a simulation step in the run."""
         scheduler = self._game.scheduler
         return Place(self._game.epoch, n, scheduler.k(n), n * scheduler.dt_s)
 
     def place_of(self, message: Any) -> Place | None:
-        """Return where a message with a stamp belongs; None if it is of an earlier run."""
+        """Return the place of a stamped message; None if it is of an earlier run."""
         n = self._game.scheduler.step_of_stamp(stamp_of(message))
         return None if n < 0 else self.place(n)
 
     def states(self, message: Any) -> FloatArray:
-        """Return (V, 8) states of the vehicles, and remember them for scans."""
+        """Return the states (V, 8) of the vehicles, and keep them for scans."""
         states = self._world.vehicle_states(message)
         self.mounts.add_states(self._game.scheduler.step_of_stamp(stamp_of(message)), states)
         return states
 
     def state(self, place: Place, states: FloatArray, commands: FloatArray | None) -> Frame:
         """
-        Make the frame of states (V, 8).
+        Return the frame of states (V, 8).
 
-        :param commands: (V, 6) consumed; None where they are not known.
+        :param commands: (V, 6) consumed; None if unknown.
         """
         return Frame('state', frames.encode_state(*place, state_rows(states, commands)))
 
     def objects(self, place: Place, message: Any) -> Frame:
-        """Make the frame of `/traffic/objects`."""
+        """Return the frame of `/traffic/objects`."""
         objects = self._world.object_states(message)
         return Frame('objects', frames.encode_objects(
             *place, np.concatenate((objects.poses, objects.velocities), axis=1)))
 
     def plan(self, place: Place, av: str, message: Any) -> Frame:
-        """Make the frame of an AV's plan."""
+        """Return the frame of an AV's plan."""
         where = f'/{av}/plan'
         series = from_joint_trajectory(_short(message, where), where)
         if series.names != vehicle_joint_names(av):
@@ -112,7 +112,7 @@ class MessageFrames:
         return Frame(f'plan:{column}', frames.encode_plan(*place, column, rows))
 
     def seen(self, place: Place, av: str, message: Any) -> Frame | None:
-        """Make the frame of whom a request names at its first point; None without perception."""
+        """Return the frame of the objects at a request's first point; None without perception."""
         if av not in self.mounts.avs:
             return None
         layout = RequestLayout.from_names(message.joint_names, av)
@@ -126,7 +126,7 @@ class MessageFrames:
         return Frame(f'seen:{column}', frames.encode_seen(*place, column, seen))
 
     def prediction(self, place: Place, av: str, message: Any) -> Frame:
-        """Make the frame of what a request says of others' future: of those who are there."""
+        """Return the frame of a request's predictions of the objects that are present."""
         where = f'/{av}/plan_request'
         series = from_joint_trajectory(_short(message, where), where)
         layout = RequestLayout.from_names(series.names, av).among(self.columns)
@@ -139,26 +139,26 @@ class MessageFrames:
             *place, column, columns, futures[present]))
 
     def estimate(self, place: Place, av: str, message: Any) -> Frame:
-        """Make the frame of where an AV takes itself to be."""
+        """Return the frame of an AV's pose estimate."""
         column = self.columns[av]
         return Frame(f'estimate:{column}', estimate_frame(place, column, message))
 
     def scan(self, place: Place, av: str, message: Any) -> Frame | None:
-        """Make the frame of a scan; None for a sensor that the AV has not or that was nowhere."""
+        """Return the frame of a scan; None if the AV lacks the sensor or its pose is unknown."""
         scan = scan_frame(place, message, self.mounts, self.columns)
         if scan is None or scan.av != av:
             return None
         return Frame(f'scan:{scan.column}:{scan.sensor}', scan.frame)
 
     def criticality(self, message: Any) -> Frame | None:
-        """Make the frame of `/criticality`; None if it is of another run."""
+        """Return the frame of `/criticality`; None if it is of another run."""
         if len(message.layout.dim) != 2:
             raise InputError('has no two dimensions', CRITICALITY_TOPIC)
         return self.criticality_of(
             read_criticality_rows(message.layout.dim[1].label, message.data))
 
     def criticality_of(self, rows: FloatArray) -> Frame | None:
-        """Make the frame of the rows of one step; None if nobody is near, or of another run."""
+        """Return the frame of one step's rows; None if no object is near, or of another run."""
         if not len(rows) or not (rows[:, :2] == (self._game.epoch, rows[0, 1])).all():
             return None
         numbers = rows[:, 2:4]
@@ -168,7 +168,7 @@ class MessageFrames:
             *self.place(int(rows[0, 1])), most_critical_rows(rows)))
 
     def occupancy(self, place: Place, message: Any) -> Frame:
-        """Make the frame of the map of permanent obstacles, which holds from a place on."""
+        """Return the frame of the map of permanent obstacles, valid from a place on."""
         return Frame('occupancy', occupancy_frame(place, message))
 
 
@@ -176,8 +176,7 @@ def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
     """
     Return the rows (V, 13) of a frame of states (V, 8).
 
-    :param commands: (V, 6) consumed, of which pages get the first five; None where they are not
-        known.
+    :param commands: (V, 6) consumed, of which pages get the first five; None if unknown.
     """
     rows = np.full((len(states), frames.STATE_COLUMNS), np.nan)
     rows[:, :STATE_WIDTH] = states
@@ -187,7 +186,7 @@ def state_rows(states: FloatArray, commands: FloatArray | None) -> FloatArray:
 
 
 def _short(message: Any, where: str) -> Any:
-    """Refuse a plan or request without points, or with more than there is time for."""
+    """Return a plan or request; raise InputError if it has no points or too many."""
     if not 0 < len(message.points) <= MAX_POINTS:
         raise InputError(f'has {len(message.points)} points', where,
                          f'give 1 to {MAX_POINTS}')

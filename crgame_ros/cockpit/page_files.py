@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The files of the page, read once: a request names a key of this table, never a path."""
+"""The table of the page's files, read once: a request names a key of it, never a path."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from crgame_ros.page_libraries import find_libraries, PLOTLY, THREE_SCRIPTS
 
 PAGE = Path(__file__).resolve().parent / 'page'
 INDEX = '/'
-# The libraries by the path of their request: '/three/three.module.js' imports the other script of
-# three.js by its relative path.
+# The libraries by request path: '/three/three.module.js' imports the other script of three.js
+# by its relative path.
 LIBRARIES = {'/plotly.js': PLOTLY, **{f'/three/{name}': name for name in THREE_SCRIPTS}}
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml', '.png': 'image/png'}
@@ -22,10 +22,10 @@ TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
 @dataclass(frozen=True)
 class PageFile:
     """
-    One file as it is served.
+    A served file.
 
     :param body: its content.
-    :param content_type: without the character set.
+    :param content_type: content type without the character set.
     :param tag: changes with the content.
     """
 
@@ -35,7 +35,7 @@ class PageFile:
 
     @property
     def is_text(self) -> bool:
-        """Whether it has a character set: UTF-8."""
+        """Return whether it is text, whose character set is UTF-8."""
         return self.content_type != 'image/png'
 
 
@@ -44,7 +44,7 @@ def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
     Read all files of the page.
 
     :param directory: the folder with index.html.
-    :return: by the path of the request.
+    :return: files by request path.
     :raises CrgameError: if the page is not installed.
     """
     table = read_files(directory, '/static/')
@@ -57,10 +57,10 @@ def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
 
 def read_library(path: str) -> PageFile | None:
     """
-    Read a script of a library, which may have been fetched while the cockpit runs.
+    Read a library script, which may be downloaded while the cockpit runs.
 
-    :param path: of the request.
-    :return: None if the path is none of LIBRARIES, or they have not been fetched.
+    :param path: request path.
+    :return: None if the path is not one of LIBRARIES or they are not downloaded.
     """
     folder = find_libraries() if path in LIBRARIES else None
     return None if folder is None else _read(folder / LIBRARIES[path])
@@ -68,10 +68,10 @@ def read_library(path: str) -> PageFile | None:
 
 def read_files(directory: Path, prefix: str) -> dict[str, PageFile]:
     """
-    Read all files of a folder that a page may consist of.
+    Read all files of a folder that can be part of a page.
 
-    :param prefix: of their requests.
-    :return: by the path of the request.
+    :param prefix: prefix of their request paths.
+    :return: files by request path.
     """
     return {f'{prefix}{path.relative_to(directory).as_posix()}': _read(path)
             for path in sorted(directory.rglob('*'))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The messages of the page: JSON of strangers in, checked mappings or one clear error out."""
+"""Parsing of messages from pages: untrusted JSON in, checked mappings or one clear error out."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -22,12 +22,12 @@ MAX_EVENT = 100
 MAX_DEVICE = 60
 MAX_RENDERER = 160
 MAX_DELAY_MS = 60_000.0
-# The most that the numbers of a view can be.
+# Largest numbers of a view.
 _VIEW_NUMBERS = {'width_px': 1e5, 'height_px': 1e5, 'ratio': 100.0}
 _VIEW_MEASURES = {'across_deg': 180.0, 'screen_width_m': 20.0, 'eye_distance_m': 20.0,
                   'rate_hz': 1000.0}
 ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
-# Rounding of a calibrated axis in the page.
+# Tolerance for rounding of a calibrated axis in the page.
 _AXIS_TOLERANCE = 1e-3
 _MAX_ID = 2 ** 53
 
@@ -38,7 +38,7 @@ _KEY = re.compile(r'[0-9a-f]{32}')
 _TASK = re.compile(r'[a-z0-9_-]{1,40}')
 _TASK_TIMES = tuple(field.name for field in fields(PageTimes))
 # Control and format characters, surrogates, private use, unassigned, line and paragraph breaks:
-# they hide or reorder what others read. Angle brackets and ampersands are for mark-up only.
+# they hide or reorder text. Angle brackets and ampersands are for mark-up only.
 _HIDDEN = frozenset({'Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp'})
 _MARKUP = frozenset('<>&')
 
@@ -67,7 +67,7 @@ def parse_message(text: str) -> dict[str, Any]:
 
 def clean_text(text: str, length: int) -> str:
     """
-    Make a stranger's text fit to be shown to others: one line without hidden characters, mark-up.
+    Return an untrusted text as one line without hidden characters and mark-up.
 
     :param length: most characters that are kept.
     """
@@ -176,7 +176,7 @@ def _device(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _layers(message: Mapping[str, Any]) -> dict[str, Any]:
-    """Read those of the layers that are named: the others stay as they are."""
+    """Read the layers that are named; the others stay as they are."""
     named: dict[str, Any] = {
         field: _flag(message, field) for field in ('predictions', 'scans') if field in message}
     if 'perception' in message:
@@ -193,7 +193,7 @@ def _sound(message: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _view(message: Mapping[str, Any]) -> dict[str, Any]:
-    """Read what is shown; what nobody knows is left out."""
+    """Read the view; unknown values are left out."""
     if message.get('shown') not in SHOWN:
         raise _wrong('shown', f'is none of {", ".join(SHOWN)}')
     flags = {field: _flag(message, field)
@@ -289,7 +289,7 @@ def _axis(value: Any, low: float) -> float:
 
 
 def _words(message: Mapping[str, Any], field: str, length: int = MAX_DEVICE) -> str:
-    """Read a text for others to read; empty where there is none."""
+    """Read a text that others will see; empty if there is none."""
     value = message.get(field, '')
     if not isinstance(value, str):
         raise _wrong(field, 'is no text')
@@ -318,5 +318,5 @@ def _refuse_constant(name: str) -> float:
 
 
 def _wrong(field: str, what: str) -> InputError:
-    # What was sent is not repeated: it may be long, and others may read the log.
+    # The sent value is not repeated: it may be long, and others may read the log.
     return InputError(what, field)

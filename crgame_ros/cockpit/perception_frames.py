@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What AVs perceive and the map of permanent obstacles as frames, live and from recordings."""
+"""Frames of AVs' perception and of the map of permanent obstacles, live and from recordings."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Steps of the true states that are kept: 3 s at 100 Hz.
+# Number of true states that are kept: 3 s at 100 Hz.
 KEPT = 300
-# From a state that is further away the vehicle is not moved on to the time of a scan [s].
+# Longest time over which a state is extrapolated to the time of a scan [s].
 MOST_MOVED_S = 0.2
 
 
@@ -34,10 +34,10 @@ class Mount(NamedTuple):
 
 class SensorMounts:
     """
-    The mounting poses of all sensors of a game, and the recent true states of the vehicles.
+    The mounting poses of all sensors of a game and the recent true states of the vehicles.
 
-    :param avs: of the game.
-    :param columns: of the driven vehicles in the states, by id.
+    :param avs: AVs of the game.
+    :param columns: columns of the driven vehicles in the states, by id.
     :param dt_s: simulation step [s].
     """
 
@@ -58,7 +58,7 @@ class SensorMounts:
 
     def add_states(self, n: int, states: FloatArray) -> None:
         """
-        Take the true states of step n.
+        Add the true states of step n.
 
         :param states: (V, 8) and perhaps further columns; they are copied.
         """
@@ -67,18 +67,18 @@ class SensorMounts:
             self._states.popitem(last=False)
 
     def sensor(self, frame_id: str) -> tuple[str, Mount] | None:
-        """Return AV and mount of a sensor by its frame `<av>/<sensor>`; None if it has none."""
+        """Return AV and mount of a sensor by its frame `<av>/<sensor>`; None if there is none."""
         av, _, name = frame_id.partition('/')
         mount = self._mounts.get(av, {}).get(name)
         return None if mount is None else (av, mount)
 
     def pose(self, av: str, mount: Mount, n: int) -> tuple[float, float, float] | None:
         """
-        Return x, y [m], yaw [rad] of a sensor in map at step n, of the true vehicle.
+        Return the pose x, y [m], yaw [rad] of a sensor in map at step n, on the true vehicle.
 
-        A state that was not received is reached from the nearest, at constant speed and yaw rate.
+        A missing state is extrapolated from the nearest, at constant speed and yaw rate.
 
-        :return: None if no state near enough is known.
+        :return: None if no state is near enough in time.
         """
         if not self._states:
             return None
@@ -97,16 +97,16 @@ class SensorMounts:
                 wrap_pi(yaw + mount.yaw))
 
 
-# As many as a sensor of a game can have.
+# Largest number of rays that a sensor of a game can have.
 MAX_RAYS = 10_000
-# Of a map: more bits than this would hold up everything else.
+# Most cells of a map: more would delay everything else.
 MAX_CELLS = 2 ** 26
 # Places of xx, xy and yy in the row-major covariance (6 x 6) of a pose.
 _COVARIANCE = (0, 1, 7)
 
 
 class Place(NamedTuple):
-    """Where in a run something belongs: epoch, simulation step, scenario step, time [s]."""
+    """A place in a run: epoch, simulation step, scenario step, time [s]."""
 
     epoch: int
     n: int
@@ -115,7 +115,7 @@ class Place(NamedTuple):
 
 
 class ScanFrame(NamedTuple):
-    """A frame, and whose scan it is: the AV's id and column, and the sensor's place in it."""
+    """The frame of a scan with the AV's id and column and the index of the sensor."""
 
     av: str
     column: int
@@ -128,11 +128,11 @@ def scan_frame(place: Place, message: Any, mounts: SensorMounts,
     """
     Read a sensor_msgs/LaserScan of a sensor of the game.
 
-    :param place: of its stamp.
-    :param mounts: of the game; knows where the vehicles were.
-    :param columns: of the driven vehicles, by id.
-    :return: None for a sensor that nobody has, and where it is not known where it was.
-    :raises InputError: if its numbers make no fan.
+    :param place: place of its stamp.
+    :param mounts: mounts of the game, with past states of the vehicles.
+    :param columns: columns of the driven vehicles, by id.
+    :return: None if no AV has the sensor or its pose is unknown.
+    :raises InputError: if its numbers do not describe a fan.
     """
     found = mounts.sensor(message.header.frame_id)
     if found is None:
@@ -159,8 +159,8 @@ def estimate_frame(place: Place, column: int, message: Any) -> bytes:
     """
     Read a nav_msgs/Odometry with an AV's estimated pose.
 
-    :param place: of its stamp.
-    :param column: of the AV.
+    :param place: place of its stamp.
+    :param column: column of the AV.
     :raises InputError: if a number in it is not finite.
     """
     position, turn = message.pose.pose.position, message.pose.pose.orientation
@@ -177,10 +177,10 @@ def estimate_frame(place: Place, column: int, message: Any) -> bytes:
 
 def occupancy_frame(place: Place, message: Any) -> bytes:
     """
-    Read a nav_msgs/OccupancyGrid; what is neither free nor occupied is free.
+    Read a nav_msgs/OccupancyGrid; a cell that is neither free nor occupied counts as free.
 
-    :param place: since when it holds.
-    :raises InputError: if its cells do not fit its size, or it is turned.
+    :param place: place from which it is valid.
+    :raises InputError: if its cells do not fit its size, or it is rotated.
     """
     info = message.info
     cells = np.array(message.data, dtype=np.int8)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading scenarios for the page, in a process of its own (`job_loop`)."""
+"""Jobs that read scenarios for the page, in a process of their own (`job_loop`)."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,14 +30,14 @@ def check(path: Path) -> dict[str, Any]:
     Check an uploaded file.
 
     :return: its `title`.
-    :raises InputError: if it is no scenario; the file is called 'upload'.
+    :raises InputError: if it is not a scenario; the error calls the file 'upload'.
     """
     return {'title': _scenario(path, UPLOAD).benchmark_id}
 
 
 def preview(path: Path, kind: str) -> dict[str, Any]:
     """
-    Show how a game or scenario begins.
+    Return the preview of a game or scenario.
 
     :param kind: game, scenario or upload.
     :return: the answer of /api/preview.
@@ -63,13 +63,13 @@ def preview(path: Path, kind: str) -> dict[str, Any]:
 def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping[str, str],
             allowed_drivers: list[str], allowed_planners: list[str]) -> dict[str, Any]:
     """
-    Write the game that somebody chose.
+    Return the text of the chosen game.
 
     :param kind: game, scenario or upload.
-    :param drivers: of humans; those left out keep the game's.
-    :param planners: of AVs; those left out keep the game's.
-    :param allowed_drivers: what may be chosen beside the game's own.
-    :param allowed_planners: what may be chosen beside the game's own.
+    :param drivers: drivers of humans; vehicles that are left out keep the game's.
+    :param planners: planners of AVs; vehicles that are left out keep the game's.
+    :param allowed_drivers: allowed choices besides the game's own.
+    :param allowed_planners: allowed choices besides the game's own.
     :return: the game file as `text`.
     :raises InputError: if the choice is not allowed, or the game cannot be used.
     """
@@ -82,7 +82,7 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
     for spec in (av.spec for av in setup.avs):
         planner = _choice(planners, spec.id, spec.planner, allowed_planners, 'planner')
         if planner != spec.planner:
-            # Another planner's options mean nothing to it.
+            # The options of another planner do not apply.
             spec = replace(spec, planner=planner, options={})
             create_planner(planner)
         avs.append(spec)
@@ -110,7 +110,7 @@ def _scenario(path: Path, source: str) -> LoadedScenario:
 def _setup(path: Path, kind: str) -> Setup:
     if kind == 'game':
         return build_setup(load_game(path))
-    # Whoever has sent a file drives in it, from where they have sent it.
+    # The sender of an uploaded file drives it from the cockpit page.
     human = HumanSpec('hv0', driver=COCKPIT if kind == UPLOAD else HumanSpec.driver)
     game = Game(path, humans=(human,))
     return build_setup(game, _scenario(path, UPLOAD if kind == UPLOAD else path.name))
@@ -120,7 +120,7 @@ def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str
             what: str) -> str:
     value = chosen.get(vehicle, own)
     if value == without_paths(own):
-        # As the page knows it.
+        # The id as the page knows it.
         return own
     if value != own and value not in allowed:
         raise InputError(f'that {what} cannot be chosen here', vehicle,

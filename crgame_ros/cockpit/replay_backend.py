@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recording behind the page: what happened in it, and its frames in chunks."""
+"""A recording behind the page: its description, and its frames in chunks."""
 
 import asyncio
 from collections import OrderedDict
@@ -38,7 +38,7 @@ def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
     Return the frames of the whole run, each after its length in bytes; None if none were recorded.
 
     :param reader: the recording.
-    :param run: in it.
+    :param run: a run in it.
     """
     if CRITICALITY_TOPIC not in reader.topics:
         return None
@@ -47,7 +47,7 @@ def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
         try:
             frame = frames.criticality(message.message)
         except (InputError, IndexError, OverflowError):
-            # Anybody may have published on it.
+            # Any node may have published on the topic.
             continue
         if frame is not None:
             found.append(frame.data)
@@ -56,9 +56,11 @@ def recorded_criticality(reader: BagReader, run: Epoch) -> bytes | None:
 
 def measured_criticality(run: Epoch, path: Path) -> bytes:
     """
-    Measure a run and give its frames, each after its length in bytes; takes seconds for minutes.
+    Measure a run and return its frames, each after its length in bytes.
 
-    :param path: of the recording.
+    A run of minutes takes seconds.
+
+    :param path: path of the recording.
     :raises InputError: if the run cannot be measured.
     """
     frames = MessageFrames(run.game, run.descriptions)
@@ -75,7 +77,7 @@ def measured_criticality(run: Epoch, path: Path) -> bytes:
 
 Progress = Callable[[float], None]
 
-# Each holds 5 s: what two people who look at different places need, and no more.
+# Each holds 5 s: enough for two people who view different parts.
 CHUNKS_KEPT = 8
 RUNS_KEPT = 2
 _MOST_DIGITS = 9
@@ -86,9 +88,9 @@ class Replay:
     One run of a recording; not to be used by two threads at once.
 
     :param reader: the recording.
-    :param epoch: which run.
-    :param progress: told which share of the recording has been gone through, 0 to 1.
-    :raises InputError: if the recording lacks what describes the run, or its states.
+    :param epoch: epoch of the run.
+    :param progress: called with the share of the recording that has been read, 0 to 1.
+    :raises InputError: if the recording lacks the description of the run or its states.
     """
 
     def __init__(self, reader: BagReader, epoch: int, progress: Progress | None = None) -> None:
@@ -102,12 +104,12 @@ class Replay:
 
     @property
     def chunks_held(self) -> int:
-        """Count the chunks in memory, at most `CHUNKS_KEPT`."""
+        """Return the number of chunks in memory, at most `CHUNKS_KEPT`."""
         return len(self._chunks)
 
     def chunk(self, number: int) -> bytes:
         """
-        Return a chunk, built anew unless it was asked for lately.
+        Return a chunk, from memory if it was requested recently.
 
         :raises InputError: if there is no such chunk, or the recording is damaged in it.
         """
@@ -120,11 +122,11 @@ class Replay:
         return self._chunks[number]
 
     def criticality(self) -> tuple[Epoch, bytes | None]:
-        """Return the run, and its CRITICALITY frames as somebody recorded them; None if nobody."""
+        """Return the run and its recorded CRITICALITY frames; None if none were recorded."""
         return self.index.run, recorded_criticality(self._reader, self.index.run)
 
     def info(self) -> dict[str, Any]:
-        """Describe the run: its times, its marks and its documents over time."""
+        """Return the description of the run: its times, its marks and its documents over time."""
         scheduler = self.index.run.game.scheduler
         first, last = self.index.first_n, self.index.last_n
         dt_s = scheduler.dt_s
@@ -142,7 +144,7 @@ class Replay:
 
 
 def _event(mark: Mark, dt_s: float, index: RunIndex) -> dict[str, Any]:
-    # A violation can be told of a step whose state was lost at the end: shown at the nearest.
+    # The state of a violation can be missing at the end; it is then shown at the nearest step.
     n = min(max(mark.n, index.first_n), index.last_n)
     return {'t': n * dt_s, 'until_t': min(max(mark.last_n, n), index.last_n) * dt_s, 'n': n,
             'k': index.run.game.scheduler.k(n), 'kind': mark.kind, 'subject': mark.subject,
@@ -151,12 +153,12 @@ def _event(mark: Mark, dt_s: float, index: RunIndex) -> dict[str, Any]:
 
 class ReplayBackend:
     """
-    Shows a recording; everything that reads it happens in one thread beside the server's.
+    A backend that shows a recording. One thread beside the server's reads it.
 
     :param path: a recording (as for `BagReader`), or the folder of a run that holds it in `bag`.
     :param epoch: the run that is shown first, None for the last of the recording.
-    :param progress: told which share of the recording has been gone through, 0 to 1.
-    :raises InputError: if it is no recording, or lacks what describes the run, or its states.
+    :param progress: called with the share of the recording that has been read, 0 to 1.
+    :raises InputError: if it is not a recording, or lacks the run's description or states.
     """
 
     mode: Literal['live', 'replay'] = 'replay'
@@ -165,7 +167,7 @@ class ReplayBackend:
                  progress: Progress | None = None) -> None:
         self.path = recording_in(path)
         self._progress = progress
-        # SQLite and the chunks in memory belong to one thread.
+        # SQLite and the chunks in memory are used in one thread only.
         self._thread = ThreadPoolExecutor(1, 'replay')
         self._runs: OrderedDict[int, Replay] = OrderedDict()
         self._measuring = asyncio.Lock()
@@ -180,11 +182,11 @@ class ReplayBackend:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """Return what is wrong with the recording although it can be shown."""
+        """Return the faults of a recording that can nevertheless be shown."""
         return self._reader.notices
 
     def close(self) -> None:
-        """Close the recording, after what is being read."""
+        """Close the recording after the current read."""
         self._thread.submit(self._reader.close)
         self._thread.shutdown()
 
@@ -203,18 +205,18 @@ class ReplayBackend:
 
     def info(self, epoch: int | None = None) -> dict[str, Any]:
         """
-        Describe a run; waits until it has been read.
+        Return the description of a run; wait until it has been read.
 
-        :param epoch: which, None for the one that is shown first.
+        :param epoch: epoch of the run, None for the one that is shown first.
         :raises InputError: if it is not in the recording or cannot be read.
         """
         return self._thread.submit(self._info, epoch).result()
 
     def chunk(self, number: int, epoch: int | None = None) -> bytes:
         """
-        Return frames, each after its length in bytes; waits until they have been read.
+        Return frames, each after its length in bytes; wait until they have been read.
 
-        :param number: which chunk, from 0.
+        :param number: number of the chunk, from 0.
         :raises InputError: if there is no such chunk or epoch, or the recording is damaged there.
         """
         return self._thread.submit(self._chunk, number, epoch).result()
@@ -237,7 +239,7 @@ class ReplayBackend:
         return self._run(epoch).criticality()
 
     def routes(self) -> list[web.RouteDef]:
-        """Return what the server is to answer besides the page."""
+        """Return the routes of the server besides the page."""
         return [web.get('/api/replay/info', self._answer_info),
                 web.get('/api/replay/chunk', self._answer_chunk),
                 web.get('/api/replay/outline', self._answer_outline),
@@ -245,7 +247,7 @@ class ReplayBackend:
 
     async def _answer_info(self, request: web.Request) -> web.Response:
         content = await self._read(self._info, self._asked_epoch(request))
-        # A string, compressed: an hour's documents are some megabytes of repetitions.
+        # A compressed string: an hour's documents are some megabytes of repetitions.
         text = without_paths(json.dumps(content, separators=(',', ':')))
         response = web.Response(text=text, content_type='application/json')
         response.enable_compression()
@@ -269,7 +271,7 @@ class ReplayBackend:
             if epoch not in self._measured:
                 run, data = await self._read(self._criticality, epoch)
                 if data is None:
-                    # Beside the thread that reads, or nothing would be shown meanwhile.
+                    # Not in the reading thread, or nothing would be shown meanwhile.
                     data = await self._read(measured_criticality, run, self.path, thread=None)
                 self._measured[epoch] = data
         return web.Response(body=self._measured[epoch], content_type='application/octet-stream')
@@ -291,7 +293,7 @@ class ReplayBackend:
         return epoch
 
     async def start(self, hub: 'Hub') -> None:
-        """Set the scene; all else the page fetches when it needs it."""
+        """Set the scene; the page requests everything else when it needs it."""
         loop = asyncio.get_running_loop()
         replay = await loop.run_in_executor(self._thread, self._run, self.epoch)
         hub.set_document('scene', replay.scene)
@@ -302,14 +304,14 @@ class ReplayBackend:
 
     async def command(self, client: 'Client', message: Mapping[str, Any]) -> str:
         """
-        Refuse: what was recorded cannot be steered.
+        Raise CrgameError: a recording cannot be controlled.
 
         :raises CrgameError: always.
         """
         raise CrgameError('This is a recording: nothing in it can be changed.')
 
     def joined(self, client: 'Client') -> None:
-        """Do nothing: each page has a time of its own."""
+        """Do nothing: each page has its own playback time."""
 
     def left(self, client: 'Client') -> None:
         """Do nothing."""
@@ -317,7 +319,7 @@ class ReplayBackend:
     async def load_game(self, path: Path, client: 'Client | None' = None, *,
                         takes_seat: bool = False) -> str:
         """
-        Refuse: no simulation runs.
+        Raise CrgameError: no simulation runs.
 
         :raises CrgameError: always.
         """
@@ -338,13 +340,13 @@ def _missing(text: str) -> web.HTTPNotFound:
 def open_replay(path: Path, epoch: int | None, say: Callable[[str], None],
                 clock_s: Callable[[], float], patience_s: float = 2.0) -> ReplayBackend:
     """
-    Open a recording, and tell how far that is where it takes long.
+    Open a recording, and print the progress if it takes long.
 
     :param epoch: the run that is shown first, None for the last.
     :param say: prints a line.
     :param clock_s: steady clock [s].
-    :param patience_s: a line each time so much has passed [s].
-    :raises InputError: as `ReplayBackend`.
+    :param patience_s: time between two lines [s].
+    :raises InputError: like `ReplayBackend`.
     """
     told_s = clock_s()
 

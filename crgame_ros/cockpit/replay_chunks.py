@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pieces of a recorded run as the frames that a live page would have been sent."""
+"""Chunks of a recorded run, as the frames that a live page would have been sent."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -20,16 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHUNK_S = 5.0
-# So far before a chunk the last scan of each sensor is looked for [ns].
+# How far before a chunk the last scan of each sensor is searched for [ns].
 CARRIED_NS = 1_000_000_000
-# Objects and predictions of a step come before its state, plans that arrived in it after.
+# Objects and predictions of a step precede its state; plans that arrived in it follow.
 _BEFORE, _STATE, _AFTER = range(3)
 
 FloatArray = NDArray[np.float64]
 
 
 class _Entry(NamedTuple):
-    """A frame with its place in the chunk."""
+    """A frame with its sort key in the chunk."""
 
     n: int
     order: int
@@ -39,14 +39,14 @@ class _Entry(NamedTuple):
 
 class ChunkBuilder:
     """
-    Builds chunks of `chunk_s` from the first recorded state on.
+    A builder of chunks of `chunk_s` from the first recorded state on.
 
-    A chunk begins with what was in force before it (objects, predictions, plans), so that it can
-    be shown without the one before. Its other frames are in the order in which they were seen.
+    A chunk begins with the frames in force before it (objects, predictions, plans), so that it
+    can be shown without the chunk before. Its other frames are in the order of arrival.
 
     :param reader: the recording.
-    :param index: of the run in it.
-    :ivar chunk_s: length of a chunk [s]: whole scenario steps, 5 s or a little off.
+    :param index: index of the run in it.
+    :ivar chunk_s: length of a chunk [s]: whole scenario steps, about 5 s.
     :ivar count: number of chunks.
     """
 
@@ -65,7 +65,7 @@ class ChunkBuilder:
         avs = [av.id for av in run.game.avs]
         self._plans = {f'/{av}/plan' for av in avs}
         self._scans = {f'/{av}/scan' for av in self._frames.mounts.avs}
-        # What makes frames of each topic's messages, in the order in which they are carried over.
+        # Functions that make frames of each topic's messages, in the order of carrying over.
         self._makers: dict[str, Callable[[Place, Any], list[Frame | None]]] = {
             OBJECT_STATES_TOPIC: _single(self._frames.objects)}
         for av in avs:
@@ -81,7 +81,7 @@ class ChunkBuilder:
 
     def build(self, number: int) -> bytes:
         """
-        Read one chunk: frames, each after its length in bytes (little-endian, 32 bit).
+        Return one chunk: frames, each after its length in bytes (little-endian, 32 bit).
 
         :param number: 0 to `count` - 1.
         :raises InputError: if there is no such chunk, or the recording is damaged in it.
@@ -95,7 +95,7 @@ class ChunkBuilder:
         return pack(entry.frame for entry in entries)
 
     def _carried(self, low: int) -> Iterator[_Entry]:
-        """Yield what was in force before step `low`."""
+        """Yield the frames in force before step `low`."""
         self._frames.forget()
         for topic in self._makers:
             log_ns = self._index.places[topic].before(low)
@@ -111,7 +111,7 @@ class ChunkBuilder:
                         yield _Entry(low, _BEFORE, -1, frame)
 
     def _carried_scans(self, topic: str, last_ns: int, low: int) -> Iterator[_Entry]:
-        """Yield the last scan of each sensor of a topic; they share it."""
+        """Yield the last scan of each sensor of a topic, which the sensors share."""
         newest: dict[str, bytes] = {}
         for message in self._reader.decoded([VEHICLES_TOPIC, topic], last_ns - CARRIED_NS,
                                             last_ns + 1):
@@ -127,14 +127,14 @@ class ChunkBuilder:
             yield _Entry(low, _BEFORE, -1, frame)
 
     def _states_of(self, content: Any) -> FloatArray | None:
-        """Read where the vehicles are; None if somebody else sent something else."""
+        """Return the states of the vehicles; None if the message is malformed."""
         try:
             return self._frames.states(content)
         except InputError:
             return None
 
     def _within(self, low: int, high: int) -> list[_Entry]:
-        """Read what was seen from step `low` until before step `high`."""
+        """Read the frames from step `low` up to, not including, step `high`."""
         spans = [span for topic, places in self._index.places.items()
                  if (span := places.span(low, high)) is not None]
         from_ns, to_ns = min(span[0] for span in spans), max(span[1] for span in spans)
@@ -176,13 +176,13 @@ class ChunkBuilder:
         return found
 
     def _step_before(self, low: int) -> int:
-        """Return the step of the state before step `low`, -1 where there is none."""
+        """Return the step of the state before step `low`, -1 if there is none."""
         steps = self._index.places[VEHICLES_TOPIC].steps
         place = int(np.searchsorted(steps, low))
         return int(steps[place - 1]) if place else -1
 
     def _read_commands(self, content: Any, commands: dict[int, FloatArray]) -> None:
-        """Read what each vehicle consumed, by step: (V, 4)."""
+        """Read the commands that each vehicle consumed, by step: (V, 4)."""
         if len(content.layout.dim) != 2:
             return
         table = CycleTable.from_message(content.layout.dim[1].label, content.data)
@@ -192,11 +192,11 @@ class ChunkBuilder:
 
     def _frames_of(self, message: DecodedMessage, n: int) -> list[bytes]:
         """
-        Make the frames of a message; none if it is malformed.
+        Return the frames of a message; none if it is malformed.
 
-        What anybody may have published must not keep the rest of the run from being shown.
+        A malformed message must not keep the rest of the run from being shown.
 
-        :param n: the step from which a map is seen; all else is at its stamp.
+        :param n: the step from which a map is shown; all else is shown at its stamp.
         """
         topic, content = message.topic, message.message
         place = self._frames.place(n) if topic == OCCUPANCY_TOPIC \
@@ -208,12 +208,12 @@ class ChunkBuilder:
         return [frame.data for frame in made if frame is not None]
 
     def _planner_view(self, av: str, place: Place, content: Any) -> list[Frame | None]:
-        """Make the frames of what an AV's planner is told."""
+        """Return the frames of a request to an AV's planner."""
         return [self._frames.prediction(place, av, content),
                 self._frames.seen(place, av, content)]
 
 
 def _single(make: Callable[..., Frame | None],
             *av: str) -> Callable[[Place, Any], list[Frame | None]]:
-    """Return what makes one frame at most of a message, of a given AV perhaps."""
+    """Return a function that makes at most one frame of a message, optionally for a given AV."""
     return lambda place, content: [make(place, *av, content)]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where in a recording the messages of one run are, by simulation step: the index of a replay."""
+"""The index of a replay: positions of one run's messages in a recording, by simulation step."""
 
 from array import array
 from collections.abc import Callable
@@ -22,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 OCCUPANCY_TOPIC = '/occupancy'
-# Between two reports of progress, so that reporting costs nothing.
+# Number of messages between two reports of progress, so that reporting costs little.
 _REPORT_EVERY = 500
 
 IntArray = NDArray[np.int64]
 
 
 def perception_topics(game: GameDocument) -> dict[str, str]:
-    """Return the topics of perception by name, with their types, and the map's."""
+    """Return the types of the perception topics and of the map's topic, by topic name."""
     topics = {OCCUPANCY_TOPIC: 'nav_msgs/msg/OccupancyGrid'}
     for av in game.avs:
         if av.perception is not None:
@@ -40,10 +40,10 @@ def perception_topics(game: GameDocument) -> dict[str, str]:
 
 class Places:
     """
-    The messages of a topic: their log times [ns] and the simulation steps they belong to.
+    The messages of a topic: their log times [ns] and simulation steps.
 
     :ivar log_ns: in the order of the recording.
-    :ivar first: step of each message; of its first row where it holds several.
+    :ivar first: step of each message; of its first row if it holds several.
     :ivar last: step of its last row.
     """
 
@@ -51,7 +51,7 @@ class Places:
         self._log_ns, self._first, self._last = array('q'), array('q'), array('q')
 
     def add(self, log_ns: int, first: int, last: int | None = None) -> None:
-        """Take note of one message."""
+        """Add one message."""
         self._log_ns.append(log_ns)
         self._first.append(first)
         self._last.append(first if last is None else last)
@@ -61,7 +61,7 @@ class Places:
 
     @property
     def newest(self) -> int:
-        """Step of the message that was added last, -1 where there is none."""
+        """Return the step of the message that was added last, -1 if there is none."""
         return self._last[-1] if self._last else -1
 
     @property
@@ -70,7 +70,7 @@ class Places:
         return np.array(self._first, dtype=np.int64)
 
     def span(self, low: int, high: int) -> tuple[int, int] | None:
-        """Return the first and last log time of what concerns low <= n < high; None if none."""
+        """Return the first and last log time of messages with low <= n < high; None if none."""
         if not self._log_ns:
             return None
         first, last = np.frombuffer(self._first, np.int64), np.frombuffer(self._last, np.int64)
@@ -88,11 +88,11 @@ class Places:
 @dataclass(frozen=True)
 class RunIndex:
     """
-    One run of a recording, ready to be read in any order.
+    The index of one run of a recording, which allows reading in any order.
 
     :param run: its documents.
     :param places: messages by topic.
-    :param tracks: what happened in it, over time.
+    :param tracks: its documents and marks over time.
     :param outline: the vehicles' motion over the whole run, for plots.
     """
 
@@ -103,21 +103,21 @@ class RunIndex:
 
     @property
     def first_n(self) -> int:
-        """Step of the first recorded state."""
+        """Return the step of the first recorded state."""
         return int(self.places[VEHICLES_TOPIC].steps[0])
 
     @property
     def last_n(self) -> int:
-        """Step of the last recorded state."""
+        """Return the step of the last recorded state."""
         return self.places[VEHICLES_TOPIC].newest
 
 
 def index_run(reader: BagReader, run: Epoch,
               progress: Callable[[float], None] | None = None) -> RunIndex:
     """
-    Go through a recording once, without keeping its states.
+    Read a recording once and return its index, without keeping its states.
 
-    :param progress: told now and then which share is done, 0 to 1.
+    :param progress: called now and then with the share that is done, 0 to 1.
     :raises InputError: if no state of the run is in it.
     """
     indexer = _Indexer(reader, run)
@@ -126,7 +126,7 @@ def index_run(reader: BagReader, run: Epoch,
         try:
             indexer.add(message)
         except InputError:
-            # Whatever somebody else sent costs that message, not the replay.
+            # A malformed message is skipped and does not end the replay.
             reader.foreign[message.topic] += 1
         if progress is not None and count % _REPORT_EVERY == 0:
             progress((message.log_time_ns - reader.start_ns) / span_ns)
@@ -134,7 +134,7 @@ def index_run(reader: BagReader, run: Epoch,
 
 
 class _Indexer:
-    """Follows a recording in the order of log time, and knows when the run goes on in it."""
+    """A builder of the index that follows a recording in the order of log time."""
 
     def __init__(self, reader: BagReader, run: Epoch) -> None:
         self._reader = reader
@@ -163,7 +163,7 @@ class _Indexer:
         elif type_name != self._types.get(topic, TRAJECTORY):
             self._reader.foreign[topic] += 1
         elif topic == OCCUPANCY_TOPIC:
-            # Its stamp is none of simulation time: it is seen from when it came.
+            # Its stamp is not simulation time: it is shown from its arrival.
             from_ns = self._run.from_log_ns
             if not self._after and (from_ns is None or log_ns >= from_ns):
                 self._places[topic].add(log_ns, self._states.newest)
@@ -173,7 +173,7 @@ class _Indexer:
     def _add_stamped(self, message: BagMessage, stamp_ns: int) -> None:
         topic, log_ns = message.topic, message.log_time_ns
         if not self._run.holds(stamp_ns, log_ns):
-            # States of another run: what has no stamp belongs to that one from here on.
+            # States of another run: messages without a stamp belong to that run from here on.
             self._after = self._after or (topic == VEHICLES_TOPIC and self._inside)
             return
         n = self._run.game.scheduler.step_of_stamp(stamp_ns)
@@ -185,7 +185,7 @@ class _Indexer:
                 if self._outline.wants(n):
                     self._outline.add_state(n, self._reader.decode(message).message)
         elif topic in self._plans:
-            # A plan is seen from the step at which it arrived.
+            # A plan is shown from the step at which it arrived.
             places.add(log_ns, max(n, self._states.newest))
         else:
             places.add(log_ns, n)

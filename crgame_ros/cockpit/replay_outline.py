@@ -15,7 +15,7 @@ from crgame_ros.timing.cycle_rows import CycleTable
 import numpy as np
 from numpy.typing import NDArray
 
-# As the page keeps them of a live run: 0.05 s apart, and further where the recording is long.
+# As the page keeps samples of a live run: 0.05 s apart, more if the recording is long.
 SPACING_S = 0.05
 MOST_SAMPLES = 24_000
 _LENGTH = struct.Struct('<I')
@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 class Outline:
     """
-    Every so many steps a state with the command in force, in little memory.
+    A sample of state and command every `stride` steps, in little memory.
 
     :param run: the run.
     :param duration_s: of the whole recording [s]
@@ -54,7 +54,7 @@ class Outline:
         self._states[n] = self._world.vehicle_states(content)
 
     def add_commands(self, table: CycleTable) -> None:
-        """Add what was consumed in some cycles."""
+        """Add the commands consumed in some cycles."""
         steps = table.column('n').astype(int)
         if (steps % self.stride == 0).any():
             for n, commands in zip(steps.tolist(), table.commands_of(self._world.vehicles),

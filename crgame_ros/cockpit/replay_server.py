@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`./run.sh --replay BAG`: the page on a recording, without ROS, until it is told to stop."""
+"""`./run.sh --replay BAG`: the page on a recording, without ROS, until a signal stops it."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,13 +18,13 @@ def serve_replay(path: Path, host: str = '127.0.0.1', port: int = 8080, token: s
     """
     Show a recording in the browser until SIGINT or SIGTERM.
 
-    :param path: as for `ReplayBackend`.
+    :param path: as in `ReplayBackend`.
     :param host: address to listen on.
     :param port: the first to try, 0 takes any.
-    :param token: that everybody has to show; None makes one where other machines can connect.
+    :param token: token of every client; None creates one if other machines can connect.
     :param say: prints a line.
     :return: exit code 0.
-    :raises InputError: if it is no recording that can be shown, or no port is free.
+    :raises InputError: if the recording cannot be shown, or no port is free.
     """
     access = Access.guarded(host, port) if token is None else Access(host, port, token)
     backend = open_replay(path, None, say, time.monotonic)

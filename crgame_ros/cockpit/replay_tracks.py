@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What happened in a recorded run over time: documents, alarms and marks for the time line."""
+"""Tracks of a recorded run over time: documents, alarms and marks for the time line."""
 
 from collections.abc import Sequence
 from copy import deepcopy
@@ -24,21 +24,21 @@ from crgame_ros.recording.reader import DecodedMessage
 import numpy as np
 from numpy.typing import NDArray
 
-# Of one kind and subject, what comes so soon after the one before is counted with it [s].
+# A mark this soon after the one before of its kind and subject is counted with it [s].
 MERGED_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True)
 class Mark:
     """
-    Something that happened.
+    An event on the time line.
 
     :param n: simulation step of the first of its kind.
-    :param last_n: of the last that is counted with it.
+    :param last_n: step of the last that is counted with it.
     :param kind: collision, off_road, stale_plan, refused_plan, fallback, lost_device, reset,
         trigger, stop, late, recording or gap.
-    :param subject: vehicle or event of the game, empty where it concerns the run.
-    :param text: for people.
+    :param subject: vehicle or event of the game, empty if it concerns the run.
+    :param text: readable text.
     :param count: how many are counted together.
     """
 
@@ -51,7 +51,7 @@ class Mark:
 
 
 class MarkList:
-    """Collects marks as a recording brings them; of one kind and subject in the order of n."""
+    """A collector of marks; those of one kind and subject must be added in the order of n."""
 
     def __init__(self, scheduler: ScenarioScheduler) -> None:
         self._within = round(MERGED_WITHIN_S / scheduler.dt_s)
@@ -76,7 +76,7 @@ class MarkList:
 _DIAGNOSTICS = '/diagnostics'
 _LATCHED = {'/scenario/signals': 'signals', '/scenario/events': 'events', '/seats': 'seats'}
 _FRAME_SKIP = '/timing/frame_skip'
-# Parts of the status document that are read from the recording; the rest is the page's.
+# Parts of the status document that are read from the recording; the page fills in the rest.
 _STATUS_PARTS = ('timing', 'planners', 'drivability', 'seats_lost')
 
 # (n, content): the content holds from step n until the next entry.
@@ -86,11 +86,11 @@ Track = list[tuple[int, Any]]
 @dataclass(frozen=True)
 class RunTracks:
     """
-    A run's documents over time; every entry of a track is complete in itself.
+    A run's documents over time; every entry of a track is a complete document.
 
-    :param documents: by kind as the page knows them (signals, events, seats, alarms) and by part
+    :param documents: by kind as on the page (signals, events, seats, alarms) and by part
         of `status` (timing, planners, drivability, seats_lost, frames_skipped).
-    :param marks: what the time line shows.
+    :param marks: marks of the time line.
     """
 
     documents: dict[str, Track]
@@ -98,7 +98,7 @@ class RunTracks:
 
 
 class TrackCollector:
-    """Takes a run's messages in the order of log time, and keeps what changes."""
+    """A collector of a run's tracks, which takes its messages in the order of log time."""
 
     def __init__(self, game: GameDocument) -> None:
         self._game = game
@@ -117,7 +117,7 @@ class TrackCollector:
 
     def add(self, recorded: DecodedMessage, newest: int | None) -> None:
         """
-        Take one message of `topics`.
+        Add one message of `topics`.
 
         :param newest: step of the run's newest state, None before the first.
         """
@@ -137,7 +137,7 @@ class TrackCollector:
                 self._add_status(status, n)
 
     def add_resets(self, steps: NDArray[np.float64], resets: NDArray[np.float64]) -> None:
-        """Note where the count of drift resets rose."""
+        """Add a mark at each step at which the count of drift resets rose."""
         for n, count in zip(steps.tolist(), resets.tolist(), strict=True):
             if self._resets is not None and count > self._resets:
                 self._marks.add(int(n), 'reset', '', 'too late: the clock was set back to now')
@@ -145,9 +145,9 @@ class TrackCollector:
 
     def finish(self, steps: NDArray[np.int64]) -> RunTracks:
         """
-        Return everything.
+        Return the tracks.
 
-        :param steps: of the recorded states.
+        :param steps: steps of the recorded states.
         """
         first = int(steps[0])
         strides = np.diff(steps)
@@ -157,7 +157,7 @@ class TrackCollector:
             self._marks.add(int(steps[index]), 'gap', '', f'{missing} states were not recorded')
         for track in self._tracks.values():
             track.sort(key=lambda entry: entry[0])
-            # What was latched before the first recorded state holds from there on.
+            # A document latched before the first recorded state is valid from that state on.
             while len(track) > 1 and track[1][0] <= first:
                 track.pop(0)
         return RunTracks(self._tracks, self._marks.marks())
@@ -189,7 +189,7 @@ class TrackCollector:
         self._mark_status(taken, n)
 
     def _mark_status(self, status: Status, n: int) -> None:
-        """Mark what is told once and is no alarm."""
+        """Add a mark for a status that is reported once and is not an alarm."""
         name, level, text, values = status
         node, _, subject = name.partition(': ')
         vehicle = subject.partition(' ')[0]
@@ -214,7 +214,7 @@ class TrackCollector:
                 if epoch == self._game.epoch:
                     self._add_fired(fired, newest or 0)
         except InputError:
-            # Anybody may publish on a topic; what is no such document is passed over.
+            # Any node may publish on a topic; other content is skipped.
             return
 
     def _add_fired(self, fired: Sequence[FiredEvent], newest: int) -> None:
@@ -229,7 +229,7 @@ class TrackCollector:
 
 
 def _seats(text: str) -> dict[str, dict[str, str]]:
-    """Read who drove, by name where it was somebody at a page."""
+    """Read the drivers of the seats, by name if the driver was at a page."""
     seats: dict[str, dict[str, str]] = parse_seats_document(text)
     for name, tenant in parse_tenants(text).items():
         if tenant.here:

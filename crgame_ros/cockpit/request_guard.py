@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What every server here asks of a request before it is answered, and the headers of answers."""
+"""The checks of every request before it is answered, and the headers of answers."""
 
 from collections.abc import Awaitable, Callable
 
@@ -15,7 +15,7 @@ from crgame_ros.errors import InputError
 
 KEEPER = web.AppKey('keeper', Doorkeeper)
 ACCESS = web.AppKey('access', Access)
-# How long a browser keeps what it got for its token [s].
+# How long a browser keeps its cookie [s].
 COOKIE_S = 12 * 3600
 
 _POLICY = 'Content-Security-Policy'
@@ -34,11 +34,11 @@ _HEADERS = {
 def guard(access: Access, keeper: Doorkeeper,
           also: Callable[[web.Request], bool] = lambda _: False) -> Middleware:
     """
-    Return what lets requests through.
+    Return the middleware that admits or refuses requests.
 
-    :param access: who is let in.
+    :param access: access control of the server.
     :param keeper: counts the connections.
-    :param also: whether somebody is let in for another reason.
+    :param also: returns whether a request without a valid cookie is admitted nevertheless.
     """
     @web.middleware
     async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -55,11 +55,11 @@ def header_writer(is_static: Callable[[str], bool], frames: Callable[[web.Reques
                   = None, framed_by: str = ''
                   ) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
     """
-    Return what writes the headers of every answer.
+    Return the function that writes the headers of every answer.
 
-    :param is_static: whether the answer to a path stays the same while its tag does.
-    :param frames: addresses of pages that a page may show inside itself; None for none.
-    :param framed_by: origin of the one page that may show this one within it; empty for none.
+    :param is_static: returns whether the answer to a path changes only with its tag.
+    :param frames: returns the addresses of pages that a page may frame; None for none.
+    :param framed_by: origin of the one page that may frame this one; empty for none.
     """
     headers = dict(_HEADERS)
     if framed_by:
@@ -79,7 +79,7 @@ def header_writer(is_static: Callable[[str], bool], frames: Callable[[web.Reques
 
 
 def file_answer(request: web.Request, file: PageFile | None) -> web.Response:
-    """Answer with a file of a page, or that the browser has it already."""
+    """Return the answer with a file of a page, or that the browser's copy is current."""
     if file is None:
         return web.Response(status=404, text='There is no such file.\n')
     if request.headers.get(hdrs.IF_NONE_MATCH) == f'"{file.tag}"':
@@ -120,7 +120,7 @@ async def _answer(access: Access, request: web.Request,
 
 
 def _refusal(access: Access, request: web.Request, port: int) -> str:
-    """Return why a request is refused whatever its token, empty if it is not."""
+    """Return why a request is refused regardless of its token; empty if it is not."""
     host = request.headers.get(hdrs.HOST, '')
     if not access.allows_host(host, port):
         return f'This is not the name of this server: open http://127.0.0.1:{port}/'

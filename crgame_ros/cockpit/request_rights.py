@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of whoever sends a request: their rights, and their page."""
+"""The rights and the page of the client that sends a request."""
 
 from aiohttp import hdrs, web
 from crgame_ros.cockpit.client import Client
@@ -12,23 +12,23 @@ from crgame_ros.errors import CrgameError
 RIGHTS = web.RequestKey('rights', Rights)
 # The key of the page from which a request comes.
 KEY_HEADER = 'X-Crgame-Key'
-# In the order in which they are looked for: most browsers name others, too.
+# In the order of the search: most browsers name others, too.
 _BROWSERS = (('Firefox/', 'Firefox'), ('Edg/', 'Edge'), ('OPR/', 'Opera'),
              ('Chromium/', 'Chromium'), ('Chrome/', 'Chrome'), ('Version/', 'Safari'))
 
 
 def granted(request: web.Request) -> Rights:
-    """Return what the browser's link or address grants."""
+    """Return the rights that the browser's link or address grants."""
     return request.get(RIGHTS, ALL_RIGHTS)
 
 
 def actor(request: web.Request, hub: Hub, kind: str) -> Client | None:
     """
-    Find whose request it is, and make sure that they may do it.
+    Return the client that sent a request, and check its rights.
 
     :param kind: load or invite.
     :return: None for a program that is no page.
-    :raises CrgameError: if they may not.
+    :raises CrgameError: if its rights do not allow the request.
     """
     client = hub.client_with_key(request.headers.get(KEY_HEADER, ''))
     rights = granted(request) if client is None else client.rights
@@ -39,7 +39,7 @@ def actor(request: web.Request, hub: Hub, kind: str) -> Client | None:
 
 
 def browser_of(request: web.Request) -> str:
-    """Name the browser and its version, empty for none that is known."""
+    """Return the name and version of the browser; empty if it is unknown."""
     agent = request.headers.get(hdrs.USER_AGENT, '')
     for mark, name in _BROWSERS:
         _, found, rest = agent.partition(mark)

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What somebody at a page may do: direct the experiment, drive, or watch."""
+"""The rights of a person at a page: direct the experiment, drive, or watch."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-# What a page, a link or the address may ask for.
+# The roles that a page, a link or the address may request.
 ROLES = ('direct', 'drive', 'watch', 'all')
 _DIRECTS = ('control', 'rate', 'planner', 'trigger')
 _DRIVES = ('input', 'claim', 'release', 'ask', 'hand_over', 'answer', 'ready', 'device',
@@ -22,7 +22,7 @@ class Rights:
     """
     The rights of one person.
 
-    :param directs: steers the experiment: run control, scenarios, planners, events, links.
+    :param directs: controls the experiment: run control, scenarios, planners, events, links.
     :param drives: may take a seat.
     :param seat: the only seat that may be taken without being offered; empty for any.
     """
@@ -44,21 +44,21 @@ class Rights:
         return ' and '.join(words) or 'spectator'
 
     def narrowed(self, role: str) -> 'Rights':
-        """Return as much of a role as these rights hold."""
+        """Return the rights of a role, limited to these rights."""
         wanted = Rights.for_role(role)
         return replace(self, directs=self.directs and wanted.directs,
                        drives=self.drives and wanted.drives)
 
     def refusal(self, kind: str, action: str = '') -> str:
         """
-        Return why something may not be done, empty if it may.
+        Return why an action is refused; empty if it is allowed.
 
-        :param kind: of a message, load, invite, runs or delete.
-        :param action: of the run control.
+        :param kind: kind of a message, or load, invite, runs or delete.
+        :param action: action of the run control.
         """
         deed = _DEEDS.get(action or kind, '')
         if kind == 'control' and action == 'start' and (self.directs or self.drives):
-            # A driver may say that they are ready: who asks more is refused where it is known.
+            # A driver may report that they are ready; other requests are refused later.
             return ''
         if kind == 'runs' and not (self.directs or self.drives):
             return f'only a driver or a director can look at past runs; you are a {self.role}'
@@ -73,5 +73,5 @@ ALL_RIGHTS = Rights()
 
 
 def refusal_of(rights: Rights, message: Mapping[str, Any]) -> str:
-    """Return why a page's message is refused, empty if it is not."""
+    """Return why a page's message is refused; empty if it is not."""
     return rights.refusal(message['type'], message.get('action', ''))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a run is doing, gathered from what the nodes tell: the page's status and alarms."""
+"""The page's status and alarms, gathered from the diagnostics of the nodes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.status_values import Status, status_truth
 
 OK, ERROR = 0, 2
-# Late traffic is told at each late tick, and never that it is in time again [s].
+# Late traffic is reported at each late tick, and its end is never reported [s].
 LATE_TRAFFIC_S = 2.0
-# Whom a contact has stopped and who touches the same one this soon has one contact [s].
+# A vehicle stopped by a contact that touches the same object within this time has one contact [s].
 SAME_CONTACT_S = 1.0
 _WORST, _OF, _THRESHOLD = 'worst_', '_of', 'threshold_'
 TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
@@ -23,12 +23,12 @@ TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
 @dataclass(frozen=True)
 class Alarm:
     """
-    Something that nobody should miss.
+    An alarm on the page.
 
     :param kind: collision, off_road, stale_plan, lost_device, recording, late or late_traffic.
-    :param subject: vehicle or node that it is about.
+    :param subject: vehicle or node concerned.
     :param text: a few words.
-    :param since_t: when it began, time of the run [s].
+    :param since_t: time of the run at which it began [s].
     """
 
     kind: str
@@ -38,21 +38,21 @@ class Alarm:
 
     @property
     def id(self) -> str:  # noqa: A003
-        """Key of the alarm while it lasts."""
+        """Return the key of the alarm while it lasts."""
         return f'{self.kind}:{self.subject}'
 
 
 class RunStatus:
-    """Takes statuses of `/diagnostics` and `/<v>/drivability` as they come."""
+    """A collector of the statuses of `/diagnostics` and `/<v>/drivability`."""
 
     def __init__(self) -> None:
         self.real_time_factor = 1.0
         self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
                                           'text': 'nothing is recorded'}
         self.seats_lost: dict[str, bool] = {}
-        # Devices at the machine of the game, by the seat that they drive.
+        # Devices at the machine of the game, by seat.
         self.devices: dict[str, dict[str, Any]] = {}
-        # Counts changes of the verdicts: a collision is to be heard when it is seen.
+        # Counts changes of the verdicts, so that a collision is heard when it is seen.
         self.verdicts = 0
         self._vehicles: tuple[str, ...] = ()
         self._traffic_late_t = -math.inf
@@ -64,7 +64,7 @@ class RunStatus:
         self.begin(())
 
     def begin(self, vehicles: Sequence[str]) -> None:
-        """Begin a run with these vehicles."""
+        """Start a run with these vehicles."""
         self._vehicles = tuple(vehicles)
         self.run = 'waiting'
         self.reason = ''
@@ -84,20 +84,20 @@ class RunStatus:
         self._calm()
 
     def _calm(self) -> None:
-        """Forget what is wrong, but for the recording."""
+        """Clear all alarms except that of the recording."""
         self._alarms = {key: alarm for key, alarm in self._alarms.items()
                         if alarm.kind == 'recording'}
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Return what is wrong now, the oldest first."""
+        """Return the current alarms, the oldest first."""
         return tuple(self._alarms.values())
 
     def add(self, status: Status, t: float) -> None:
         """
-        Take a status.
+        Add a status.
 
-        :param status: its name is node and subject, or `<v>/drivability`.
+        :param status: named by node and subject, or `<v>/drivability`.
         :param t: time of the run [s]
         """
         name, level, text, values = status
@@ -136,29 +136,29 @@ class RunStatus:
 
     def add_events(self, fired: Sequence[FiredEvent], dt_s: float) -> None:
         """
-        Take the contacts that stopped who drove: they overlap nobody, so no verdict tells of them.
+        Add the contacts that stopped a driver: without overlap, no verdict reports them.
 
-        :param fired: everything since the start of the run.
-        :param dt_s: of the simulation's steps [s]
+        :param fired: all events since the start of the run.
+        :param dt_s: simulation step [s]
         """
         for event in fired:
             if event.touching is None or event in self._stops:
                 continue
             vehicle, other = event.touching
             t = self._stops[event] = event.n * dt_s
-            # Who drives on against somebody that a verdict names has that contact already.
+            # A contact that a verdict already names is not counted again.
             if other not in self._hit(vehicle) and vehicle not in self._hit(other):
                 self.contacts.append({'vehicle': vehicle, 'with': other, 't': t})
                 self.verdicts += 1
 
     def lose(self) -> None:
-        """Take note that the simulation is silent."""
+        """Record that the simulation is silent."""
         if self.run != 'ended':
             self.run, self.reason = 'ended', 'silence'
             self._calm()
 
     def document(self) -> dict[str, Any]:
-        """Return what the status document says of the run's health."""
+        """Return the part of the status document about the run's health."""
         over = self.run == 'ended'
         return {'run': self.run, 'reason': self.reason, 'stays': self.stays,
                 'awaited': self.awaited, 'countdown_s': self.countdown_s,
@@ -177,7 +177,7 @@ class RunStatus:
 
     def _alarm(self, kind: str, subject: str, on: bool, text: str, t: float) -> None:
         alarm = Alarm(kind, subject, text, t)
-        # What still stands when a run has ended is told as its result.
+        # Alarms that last when a run has ended are reported in its result.
         if not on or (self.run == 'ended' and kind != 'recording'):
             self._alarms.pop(alarm.id, None)
         elif alarm.id not in self._alarms or self._alarms[alarm.id].text != text:
@@ -235,9 +235,9 @@ class RunStatus:
 
     def _note_violations(self, vehicle: str, hit: Sequence[str], off_road: bool,
                          t: float) -> None:
-        """Note what a verdict says that the one before did not."""
+        """Record the violations of a verdict that the one before did not have."""
         for other in hit:
-            # Both of two driven vehicles tell of their contact.
+            # Both of two driven vehicles report their contact.
             told = vehicle in self._hit(other) or self._was_stopped(vehicle, other, t)
             if other not in self._hit(vehicle) and not told:
                 self.contacts.append({'vehicle': vehicle, 'with': other, 't': t})
@@ -245,12 +245,12 @@ class RunStatus:
             self.departures.append({'vehicle': vehicle, 't': t})
 
     def _hit(self, vehicle: str) -> Sequence[str]:
-        """Return whom the last verdict on a vehicle names."""
+        """Return the objects that the last verdict on a vehicle names."""
         hit: Sequence[str] = self.drivability.get(vehicle, {}).get('hit', ())
         return hit
 
     def _was_stopped(self, vehicle: str, other: str, t: float) -> bool:
-        """Return whether one of two has just been stopped by the other."""
+        """Return whether one of two vehicles has just been stopped by a contact with the other."""
         return any({*(event.touching or ())} == {vehicle, other}
                    and abs(t - at_t) < SAME_CONTACT_S for event, at_t in self._stops.items())
 
@@ -267,14 +267,14 @@ class RunStatus:
 
 
 def _tracking(values: Mapping[str, str]) -> dict[str, float | None] | None:
-    """Return how far an AV is from its plan, now and at worst; None unless it tracks plans."""
+    """Return an AV's deviation from its plan, now and at worst; None unless it tracks plans."""
     if TRACKING[0] not in values:
         return None
     return {name: _number(values.get(name)) for name in TRACKING}
 
 
 def _criticality(level: int, values: Mapping[str, str]) -> dict[str, Any]:
-    """Read what is told of a vehicle's criticality: the worst so far, and what counts as it."""
+    """Read a vehicle's criticality: the worst values so far and their limits."""
     worst = {name[len(_WORST):-len(_OF)]: other for name, other in values.items()
              if name.startswith(_WORST) and name.endswith(_OF)}
     return {'critical': level != OK, 'tet_s': _number(values.get('tet_s')),
@@ -287,7 +287,7 @@ def _criticality(level: int, values: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _number(text: str | None) -> float | None:
-    """Read a number; None where there is none that JSON can carry."""
+    """Read a number; None if there is none that JSON can represent."""
     try:
         value = float(text or '')
     except ValueError:

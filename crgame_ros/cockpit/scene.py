@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scene document: all that the page draws and lists and that stays as it is during a run."""
+"""The scene document: everything on the page that does not change during a run."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -33,14 +33,14 @@ import shapely
 
 Document = dict[str, Any]
 
-# Of what a sign says beside its kind: no plate has room for more characters.
+# Most characters of a sign's additional value: no plate has room for more.
 _MOST_TEXT = 40
-# A hole in the road that is narrower is a gap of the map [m].
+# A narrower hole in the road is a gap of the map [m].
 _GAP_WIDTH = 0.8
 
 
 def light_entries(network: LaneletNetwork) -> list[Document]:
-    """Describe the lights that have a place: where, for which lanelets and movement."""
+    """Describe the lights that have a place: their position, lanelets and movement."""
     lanelets: dict[int, list[Lanelet]] = {}
     for lanelet in network.lanelets:
         for light_id in lanelet.traffic_lights or ():
@@ -50,7 +50,7 @@ def light_entries(network: LaneletNetwork) -> list[Document]:
 
 
 def _light(light: TrafficLight, lanelets: list[Lanelet]) -> Document | None:
-    """Place a light; one that neither has a position nor a lanelet cannot be shown."""
+    """Describe a light; None if it has neither a position nor a lanelet."""
     position, yaw = light.position, 0.0
     if lanelets:
         along = lanelets[0].center_vertices[-1, :2] - lanelets[0].center_vertices[-2, :2]
@@ -67,7 +67,7 @@ def _light(light: TrafficLight, lanelets: list[Lanelet]) -> Document | None:
 
 
 def sign_entries(network: LaneletNetwork) -> list[Document]:
-    """Describe what each sign says, where it stands, and which way its readers drive."""
+    """Describe the content and position of each sign and the heading of the traffic it faces."""
     lanelets: dict[int, list[Lanelet]] = {}
     for lanelet in network.lanelets:
         for sign_id in lanelet.traffic_signs or ():
@@ -105,7 +105,7 @@ def lanelet_entries(network: LaneletNetwork,
     """
     Describe the lanelets in their order: bounds, markings, neighbours.
 
-    :param heights: of those lanelets that have any
+    :param heights: heights of the lanelets that have any
     """
     roads = RoadNetwork(network)
     crossing = {
@@ -140,20 +140,20 @@ def _lanelet(lanelet: Lanelet, roads: RoadNetwork, crossing: set[int],
 
 
 def _raised(vertices: Points, heights: Points | None) -> Points:
-    """Return the vertices their heights, if they have any: (N, 3), else (N, 2) [m]."""
+    """Return the vertices with their heights, if they have any: (N, 3), else (N, 2) [m]."""
     return vertices[:, :2] if heights is None else np.column_stack((vertices[:, :2], heights))
 
 
 def _heights(vertices: Points) -> list[float] | None:
-    """Return a bound's heights [m]; None of a lanelet that is flat."""
+    """Return a bound's heights [m]; None if the lanelet is flat."""
     return flat(vertices[:, 2]) if vertices.shape[1] > 2 else None
 
 
 def gap_outlines(network: LaneletNetwork) -> list[list[float]]:
     """
-    Return the slits between lanelets that are no ground to the eye, only cracks in the map.
+    Return the slits between lanelets, which are cracks in the map rather than ground.
 
-    They are for display alone: whether a vehicle is on the road is not decided with them.
+    They are for display only: the check whether a vehicle is on the road does not use them.
     """
     road = shapely.union_all(lanelet_areas(network.lanelets))
     holes = [shapely.Polygon(ring) for part in getattr(road, 'geoms', [road])
@@ -163,25 +163,25 @@ def gap_outlines(network: LaneletNetwork) -> list[list[float]]:
 
 
 def stop_line_entries(network: LaneletNetwork) -> list[Document]:
-    """Describe the stop lines: their ends, how they are painted, and whose they are."""
+    """Describe the stop lines: their ends, markings and lanelets."""
     return [{'points': flat(stop_line_ends(lanelet)), 'lanelet': int(lanelet.lanelet_id),
              'line': marking_name(lanelet.stop_line.line_marking)}
             for lanelet in network.lanelets if lanelet.stop_line is not None]
 
 
 def marking_name(marking: LineMarking | None) -> str:
-    """Name a line marking as CommonRoad's files do."""
+    """Return the name of a line marking in CommonRoad's files."""
     return 'no_marking' if marking is None else str(marking.value)
 
 
-# Shown around the vehicles where a scenario has no roads at all [m].
+# Margin shown around the vehicles if a scenario has no roads [m].
 _EMPTY_MARGIN = 50.0
 
 
 def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
                    game: GameDocument) -> Document:
     """
-    Describe the scene of a run to the page; free of NaN and infinities.
+    Return the scene of a run for the page, without NaN and infinities.
 
     :param loaded: the scenario
     :param objects: everything that can appear; driven vehicles among them are left out, because
@@ -238,7 +238,7 @@ def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) 
 
 
 def _perception(spec: PerceptionSpec) -> Document:
-    """Name the sensors of an AV, and say how far the farthest reaches [m]; null sees all."""
+    """Return the sensors of an AV and its longest range [m]; null if it sees all."""
     return {'localisation': spec.localisation is not None,
             'sensors': [sensor.name for sensor in spec.sensors],
             'range': max((sensor.horizon for sensor in spec.sensors), default=None)}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Orders about seats that are on their way to the simulation."""
+"""Seat orders that the simulation has not confirmed yet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.game.seat_documents import SeatDemand, SeatOccupant
 
-# An order that is published while the simulation loads another game reaches nobody [s].
+# Interval of repetition [s]: an order sent while the simulation loads another game is lost.
 AGAIN_S = 0.5
 GIVE_UP_S = 10.0
 
@@ -25,24 +25,24 @@ class _Order:
 
 class SeatOrders:
     """
-    Remembers what was ordered until it is so, and what has to be ordered again.
+    The seat orders that are not fulfilled yet, to be repeated until they are.
 
-    Until then `/seats` may still tell of the time before, which says nothing against the order.
+    Until then, `/seats` may still report the earlier state, which does not refute the order.
     """
 
     def __init__(self) -> None:
         self._orders: dict[str, _Order] = {}
 
     def __contains__(self, seat: object) -> bool:
-        """Return whether an order about a seat is on its way."""
+        """Return whether an order about a seat is pending."""
         return seat in self._orders
 
     def note(self, demand: SeatDemand, seats: Seats, tenants: Tenants, now_s: float) -> None:
         """
-        Remember an order that is sent now: somebody takes a seat, or gives it back.
+        Record an order that is sent now: a person takes a seat or gives it back.
 
-        :param seats: what `/seats` says; what is already so needs no answer.
-        :param tenants: who is in the seats.
+        :param seats: content of `/seats`; an order that is already fulfilled needs no answer.
+        :param tenants: occupants of the seats.
         :param now_s: steady clock [s].
         """
         seat = demand.seat
@@ -50,7 +50,7 @@ class SeatOrders:
             self._orders[seat] = _Order(demand, now_s, now_s)
 
     def answered(self, seats: Seats, tenants: Tenants) -> None:
-        """Take what `/seats` says anew."""
+        """Remove the orders that the new content of `/seats` fulfils."""
         self._orders = {
             seat: order for seat, order in self._orders.items()
             if seat in seats and not _is_so(order.demand, seats[seat], tenants.get(seat))
@@ -74,18 +74,18 @@ class SeatOrders:
 
 def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
            tenant: SeatOccupant | None) -> bool:
-    """Return whether a seat is as ordered."""
+    """Return whether an order is fulfilled."""
     if entry is None:
         return False
     drives = entry['source'] == COCKPIT
     if demand.source == COCKPIT:
         return drives and (demand.person is None or (
             tenant is not None and tenant.here and tenant.person.id == demand.person.id))
-    # Given back in a game whose driver is the cockpit, the seat stays the cockpit's, and empty.
+    # If the game's driver is the cockpit, a seat that is given back stays the cockpit's, empty.
     return not drives or (entry['driver'] == COCKPIT and tenant is None)
 
 
 def _is_in_vain(demand: SeatDemand, tenant: SeatOccupant | None) -> bool:
-    """Return whether somebody at another cockpit was quicker."""
+    """Return whether a person at another cockpit has taken the seat first."""
     return demand.source == COCKPIT and demand.person is not None and tenant is not None \
         and tenant.here and tenant.person.id not in (demand.person.id, demand.displaced)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which seats the clients of this server hold, and what the page is told of all seats."""
+"""The seats that clients of this server hold, and the seats document of the page."""
 
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatOccupant
 
-# So long the seat of somebody whose connection has broken is kept for them [s].
+# How long a seat is kept for a driver whose connection has broken [s].
 KEEP_S = 60.0
 
 
@@ -22,7 +22,7 @@ def _people(clients: Iterable[str], names: Mapping[str, str]) -> list[dict[str, 
 
 
 def short_source(driver: str) -> str:
-    """Name a driver source by its file's name alone: pages need not know the folders here."""
+    """Return a driver source with its file's name only: pages must not see folders."""
     kind, colon, argument = driver.partition(':')
     return f'{kind}{colon}{PurePath(argument).name}' if colon else driver
 
@@ -32,10 +32,10 @@ class SeatTable:
     """
     The seats of a run as the browser sees them.
 
-    :param seats: what `/seats` says: source and driver by vehicle.
-    :param held: the seats that somebody here holds.
-    :param tenants: what `/seats` says of the people in the seats, here and at other cockpits.
-    :param absent_s: since when those who are not here are absent, by seat; steady clock [s].
+    :param seats: content of `/seats`: source and driver by vehicle.
+    :param held: the seats that clients of this server hold.
+    :param tenants: the people in the seats according to `/seats`, here and at other cockpits.
+    :param absent_s: since when absent drivers are absent, by seat; steady clock [s].
     """
 
     seats: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -46,11 +46,11 @@ class SeatTable:
     def update(self, seats: Mapping[str, Mapping[str, str]], awaited: Container[str] = (),
                tenants: Mapping[str, SeatOccupant] | None = None) -> list[HeldSeat]:
         """
-        Take what `/seats` says.
+        Update the table with the content of `/seats`.
 
-        :param awaited: seats about which an order is on its way: what is said of them is old.
-        :param tenants: who is in the seats; None leaves them as they were.
-        :return: the seats that somebody outside has taken away, which are no longer held.
+        :param awaited: seats with a pending order, whose content is out of date.
+        :param tenants: occupants of the seats; None leaves them as they were.
+        :return: the seats that were taken away from outside, which are no longer held.
         """
         self.seats = {name: dict(entry) for name, entry in seats.items()}
         if tenants is not None:
@@ -68,7 +68,7 @@ class SeatTable:
 
     def note_absent(self, lost: Mapping[str, bool], now_s: float) -> None:
         """
-        Take note of who has gone: their connection has ended, or their whole cockpit.
+        Record the absent drivers, whose connection or whole cockpit has ended.
 
         :param lost: seats whose driver is silent.
         :param now_s: steady clock [s]
@@ -78,17 +78,17 @@ class SeatTable:
         self.absent_s = {name: self.absent_s.get(name, now_s) for name in gone}
 
     def kept_for(self, seat: str, now_s: float) -> float:
-        """Return for how long a seat is still kept for who has gone [s]; 0 if it is not."""
+        """Return how long a seat is still kept for its absent driver [s]; 0 if it is not."""
         if seat in self.held or seat not in self.absent_s:
             return 0.0
         return max(0.0, self.absent_s[seat] + KEEP_S - now_s)
 
     def seat_of(self, client: str) -> HeldSeat | None:
-        """Find the seat that a client holds."""
+        """Return the seat that a client holds; None if it holds none."""
         return next((item for item in self.held.values() if item.holder == client), None)
 
     def seat_kept_for(self, person: str) -> str | None:
-        """Find the seat that a person had, and may come back to."""
+        """Return the seat that a person had and may take again; None if there is none."""
         return next((name for name, tenant in self.tenants.items()
                      if tenant.person.id == person and name in self.seats
                      and self.seats[name]['source'] == COCKPIT), None)
@@ -96,13 +96,13 @@ class SeatTable:
     def claim(self, client: str, seat: str, names: Mapping[str, str], *, person: str = '',
               may_displace: bool = True, now_s: float = 0.0) -> HeldSeat:
         """
-        Return a free seat to a client; one that it held before has to be left first.
+        Assign a free seat to a client, which must have left its former seat.
 
-        :param names: of the clients by id, for messages.
+        :param names: names of the clients by id, for messages.
         :param person: id of the client's person.
-        :param may_displace: whether it may take a seat that is kept for somebody who has gone.
+        :param may_displace: whether it may take a seat that is kept for an absent driver.
         :param now_s: steady clock [s]
-        :raises InputError: if there is no such seat or somebody holds it.
+        :raises InputError: if there is no such seat or another client holds it.
         """
         self._known(seat)
         holder = self.held.get(seat)
@@ -128,12 +128,12 @@ class SeatTable:
 
     def release(self, client: str, seat: str) -> HeldSeat | None:
         """
-        Return a seat back to the driver or planner of the game.
+        Return a seat to the driver or planner of the game.
 
-        Anybody may do that with a seat that has been left.
+        Any client may do that with a seat that has been left.
 
-        :return: the seat as it was held, None if nobody held it.
-        :raises InputError: if somebody else holds it or nobody ever took it.
+        :return: the seat as it was held, None if no client held it.
+        :raises InputError: if another client holds it or no client ever took it.
         """
         entry = self._known(seat)
         holder = self.held.get(seat)
@@ -147,7 +147,7 @@ class SeatTable:
 
     def offer(self, client: str, seat: str, to: str) -> HeldSeat:
         """
-        Offer a seat to another client, who accepts it or declines; to oneself: withdraw that.
+        Offer a seat to another client, or withdraw the offer if `to` is the client itself.
 
         :raises InputError: if the client does not hold it.
         """
@@ -157,10 +157,10 @@ class SeatTable:
 
     def accept(self, client: str, seat: str, person: str = '') -> HeldSeat:
         """
-        Take a seat that was offered.
+        Accept an offered seat.
 
         :return: the seat as it was held.
-        :raises InputError: if it is not offered to this client (any more).
+        :raises InputError: if it is not, or no longer, offered to this client.
         """
         before = self._offered(client, seat)
         after = self.held[seat] = HeldSeat(seat, client, person)
@@ -169,9 +169,9 @@ class SeatTable:
 
     def decline(self, client: str, seat: str) -> HeldSeat:
         """
-        Leave a seat that was offered to who has it.
+        Decline an offered seat, which its holder keeps.
 
-        :raises InputError: if it is not offered to this client (any more).
+        :raises InputError: if it is not, or no longer, offered to this client.
         """
         holder = self._offered(client, seat)
         holder.offered_to = None
@@ -180,9 +180,9 @@ class SeatTable:
 
     def ask(self, client: str, seat: str) -> HeldSeat:
         """
-        Note that a client wants a seat that somebody holds.
+        Record that a client requests a seat that another holds.
 
-        :raises InputError: if nobody holds it.
+        :raises InputError: if no client holds it.
         """
         self._known(seat)
         holder = self.held.get(seat)
@@ -194,9 +194,9 @@ class SeatTable:
 
     def left(self, client: str) -> HeldSeat | None:
         """
-        Forget a client that is gone: its car is stopped.
+        Remove a client that has gone; its car is stopped.
 
-        :return: the seat that it held.
+        :return: the seat that it held, if any.
         """
         for item in self.held.values():
             item.requests = [other for other in item.requests if other != client]
@@ -212,7 +212,7 @@ class SeatTable:
         """
         Return the seats for the page.
 
-        :param names: of the clients that may drive, by id.
+        :param names: names of the clients that may drive, by id.
         :param lost: seats whose driver is silent.
         :param now_s: steady clock [s]
         """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a page shows its person: the map or a 3D view, how wide, how fine and how often."""
+"""The view that a page shows: map or 3D, its angle, resolution and picture rate."""
 
 from dataclasses import dataclass
 
@@ -11,22 +11,22 @@ SHOWN = ('map', 'driver', 'chase', 'bird')
 @dataclass(frozen=True)
 class SeenView:
     """
-    What a page has told of its picture.
+    The properties of a page's picture, as reported by the page.
 
-    :param shown: one of `SHOWN`; empty before the page has told.
+    :param shown: one of `SHOWN`; empty before the page has reported.
     :param inset: whether the small map lies over a 3D view.
-    :param plans: whether what AVs plan is to be seen.
+    :param plans: whether the plans of AVs are shown.
     :param mirrors: whether there are mirrors.
-    :param bare: whether the page is a stage, with nothing but the view.
+    :param bare: whether the page is a stage, with only the view.
     :param across_deg: angle across a 3D view [deg]; None on the map.
-    :param screen_width_m: of the screen, where the view is true to scale [m]; None where not.
-    :param eye_distance_m: of the eyes from it [m].
-    :param width_px: of the picture on the page [CSS px].
+    :param screen_width_m: width of the screen if the view is true to scale [m], else None.
+    :param eye_distance_m: distance of the eyes from the screen [m].
+    :param width_px: width of the picture on the page [CSS px].
     :param height_px: [CSS px]
-    :param ratio: pixels that are drawn to a CSS pixel.
-    :param rate_hz: pictures per second; None where nobody has counted yet.
-    :param renderer: what draws, as far as the browser tells; empty on the map.
-    :param software: whether that is the processor.
+    :param ratio: drawn pixels per CSS pixel.
+    :param rate_hz: pictures per second; None before the first count.
+    :param renderer: name of the renderer as the browser reports it; empty on the map.
+    :param software: whether the processor renders.
     """
 
     shown: str = ''

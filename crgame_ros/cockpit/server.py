@@ -30,8 +30,8 @@ def _add_invite_routes(app: web.Application, access: Access, hub: Hub) -> None:
     """
     Add the route.
 
-    :param access: whose links they are; it may have none.
-    :param hub: knows the page that asks.
+    :param access: access control with the links; it may have none.
+    :param hub: all clients.
     """
     async def invite(request: web.Request) -> web.Response:
         try:
@@ -68,13 +68,13 @@ _JSON_BYTES = 256 * 1024
 def create_app(backend: Backend, access: Access, library: Library | None, *,
                page: Path = page_files.PAGE, framed_by: str = '') -> web.Application:
     """
-    Make the server's application. It starts the backend, and stops it when it is cleaned up.
+    Return the server's application, which starts the backend and stops it at cleanup.
 
     :param backend: the run or recording behind the page.
-    :param access: who is let in.
+    :param access: access control of the server.
     :param library: scenarios that can be chosen; None for none.
     :param page: the folder of the page.
-    :param framed_by: origin of the one page that may show this one within it; empty for none.
+    :param framed_by: origin of the one page that may frame this one; empty for none.
     :raises CrgameError: if the page or Plotly is not installed.
     """
     hub = Hub(backend.mode, framed_by)
@@ -108,9 +108,9 @@ def create_app(backend: Backend, access: Access, library: Library | None, *,
 
 async def listen(app: web.Application, host: str, port: int) -> tuple[web.AppRunner, int]:
     """
-    Start to listen, at the next free port if the one asked for is taken.
+    Start to listen, at the next free port if the requested one is taken.
 
-    :param app: of `create_app`; its backend is started.
+    :param app: from `create_app`; its backend is started.
     :param host: address or name.
     :param port: the first to try; 0 takes any.
     :return: the runner, whose `cleanup` ends everything, and the port.

@@ -26,7 +26,7 @@ MAX_REQUESTS = 16
 # A ping after 5 s of silence, 2.5 s for its answer.
 HEARTBEAT_S = 5.0
 CLOSE_S = 0.4
-# What the kernel may hold unsent: more would be seconds of old frames on a slow network [bytes].
+# Most bytes unsent in the kernel: more would be seconds of old frames on a slow network.
 _KERNEL_UNSENT = 64 * 1024
 
 _log = logging.getLogger(__name__)
@@ -34,17 +34,17 @@ _log = logging.getLogger(__name__)
 
 class Session:
     """
-    Reads a client's messages, and makes sure that the backend learns of its end.
+    A connection that reads a client's messages and reports its end to the backend.
 
     :param hub: all clients.
-    :param backend: what the messages are for.
+    :param backend: carries out the messages.
     """
 
     def __init__(self, hub: Hub, backend: Backend) -> None:
         self._hub = hub
         self._backend = backend
-        # One byte more: aiohttp refuses a message of exactly this size. Pings are ours to answer,
-        # because they count as messages; so are closes, because the backend comes first.
+        # One byte more: aiohttp refuses a message of exactly this size. This class answers pings,
+        # because they count as messages, and closes, because the backend comes first.
         self.socket = web.WebSocketResponse(
             timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
             autoclose=False, max_msg_size=page_messages.MAX_BYTES + 1, writer_limit=0)
@@ -84,28 +84,28 @@ class Session:
             self._backend.joined(client)
             code, reason = await self._read(client)
         finally:
-            # Before anything that waits: a seat may be held.
+            # Before any await: the client may hold a seat.
             self._leave(client)
             writer.cancel()
             self._requests.put_nowait(None)
             if reason or client.dropped:
                 _log.info('%s was dropped: %s', client.id, reason or client.dropped)
             await self.close(code, reason)
-        # A request that has begun is finished, whether or not its page has gone.
+        # A started request is finished even if its page has gone.
         await asyncio.wait([self._worker])
         return self.socket
 
     async def end(self) -> None:
-        """Close the connection because the server ends, and give up what was asked for."""
+        """Close the connection because the server ends, and cancel pending requests."""
         await self.close(WSCloseCode.GOING_AWAY, 'the cockpit ends')
         if self._worker is not None:
             self._worker.cancel()
 
     async def close(self, code: int, reason: str) -> None:
         """
-        Close the connection within a second, whatever its other end does.
+        Close the connection within a second, whatever the client does.
 
-        :param reason: at most 123 bytes, for people.
+        :param reason: readable reason of at most 123 bytes.
         """
         with contextlib.suppress(TimeoutError, ConnectionError):
             async with asyncio.timeout(2 * CLOSE_S):
@@ -123,7 +123,7 @@ class Session:
             _log.exception('end of %s', client.id)
 
     async def _read(self, client: Client) -> tuple[int, str]:
-        """Take messages until the connection ends; give the code and reason to close it with."""
+        """Read messages until the connection ends; return the code and reason of the close."""
         loop = asyncio.get_running_loop()
         while True:
             message = await self.socket.receive()
@@ -159,8 +159,8 @@ class Session:
                 try:
                     await self._backend.command(client, message)
                 except CrgameError as error:
-                    # Repeated every 50 ms, and sent for a while after a seat was lost: the seats
-                    # say who holds them.
+                    # Inputs repeat every 50 ms, and go on for a while after a seat was lost. The
+                    # seats document already names the holders.
                     _log.debug('%s of %s: %s', message['type'], client.id, error)
             case 'name':
                 client.name = message['name']
@@ -195,7 +195,7 @@ class Session:
             self._requests.put_nowait(message)
         except asyncio.QueueFull:
             self._reply(client, message, False, f'{MAX_REQUESTS} requests are waiting already')
-        # Let it begin before the next message is taken.
+        # Let the task start before the next message is read.
         await asyncio.sleep(0)
 
     def _blame(self, client: Client, error: InputError) -> None:
@@ -219,7 +219,7 @@ class Session:
 
 
 def _end_with(writer: asyncio.Task[None], client: Client) -> None:
-    """Drop a client that nothing can be sent to any more."""
+    """Drop a client to which nothing can be sent any more."""
     error = None if writer.cancelled() else writer.exception()
     if error is not None and not isinstance(error, ConnectionError):
         _log.error('cannot send to %s', client.id, exc_info=error)
@@ -228,8 +228,8 @@ def _end_with(writer: asyncio.Task[None], client: Client) -> None:
 
 
 def _send_promptly(transport: asyncio.WriteTransport) -> None:
-    """Hold back no more than one message: what is old is replaced, not sent late."""
-    # With 0, TLS would hold back for ever: it takes an empty buffer for a full one.
+    """Limit the send buffer to one message, so that old frames are replaced, not sent late."""
+    # With 0, TLS would never send: it treats an empty buffer as a full one.
     transport.set_write_buffer_limits(high=1, low=0)
     raw = transport.get_extra_info('socket')
     if raw is not None and hasattr(socket, 'TCP_NOTSENT_LOWAT'):

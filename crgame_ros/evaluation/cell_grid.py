@@ -90,7 +90,7 @@ class CellGrid:
         return (planner.digest,) if planner.choice is not None else scene.digests
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return asdict(self)
 
     @classmethod
@@ -108,7 +108,7 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
     """
     Load and check everything that a plan names, and take its files into a store.
 
-    :param progress: is told how much is done, 0 to 1.
+    :param progress: called with the share done so far, 0 to 1.
     :raises InputError: if anything cannot be used.
     """
     planners = tuple(_planner(choice.planner, choice.name, choice.options, store)

@@ -86,7 +86,7 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
     :param folder: of the evaluation; is made, or one of the same kind.
     :param computing: where and how.
     :param told: is given how far it is; with a cell and its row when one has ended.
-    :param loading: is told how much of the plan has been loaded, 0 to 1.
+    :param loading: called with the share of the plan loaded so far, 0 to 1.
     :raises InputError: if plan or folder cannot be used.
     :raises CrgameError: if the scheduler is lost; what was finished is kept.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""cockpit_node: the page in which people drive, see everything and steer the run."""
+"""cockpit_node: the page in which people drive, watch and control the run."""
 
 import asyncio
 from contextlib import ExitStack
@@ -23,7 +23,7 @@ LOOK_S = 0.05
 
 
 class CockpitNode(Node):
-    """Serves the page and its WebSocket; the simulation never waits for a viewer."""
+    """The server of the page and its WebSocket; the simulation never waits for a viewer."""
 
     def __init__(self) -> None:
         super().__init__('cockpit_node')

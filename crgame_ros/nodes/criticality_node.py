@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""criticality_node: how much time, room and braking is left to every driven vehicle."""
+"""criticality_node: the time, distance and braking left to every driven vehicle."""
 
 from array import array
 import time
@@ -25,10 +25,10 @@ GREATEST = 1000.0
 
 class CriticalityNode(ObserverNode[Criticality]):
     """
-    Measures each scenario tick, and publishes its rows.
+    The node that measures criticality at each scenario tick and publishes the rows.
 
-    On /diagnostics it tells of each vehicle when it becomes critical or no longer is, and every
-    second.
+    On /diagnostics it reports on each vehicle every second, and when the vehicle becomes critical
+    or ceases to be.
     """
 
     def __init__(self) -> None:
@@ -51,17 +51,17 @@ class CriticalityNode(ObserverNode[Criticality]):
         self._n = -1
 
     def make(self, run: ObservedRun) -> Criticality:
-        """Make the observer of a run."""
+        """Build the observer of a run."""
         self._told, self._n, self._heartbeat_s = {}, -1, 0.0
         return Criticality(run, self._thresholds)
 
     def publish(self, observer: Criticality, stamp_ns: int) -> None:
-        """Publish what a tick has brought."""
+        """Publish the rows of a tick."""
         if observer.n == self._n:
             return
         self._n = observer.n
         rows = criticality_rows(observer, self.epoch, observer.n)
-        # A table without rows would not even tell of which step it is.
+        # A table without rows does not even hold its step.
         if len(rows):
             self._message.layout.dim[0].size = len(rows)
             self._message.layout.dim[0].stride = rows.size
@@ -75,7 +75,7 @@ class CriticalityNode(ObserverNode[Criticality]):
 
     def _publish_vehicle(self, observer: Criticality, tick: TickMeasures, stamp_ns: int,
                          beats: bool) -> None:
-        """Tell of one vehicle, if it is time."""
+        """Publish the status of one vehicle if it is due."""
         values, others = (each.tolist() for each in tick.worst())
         now = {name: (value, other) for name, value, other in zip(
             MEASURES, values, others, strict=True) if other >= 0}

@@ -18,9 +18,9 @@ HEARTBEAT_S = 1.0
 
 class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
     """
-    Checks each published state; reports changes at once and a heartbeat every second.
+    The node that checks each published state; it reports changes at once and all every second.
 
-    Whoever begins to listen is told at once, too: after a restart nobody has heard what it finds.
+    A new subscriber also gets a report at once, because after a restart none has received any.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
         self._listeners = 0
 
     def make(self, run: ObservedRun) -> DrivabilityMonitor:
-        """Make the monitor of a run, and the topics of its vehicles."""
+        """Build the monitor of a run and the topics of its vehicles."""
         monitor = drivability_monitor(run)
         for item in run.vehicles:
             if item.id not in self._reports:
@@ -40,7 +40,7 @@ class DrivabilityNode(ObserverNode[DrivabilityMonitor]):
         return monitor
 
     def publish(self, observer: DrivabilityMonitor, stamp_ns: int) -> None:
-        """Report what has changed, or everything now and then."""
+        """Publish the changes; publish everything every second."""
         due = observer.changed
         listeners = sum(each.get_subscription_count() for each in self._reports.values())
         if listeners > self._listeners or time.monotonic() - self._heartbeat_s > HEARTBEAT_S:

@@ -43,10 +43,10 @@ DEVICE_POLL_S = 0.02
 
 class DriverNode(Node):
     """
-    Publishes the command of each coming cycle, and again at once when the input changes.
+    The node that publishes the command of each next cycle, and again when the input changes.
 
-    `/clock` of step n asks for the command that moves the vehicle from n to n + 1. A device is
-    waited for by a thread of its own, so that a key takes effect in the cycle it is pressed in.
+    `/clock` of step n requests the command that moves the vehicle from n to n + 1. A separate
+    thread waits for the device, so that a key takes effect in the cycle in which it is pressed.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class DriverNode(Node):
         watcher = threading.Thread(target=self._watch_device, name='device')
         watcher.start()
         try:
-            # What a driver does must not miss the cycle it is meant for.
+            # An input must not miss the cycle that it is meant for.
             spin(self, stop, prompt_executor())
         finally:
             self._running = False
@@ -122,7 +122,7 @@ class DriverNode(Node):
         except CrgameError as error:
             self.get_logger().error(str(error))
             return
-        # Before the device is closed, so that it can be told to let go.
+        # Before the device is closed, so that its force can be switched off.
         self._force.end()
         with self._lock:
             if self._driver is not None:
@@ -136,14 +136,16 @@ class DriverNode(Node):
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
 
     def _policy_world(self) -> 'PolicyWorld':
-        """Return what a policy looks at; it is subscribed to once, and only where one drives."""
+        """
+        Return the world of a policy; subscribe to it once, and only where a policy drives.
+        """
         if self._world is None:
             from crgame_ros.ros.live_policy import PolicyWorld
             self._world = PolicyWorld(self._endpoints)
         return self._world
 
     def _on_seats(self, message: String) -> None:
-        """Fall silent while somebody else has the seat."""
+        """Stop publishing while another driver has the seat."""
         try:
             seat = parse_seats_document(message.data).get(self._vehicle_id)
             self._silent = seat is not None and seat['source'] != GAME
@@ -208,18 +210,18 @@ class DriverNode(Node):
                     if self._driver is not None and self._driver.poll(time.monotonic()):
                         self._publish()
             except (OSError, ValueError):
-                # The device went away between two looks; the driver finds it again.
+                # The device disappeared between two reads; the driver finds it again.
                 time.sleep(DEVICE_POLL_S)
 
     def _observe(self) -> None:
-        """Let a policy see what has come since the last cycle, as before the first one."""
+        """Pass a policy the messages since the last cycle, and those before the first one."""
         with self._lock:
             if self._driver is not None and self._driver.is_looking \
                     and self._driver.poll(time.monotonic()):
                 self._publish()
 
     def _log_problem(self) -> None:
-        """Tell once of each new trouble with the device, and of its end."""
+        """Log each new problem with the device once, and its end."""
         assert self._driver is not None
         problem: InputError | None = self._driver.problem
         text = '' if problem is None else str(problem)

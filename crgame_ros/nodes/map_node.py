@@ -22,12 +22,12 @@ from rclpy.node import Node
 PERIOD_S = 0.1
 # Joints of a vehicle in /vehicles/tick_state: x, y, yaw, steering.
 JOINTS = 4
-# What is published where nothing is occupied: viewers want at least one cell.
+# Published where nothing is occupied: viewers need at least one cell.
 NOTHING = OccupancyGrid((0.0, 0.0), 1.0, np.zeros((1, 1), dtype=bool))
 
 
 class MapNode(Node):
-    """Publishes the map's tiles around the driven vehicles, whenever these are other tiles."""
+    """The node that publishes the map tiles around the driven vehicles when these tiles change."""
 
     def __init__(self) -> None:
         super().__init__('map_node')
@@ -63,7 +63,7 @@ class MapNode(Node):
             self.get_logger().error(str(error))
 
     def _open(self, text: str) -> None:
-        """Open the map of a new game; the one before is forgotten even if it is the same file."""
+        """Open the map of a new game; reopen it even if the file is the same."""
         path = parse_game_document(text).occupancy
         if path is None:
             self._clear()
@@ -71,7 +71,7 @@ class MapNode(Node):
             self._map = TiledOccupancy(path)
 
     def _clear(self) -> None:
-        """Take back what was published."""
+        """Clear the published map."""
         self._map = None
         if self._published is not None:
             self._publish(NOTHING)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""marker_node: the scene as markers for RViz and Foxglove, while somebody looks at them."""
+"""marker_node: the scene as markers for RViz and Foxglove, while there are subscribers."""
 
 from contextlib import suppress
 import time
@@ -21,16 +21,16 @@ import numpy as np
 from rclpy.node import Node
 
 PERIOD_S = 0.05
-# While nothing moves, the same is sent so often: markers that nobody renews vanish.
+# While nothing moves, markers are sent again at this period [s]: otherwise they expire.
 KEEP_ALIVE_S = 1.0
 LOOK_S = 0.25
-# Of who has just been seen, writer and reader may not have met, which takes seconds on a machine
-# with nothing to spare: the map is sent more than once, after [s].
+# A new subscriber's reader may not be matched yet, which takes seconds on a busy machine. So the
+# map is sent several times, after these delays [s].
 MAP_AFTER_S = (0.1, 1.1, 5.1)
 
 
 class MarkerNode(Node):
-    """Draws nothing, and reads nothing, while nobody subscribes to `/markers` or `/tf`."""
+    """The node that draws the scene; it reads and draws nothing without subscribers."""
 
     def __init__(self) -> None:
         super().__init__('marker_node')
@@ -43,7 +43,7 @@ class MarkerNode(Node):
         self._objects = self._endpoints.polled('/traffic/objects', depth=1)
         self._signals = self._endpoints.polled('/scenario/signals')
         self._orders = self._endpoints.polled('/timing/frame_skip')
-        # What comes often or is large is subscribed to while somebody looks.
+        # Frequent or large topics are subscribed to only while there are viewers.
         self._states: PolledSubscription | None = None
         self._paths: dict[str, tuple[PolledSubscription, PolledSubscription]] = {}
         self._set: ScenarioSet | None = None
@@ -91,14 +91,14 @@ class MarkerNode(Node):
             self._sent_s = now_s
 
     def _rest(self) -> None:
-        """Give up states, requests and plans: nobody looks."""
+        """Unsubscribe from states, requests and plans while there are no viewers."""
         if self._states is not None:
             self.destroy_subscription(self._states.subscription)
             self._states = None
         self._start_over()
 
     def _start_over(self) -> None:
-        """Forget who has looked, and the plans and requests of a game's AVs."""
+        """Discard the known viewers, and the plans and requests of a game's AVs."""
         for slots in self._paths.values():
             for slot in slots:
                 self.destroy_subscription(slot.subscription)
@@ -107,7 +107,7 @@ class MarkerNode(Node):
         self._looked_s = -np.inf
 
     def _update_scene(self) -> None:
-        """Build the scene anew when there is a new set of documents."""
+        """Rebuild the scene when there is a new set of documents."""
         try:
             documents = self._documents.poll()
             if documents is not None:
@@ -131,7 +131,7 @@ class MarkerNode(Node):
                                        documents.game.scheduler.clock_offset_ns)
 
     def _resend_to_newcomers(self, now_s: float) -> None:
-        """Have the map sent to whoever was not there before."""
+        """Schedule the map for new subscribers."""
         if now_s - self._looked_s < LOOK_S:
             return
         self._looked_s = now_s
@@ -142,21 +142,23 @@ class MarkerNode(Node):
         self._known = present
 
     def _receive_states(self, scene: SceneMarkers, documents: ScenarioSet) -> bool:
-        """Take the newest of everything that moves; tell whether there are new states."""
+        """
+        Read the newest messages of moving things; return whether there are new states.
+        """
         offset_ns = documents.game.scheduler.clock_offset_ns
         if (signals := self._signals.latest()) is not None:
             self._read_signals(signals.data)
             scene.set_signals(self._light_states)
         message = self._objects.latest()
         if message is not None and from_time(message.header.stamp) >= offset_ns:
-            # Those of the game before or after this one are passed over.
+            # States of the game before or after this one are skipped.
             with suppress(InputError):
                 scene.set_objects(self._reader.object_states(message),
                                   from_time(message.header.stamp))
         message = None if self._states is None else self._states.latest()
         if message is not None \
                 and self._time.follow(from_time(message.header.stamp)) is TimeCourse.BACK:
-            # A recording that is played once more: viewers forget what they were shown.
+            # A recording is played again: viewers discard what they were shown.
             self._begin(documents)
             return False
         if message is None or from_time(message.header.stamp) < offset_ns:
@@ -180,7 +182,7 @@ class MarkerNode(Node):
                     scene.set_prediction(
                         av_id, from_joint_trajectory(request, f'/{av_id}/plan_request'))
             except InputError as error:
-                # Whoever the plan is for refuses it and says so; here it is just not drawn.
+                # The plan's AV refuses it and reports that; here the plan is just not drawn.
                 self.get_logger().warning(str(error), throttle_duration_sec=5.0)
 
     def _read_signals(self, text: str) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""perception_node: what one AV perceives of the true world (FS II-B)."""
+"""perception_node: one AV's perception of the true world (FS II-B)."""
 
 import gc
 import math
@@ -30,7 +30,7 @@ COLLECT_EVERY = 100
 
 
 class PerceptionNode(Node):
-    """Turns the true requests of one AV into the perceived ones that its planner gets."""
+    """The node that turns the true requests of one AV into the perceived ones for its planner."""
 
     def __init__(self) -> None:
         super().__init__('perception_node')
@@ -75,12 +75,12 @@ class PerceptionNode(Node):
             self.get_logger().error(f'{self._vehicle_id}: {error}', throttle_duration_sec=1.0)
 
     def _forget(self) -> None:
-        """Begin a run, or the same one anew."""
+        """Discard the state for a new run, or for a restart of the same one."""
         self._perception, self._asked = None, None
         self._n = -1
 
     def _observe(self, step: WorldStep) -> None:
-        """Look at the true world at one step."""
+        """Observe the true world at one step."""
         scenario = self._scenario
         if scenario is None or step.n <= self._n:
             return
@@ -109,14 +109,14 @@ class PerceptionNode(Node):
         self._answer()
 
     def _publish_diagnostics(self, perception: Perception, stamp_ns: int) -> None:
-        """Report what the AV knows."""
+        """Publish what the AV knows."""
         seen = int(perception.seen.sum())
         sigma = math.sqrt(max(perception.covariance[0, 0] + perception.covariance[1, 1], 0.0))
         self._report.publish(f'{seen} known', {
             'known': seen, 'position_sigma': f'{sigma:.3f}', 'n': self._n}, stamp_ns)
 
     def _made(self, scenario: ScenarioSet, initial: VehicleState) -> Perception | None:
-        """Make the perception of a new run, from where the AV is now; None if it has none."""
+        """Build the perception of a new run from the AV's present pose; None if it has none."""
         game = scenario.game
         av = game.av(self._vehicle_id)
         if av is None or av.perception is None:
@@ -136,7 +136,7 @@ class PerceptionNode(Node):
         return perception
 
     def _answer(self) -> None:
-        """Answer the true request once its step has been observed."""
+        """Publish the perceived request once the step of the true one has been observed."""
         if self._asked is None or self._perception is None or self._scenario is None:
             return
         n = self._scenario.game.scheduler.tick_of_stamp(self._asked.stamp_ns)

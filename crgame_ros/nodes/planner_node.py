@@ -31,12 +31,14 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, String
 from trajectory_msgs.msg import JointTrajectory
 
-# Garbage is collected after an answer, never in the middle of planning one.
+# Garbage is collected after an answer, never during planning.
 COLLECT_EVERY = 10
 
 
 class PlannerNode(Node):
-    """Answers the plan requests of one AV; prepares anew when the scenario or game changes."""
+    """
+    The node that answers one AV's plan requests; a new scenario or game prepares it again.
+    """
 
     def __init__(self) -> None:
         super().__init__('planner_node')
@@ -68,7 +70,7 @@ class PlannerNode(Node):
             endpoints.subscription('/scenario/objects', self._on_objects),
             endpoints.subscription('/scenario/game', self._on_game),
             endpoints.subscription('/timing/frame_skip', self._on_frame_skip),
-            # Before the requests, for an event may change who answers them.
+            # Before the requests, because an event may change the planner that answers them.
             endpoints.subscription('/scenario/events', self._on_events),
             endpoints.subscription('/<av>/plan_request', self._on_request, self._vehicle_id)]
 
@@ -94,7 +96,7 @@ class PlannerNode(Node):
         self._apply_events()
 
     def _apply_events(self) -> None:
-        """Bring the planner up to what events have done in the present run."""
+        """Apply the events of the present run to the planner."""
         epoch, fired = self._events
         if self._manager is None or self._game is None or epoch != self._game.epoch:
             return
@@ -108,7 +110,7 @@ class PlannerNode(Node):
         try:
             self._documents.add(kind, text)
         except InputError as error:
-            # The game before goes on.
+            # The previous game goes on.
             self._refusals.note(f'/scenario/{kind}', str(error))
             return
         try:
@@ -124,7 +126,7 @@ class PlannerNode(Node):
             self._on_request(waiting)
 
     def _prepare(self, scenario: ScenarioSet) -> None:
-        """Set the planner up for documents that belong together."""
+        """Set up the planner for a matching set of documents."""
         game, loaded = scenario.game, scenario.loaded
         self._scenario = scenario
         self._time = RunTime(max(USUAL_NS, 3 * game.scheduler.time_step_ns))
@@ -167,7 +169,7 @@ class PlannerNode(Node):
             request = self._reader.read(
                 from_joint_trajectory(message, f'/{self._vehicle_id}/plan_request'))
         except InputError as error:
-            # A request of the game before or after this one: its documents are on their way.
+            # A request of the game before or after this one; its documents have not arrived yet.
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             self._waiting = message
             return
@@ -175,7 +177,7 @@ class PlannerNode(Node):
         if course is TimeCourse.BEHIND:
             return
         if course is TimeCourse.BACK and self._scenario is not None:
-            # A recording that is played once more: the planner knows nothing of it yet.
+            # A recording is played again: the planner starts afresh.
             self._prepare(self._scenario)
         self._diagnostics.now_ns = request.stamp_ns
         plan = self._manager.plan(request)
@@ -189,7 +191,7 @@ class PlannerNode(Node):
             gc.collect()
 
     def _report(self, k: int, plan: Plan) -> None:
-        """Tell of a fallback at once, and of the counts every ten requests."""
+        """Publish a fallback at once, and the counts every ten requests."""
         assert self._manager is not None
         statistics = self._manager.statistics
         if not plan.fallback and statistics.plans % 10:
@@ -204,7 +206,7 @@ class PlannerNode(Node):
 
 
 def _path(plan: Plan, transform: RigidTransform) -> Path:
-    """Return a plan for people: rear-axle poses in map, whatever frame its AV plans in."""
+    """Return a plan for viewers: rear-axle poses in map, whatever frame its AV plans in."""
     message = Path()
     message.header.frame_id = MAP
     message.header.stamp = to_time(plan.stamp_ns)

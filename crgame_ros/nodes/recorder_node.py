@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""recorder_node: every recorded topic of the contract, raw, into MCAP; one bag a run."""
+"""recorder_node: the recording of each run's topics into one MCAP bag, as raw messages."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -31,12 +31,12 @@ from std_msgs.msg import String
 
 PERIOD_S = 0.01
 REPORT_S = 1.0
-# Ten seconds of the busiest topic fit into the queue, should the disk stall.
+# Ten seconds of the busiest topic fit into the queue, in case the disk stalls.
 QUEUE_DEPTH = 2000
 DIAGNOSTICS_TOPIC = '/diagnostics'
-# After a run has ended, what the others said last is taken in [s].
+# After a run's end, the last messages of other nodes are recorded for this long [s].
 DRAIN_S = 0.3
-# A simulation that says nothing for so long has ended, or stands still [s].
+# A simulation that is silent for this long has ended or stands still [s].
 SILENCE_S = 2.0
 CLOCK_TOPIC = '/clock'
 
@@ -53,12 +53,12 @@ class RecordedTopic:
 
     @property
     def latched(self) -> bool:
-        """Whether late joiners get the latest message."""
+        """Return whether late joiners get the latest message."""
         return self.topic.qos.durability == 'transient_local'
 
 
 class RecorderNode(Node):
-    """Takes serialised messages as they come; opens a new bag with each new game."""
+    """The node that writes serialised messages as they come; it opens a bag for each new game."""
 
     def __init__(self) -> None:
         super().__init__('recorder_node')
@@ -74,13 +74,13 @@ class RecorderNode(Node):
         self._ended_s: float | None = None
         self._closed: dict[str, int] | None = None
         self._game_text = b''
-        # Topics of which there is a message in this bag, and whether all of them have been told.
+        # Topics with a message in this bag, and whether all of them have been reported.
         self._recorded: set[str] = set()
         self._recorded_told = True
         self._heard_s = -math.inf
         self._report_s = 0.0
         self._time = RunTime()
-        # Messages of which it is not certain yet to which run they belong, and of no run yet.
+        # Messages whose run is not certain yet, and messages that came before any run.
         self._held: list[tuple[RecordedTopic, bytes, int, int]] | None = None
         self._early: deque[tuple[RecordedTopic, bytes, int, int]] = deque(maxlen=QUEUE_DEPTH)
         self._awaited = GameAwaited(self, 'nothing is recorded')
@@ -106,15 +106,15 @@ class RecorderNode(Node):
             self._close()
 
     def _work(self) -> None:
-        # A new game comes after the last message of the run before it, and well before the first
-        # message of its own run: data first, then documents.
+        # A new game comes after the last message of the previous run, and well before the first
+        # message of its own run. So data are read first, then documents.
         if self._writer is not None:
             for recorded in list(self._topics.values()):
                 if not recorded.latched:
                     self._write_waiting(recorded)
         else:
             self._write_waiting(self._topics[CLOCK_TOPIC])
-        # The game comes last of them: a new bag then begins with the documents that belong to it.
+        # The game is read last, so that a new bag begins with the documents that belong to it.
         latched = [recorded for recorded in self._topics.values() if recorded.latched]
         for recorded in sorted(latched, key=lambda item: item.name == GAME_TOPIC):
             self._write_waiting(recorded)
@@ -132,13 +132,13 @@ class RecorderNode(Node):
             self._report(self._writer)
 
     def _publish_recorded(self) -> None:
-        """Tell whose messages arrive here: a run begins when everybody's do."""
+        """Publish the topics whose messages arrive: a run begins when those of all nodes do."""
         self._recorded_told = True
         self._publish_status(DiagnosticStatus.OK, RECORDED, {
             OFFSET: self._offset_ns, **dict.fromkeys(sorted(self._recorded), 1)}, RECORDED)
 
     def _report(self, writer: BagWriter | None) -> None:
-        """Tell how the recording is going, or that it is done."""
+        """Publish the progress of the recording, or that it is complete."""
         if writer is None:
             if self._closed is not None:
                 self._publish_status(DiagnosticStatus.OK, 'recorded', self._closed)
@@ -172,11 +172,11 @@ class RecorderNode(Node):
             self._write(recorded, data, published_ns, received_ns)
 
     def _follow(self, clock_ns: int) -> None:
-        """Open another bag where time has run back: a recording is played once more."""
+        """Open another bag where time has run back: a recording is played again."""
         self._awaited.check(bool(self._game_text), True)
         course = self._time.follow(clock_ns)
         if course is TimeCourse.BEHIND:
-            # Until it is certain to which run it belongs.
+            # Held until its run is certain.
             self._held = [] if self._held is None else self._held
             return
         held, self._held = self._held or [], None
@@ -188,7 +188,7 @@ class RecorderNode(Node):
             self._write(*item)
 
     def _note_end(self, data: bytes) -> None:
-        """Note that the run has ended; an end that is told late may be that of the run before."""
+        """Note the end of the run; a late message may report that of the previous run."""
         message: DiagnosticArray = deserialize_message(data, DiagnosticArray)
         if self._ended_s is None and from_time(message.header.stamp) >= self._offset_ns \
                 and any(item.name == 'sim_node: run' and item.message == 'ended'
@@ -196,10 +196,10 @@ class RecorderNode(Node):
             self._ended_s = time.monotonic()
 
     def _begin_bag(self, game_data: bytes) -> None:
-        """Open the bag of a new game, with every latched message that is already there."""
+        """Open the bag of a new game, and write every latched message received so far."""
         self._game_text = game_data
         try:
-            # Before the bag is closed: what is no game must not end its recording.
+            # Parsed before the bag is closed: an invalid game must not end the recording.
             game = parse_game_document(deserialize_message(game_data, String).data)
             offset_ns = game.scheduler.clock_offset_ns
             if offset_ns <= self._offset_ns and self._goes_on:
@@ -207,7 +207,8 @@ class RecorderNode(Node):
                     GAME_TOPIC, f'{GAME_TOPIC}: another game of a run that goes on')
                 return
             self._close()
-            # Before its first cycle: what is told of this recording is not of the run before.
+            # Set before the first cycle, so that reports on this recording do not count to the
+            # previous run.
             self._endpoints.diagnostics.now_ns = offset_ns
             self._subscribe(tuple(item.id for item in game.humans),
                             tuple(item.id for item in game.avs))
@@ -233,12 +234,12 @@ class RecorderNode(Node):
 
     @property
     def _goes_on(self) -> bool:
-        """Whether a run is being recorded, and its simulation has been heard just now."""
+        """Return whether a run is being recorded and its simulation is still publishing."""
         return self._writer is not None and self._ended_s is None \
             and time.monotonic() - self._heard_s < SILENCE_S
 
     def _folder_of(self, epoch: int) -> Path:
-        """Choose a folder; a simulation that was started again begins with the first run anew."""
+        """Return the bag's folder; a restarted simulation counts its runs from the first again."""
         wanted = run_folder(self._directory.parent, epoch) / self._directory.name
         return next(folder for folder in numbered(wanted) if not folder.exists())
 
@@ -248,7 +249,7 @@ class RecorderNode(Node):
             self._held.append((recorded, data, published_ns, received_ns))
             return
         if self._writer is None and recorded.name == CLOCK_TOPIC:
-            # Looked at early; it belongs to the bag that is opened next.
+            # Received early; it belongs to the next bag.
             self._early.append((recorded, data, published_ns, received_ns))
         if self._writer is None or self._writer.failed is not None:
             return
@@ -261,7 +262,7 @@ class RecorderNode(Node):
             self._report_failure(error)
 
     def _report_failure(self, error: CrgameError) -> None:
-        """Say that recording has failed; driving goes on."""
+        """Report that recording has failed; the run goes on."""
         self.get_logger().error(str(error))
         self._publish_status(DiagnosticStatus.ERROR, str(error), {})
 

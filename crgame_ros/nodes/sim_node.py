@@ -33,12 +33,12 @@ NS_PER_S = 1_000_000_000
 # /clock starts here: ROS takes a time of zero for "no clock yet".
 FIRST_OFFSET_NS = NS_PER_S
 REALTIME_PRIORITY = 50
-# Within such a time nodes know of each other [s].
+# Nodes discover each other within this time [s].
 DISCOVERY_S = 2.0
 
 
 class SimNode(Node):
-    """The live runner: one epoch after the other, each with its own stretch of /clock."""
+    """The live runner: one epoch after another, each with its own interval of /clock."""
 
     def __init__(self) -> None:
         super().__init__('sim_node')
@@ -50,7 +50,7 @@ class SimNode(Node):
 
     def run(self, stop: StopFlag) -> None:
         """Run until the game ends or a stop is asked for."""
-        # A launcher holds the place of those that it started.
+        # A launcher holds the namespace for the nodes that it started.
         place = hold_namespace(str(self.context.get_domain_id()), self.get_namespace()) \
             if self._control.roster is None else nullcontext()
         with place:
@@ -58,20 +58,20 @@ class SimNode(Node):
 
     def _run(self, stop: StopFlag) -> None:
         setup = self._announce(build_setup(self._control.first_game()))
-        # Of others that it started a launcher knows.
+        # A launcher knows of the other simulations that it started.
         refuse_another(self, self._created_s + (DISCOVERY_S if self._control.roster is None
                                                 else 0.0))
         if self._control.wants_realtime_priority:
             self._raise_priority()
         else:
             shorten_time_slice()
-        # Where it is refused, pages that the system takes back are seen among the causes.
+        # Where it is refused, the causes of late steps show pages that the system has reclaimed.
         lock_memory()
         self._control.paused = self._control.starts_paused
         epoch, offset_ns, again = 0, FIRST_OFFSET_NS, False
         while True:
-            # With a driver in the browser a run begins when somebody says so, but once more the
-            # same for the same people goes on.
+            # With a driver in the browser a run waits for a start. A repetition with the same
+            # people begins by itself.
             if not (self._control.started or again):
                 self._control.paused |= self._control.starts_paused or any(
                     item.driver == COCKPIT for item in setup.humans)
@@ -100,13 +100,15 @@ class SimNode(Node):
             offset_ns = (now_ns // NS_PER_S + 2) * NS_PER_S
 
     def _all_sit(self, setup: Setup) -> bool:
-        """Return whether somebody is in each seat that the game leaves to people at pages."""
+        """Return whether each seat that the game leaves to people at pages is occupied."""
         tenants = self._control.seat_tenants
         return all(human.id in tenants and tenants[human.id].here
                    for human in setup.humans if human.driver == COCKPIT)
 
     def _next_setup(self, present: Setup) -> Setup:
-        """Load what the parameters name now; keep the present game if that is unusable."""
+        """
+        Load the game that the parameters name; keep the present one if it is unusable.
+        """
         try:
             return self._announce(build_setup(self._control.next_game(present.game)))
         except CrgameError as error:
@@ -125,14 +127,16 @@ class SimNode(Node):
         return setup
 
     def _read_recordings(self, setup: Setup) -> 'RecordedInputs | None':
-        """Read whole what repeats a recording, before the run: its loop opens no file."""
+        """Read the recordings to be repeated before the run, because its loop opens no file."""
         if not any(is_replay(human.driver) for human in setup.humans):
             return None
         from crgame_ros.recording.recorded_inputs import recorded_inputs
         return recorded_inputs(setup)
 
     def _write_roster(self, setup: Setup) -> None:
-        """Tell the launcher who takes part, for a chosen game may have other vehicles."""
+        """
+        Write the participants for the launcher: a chosen game may have other vehicles.
+        """
         path = self._control.roster
         if path is None:
             return
@@ -145,7 +149,7 @@ class SimNode(Node):
             self.get_logger().error(f'{path}: cannot be written ({error.strerror})')
 
     def _write_game(self, game: Game, epoch: int) -> None:
-        """Write the game as it is run beside its recording."""
+        """Write the resolved game beside its recording."""
         if self._control.folder is None:
             return
         path = run_folder(self._control.folder, epoch) / 'game.yaml'

@@ -24,7 +24,7 @@ REPORT_S = 1.0
 
 
 class TimesyncNode(Node):
-    """Reads every cycle that sim_node measured."""
+    """The supervisor of the cycles that sim_node has measured."""
 
     def __init__(self) -> None:
         super().__init__('timesync_node')
@@ -68,7 +68,7 @@ class TimesyncNode(Node):
         stamp_ns = self._game.scheduler.stamp_ns(int(table.column('n')[-1]))
         course = self._time.follow(stamp_ns)
         if course is TimeCourse.BACK:
-            # A recording that is played once more.
+            # A recording is played again.
             self._begin_anew(self._game)
         if course in (TimeCourse.ON, TimeCourse.BACK):
             self._metrics.add_rows(table.timing_rows())
@@ -89,7 +89,7 @@ class TimesyncNode(Node):
         self._metrics = TimingMetrics(game.scheduler.dt_s)
         self._late = LateSteps()
         self._skipping = FrameSkipping(game.timing)
-        # An order of the run before, or of a supervisor that was killed, ends with it.
+        # Cancel an order of the previous run or of a supervisor that was killed.
         self._orders.publish(Bool(data=False))
 
     def _order(self, lag_s: float) -> None:

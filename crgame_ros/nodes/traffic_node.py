@@ -33,14 +33,14 @@ import numpy as np
 from rclpy.node import Node
 
 PERIOD_S = 0.005
-# Garbage is collected after an answer, never in the middle of one.
+# Garbage is collected after an answer, never during one.
 COLLECT_EVERY = 10
 # Ticks.
 MAX_BEHIND = 5
 
 
 class TrafficNode(Node):
-    """Moves the agents of a run one tick ahead of the world that it hears of."""
+    """The node that moves a run's agents one tick ahead of the published world."""
 
     def __init__(self) -> None:
         super().__init__('traffic_node')
@@ -73,8 +73,8 @@ class TrafficNode(Node):
             if message is not None:
                 self._receive_events(message.data)
             ticks = list(self._world.steps()) if self._knows_the_events else []
-            # A little late, the agents catch up; after a standstill they go on from where they
-            # are by now.
+            # After a short delay the agents catch up; after a long one they continue from the
+            # newest tick.
             for step in ticks if len(ticks) <= MAX_BEHIND else ticks[-1:]:
                 if self._spec is not None:
                     self._advance(step)
@@ -84,12 +84,12 @@ class TrafficNode(Node):
 
     @property
     def _knows_the_events(self) -> bool:
-        """Whether what events have done in this run has been heard: agents go on by it."""
+        """Return whether this run's events have been received, which agents need to continue."""
         game = self._scenario.game if self._scenario is not None else None
         return game is None or not game.events or self._fired[0] == game.epoch
 
     def _begin_anew(self) -> None:
-        """Follow the same run from its start."""
+        """Restart the same run."""
         if self._scenario is not None:
             self._begin(self._scenario)
 
@@ -100,7 +100,7 @@ class TrafficNode(Node):
             self._refusals.note('/scenario/events', str(error))
 
     def _begin(self, scenario: ScenarioSet) -> None:
-        """Get ready for a run; its agents are made when its world is heard of."""
+        """Prepare for a run; its agents are built when its world arrives."""
         self._world.begin(scenario)
         self._scenario, self._traffic, self._spec = scenario, None, None
         self._spec = scenario.game.traffic
@@ -130,7 +130,7 @@ class TrafficNode(Node):
         scheduler = self._scenario.game.scheduler
         k = scheduler.k(step.n)
         if self._traffic is not None and k == self._k - 1:
-            # Told again because the answer may have been lost.
+            # Published again because the answer may have been lost.
             self._agents.publish(self._message.message)
             return
         begin_s = time.perf_counter()
@@ -159,7 +159,7 @@ class TrafficNode(Node):
             gc.collect()
 
     def _obey(self, traffic: Traffic, k: int) -> None:
-        """Let agents do as events have told them by a tick."""
+        """Apply the events up to a tick to the agents."""
         assert self._scenario is not None
         epoch, fired = self._fired
         game = self._scenario.game
@@ -172,7 +172,7 @@ class TrafficNode(Node):
                 self._orders.obey(action, traffic)
 
     def _made(self, view: WorldView, k: int, step: WorldStep) -> Traffic:
-        """Make the agents of a new run, or go on with those that others have seen."""
+        """Build the agents of a new run, or continue with those published before."""
         assert self._scenario is not None and self._spec is not None
         game, traffic = self._scenario.game, self._traffic
         if traffic is None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How long the inputs of a device at this machine take, told on /diagnostics and so recorded."""
+"""The delay of inputs from a device of this machine, published on /diagnostics and so recorded."""
 
 from collections import deque
 import statistics
@@ -10,16 +10,16 @@ from crgame_ros.ros.diagnostics import Diagnostics
 from diagnostic_msgs.msg import DiagnosticStatus
 
 _TELL_PERIOD_S = 1.0
-# Enough to tell how it is now; a median does not mind a single late one.
+# Enough for the present delay; a single late input does not affect the median.
 _KEPT = 21
 
 
 class DeviceDelay:
     """
-    Measures from an input's time stamp, on the steady clock of this machine.
+    The delay since an input's time stamp, on the steady clock of this machine.
 
     :param diagnostics: of the node.
-    :param vehicle_id: whose seat.
+    :param vehicle_id: of the seat.
     """
 
     def __init__(self, diagnostics: Diagnostics, vehicle_id: str) -> None:
@@ -31,7 +31,7 @@ class DeviceDelay:
 
     def published(self, input_s: float, now_s: float, n: int) -> None:
         """
-        Take note of a command that obeys an input.
+        Note a command that results from an input.
 
         :param input_s: when the input came, steady clock [s]
         :param now_s: now, after the command was published [s]
@@ -42,11 +42,11 @@ class DeviceDelay:
 
     def stepped(self, now_s: float, n: int, device: str) -> None:
         """
-        Take note of a new cycle, and tell once a second.
+        Note a new cycle, and publish the delays once a second.
 
         :param now_s: steady clock [s]
-        :param n: the cycle; its state is known.
-        :param device: which drives.
+        :param n: the cycle, whose state is known.
+        :param device: that drives.
         """
         self._states.stepped(now_s, n)
         if not self._commands_ms or now_s - self._told_s < _TELL_PERIOD_S:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a node tells of itself and others: every status in one form and one time base."""
+"""The statuses that nodes publish, all in one form and one time base."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from rclpy.publisher import Publisher
 
 
 def printable(text: str) -> str:
-    """Return a text as it may go out in a message: halves of characters cannot be encoded."""
+    """Return a text fit for a message, without lone surrogates, which cannot be encoded."""
     return text.encode('utf-8', 'replace').decode('utf-8')
 
 
@@ -20,27 +20,27 @@ class Diagnostics:
     """
     The statuses of one node, stamped with simulation time.
 
-    `hardware_id` is the full name of the node that speaks, with its namespace.
+    `hardware_id` is the full name of the publishing node, with its namespace.
 
-    :param node: that speaks.
+    :param node: that publishes.
     :param publisher: of `/diagnostics`.
     """
 
     def __init__(self, node: Node, publisher: Publisher) -> None:
         self.publisher = publisher
         self._hardware_id = node.get_fully_qualified_name()
-        # Simulation time that the node has last heard of [ns]; 0, as for ROS: none so far.
+        # Latest simulation time that the node has received [ns]; 0 means none, as in ROS.
         self.now_ns = 0
 
     def array(self, name: str, level: bytes, text: str, values: Mapping[str, object],
               stamp_ns: int | None = None) -> DiagnosticArray:
         """
-        Make a message of one status.
+        Build a message of one status.
 
         :param name: node and subject, `<node>: <subject>`.
         :param level: OK, WARN or ERROR.
-        :param stamp_ns: simulation time that it is about; the latest that the node has heard of
-            where None [ns]
+        :param stamp_ns: simulation time of the status; the latest that the node has received where
+            None [ns]
         """
         if stamp_ns is not None:
             self.now_ns = stamp_ns

@@ -28,27 +28,29 @@ def qos_profile(qos: Qos) -> QoSProfile:
         durability=DurabilityPolicy[qos.durability.upper()])
 
 
-# Messages that cannot be used, or are of others, are passed over: so many at one look.
+# Unusable messages, and those for other nodes, are skipped: at most this many per read.
 MAX_PASSED_OVER = 100
-# Of a slot for one message others would take the place; so many wait where we choose.
+# Others' messages would fill a slot for one message; so with a filter, this many wait.
 SHARED_DEPTH = 200
-# Of each node of this process.
+# One entry for each node of this process.
 _TOLD: WeakKeyDictionary[Node, tuple[Diagnostics, Refusals]] = WeakKeyDictionary()
 
 
 class PolledGroup(CallbackGroup):
-    """Keeps its subscriptions out of every executor: their owner takes messages itself."""
+    """
+    A callback group outside every executor: the owner of its subscriptions reads them itself.
+    """
 
     def can_execute(self, entity: Any) -> bool:
-        """Never let an executor wait for or run the entity."""
+        """Return False, so that no executor waits for or runs the entity."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Refuse execution."""
+        """Return False, which refuses execution."""
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        """Have nothing to release."""
+        """Do nothing, as there is nothing to release."""
 
 
 class PolledSubscription:
@@ -60,11 +62,10 @@ class PolledSubscription:
 
     :param subscription: to serialised messages.
     :param name: of the topic.
-    :param read: makes of a serialised message what the owner wants, or raises InputError.
-    :param refuse: is told of messages that cannot be used, which are passed over; without it they
-        raise InputError.
-    :ivar wanted: decides by stamp [ns] and frame whether a message is one for the owner; others
-        are passed over before anything else is made of them. Every message, if None.
+    :param read: converts a serialised message for the owner, or raises InputError.
+    :param refuse: called with each unusable message, which is then skipped; without it such a
+        message raises InputError. :ivar wanted: decides by stamp [ns] and frame whether a message
+        is for the owner; others are skipped before they are converted. None accepts every message.
     """
 
     def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], Any],
@@ -76,14 +77,16 @@ class PolledSubscription:
         self._refuse = refuse
 
     def pop(self) -> Any | None:
-        """Take the oldest waiting message (or its bytes, if raw); None if there is none."""
+        """
+        Remove and return the oldest waiting message (its bytes if raw), None if there is none.
+        """
         taken = self.pop_timed()
         return None if taken is None else taken[0]
 
     def pop_timed(self) -> tuple[Any, int, int] | None:
         """Return what `pop` does, with the times of publication and reception [ns since 1970]."""
         subscription = self.subscription
-        # A flood of what cannot be used waits its turn.
+        # The rest of a flood of unusable messages waits.
         for _ in range(MAX_PASSED_OVER):
             with subscription.handle:
                 taken = subscription.handle.take_message(subscription.msg_type, True)
@@ -102,7 +105,7 @@ class PolledSubscription:
         return None
 
     def latest(self) -> Any | None:
-        """Take all waiting messages and give the newest; None if there is none."""
+        """Remove all waiting messages and return the newest, None if there is none."""
         newest = None
         while (message := self.pop()) is not None:
             newest = message
@@ -110,7 +113,7 @@ class PolledSubscription:
 
 
 class Endpoints:
-    """Creates a node's endpoints by their contract names."""
+    """The endpoints of a node, created by their contract names."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -154,10 +157,10 @@ class Endpoints:
         """
         Create a subscription that the node reads itself.
 
-        :param raw: give serialised messages.
-        :param verify: give serialised messages of the topic's type, whatever is in them.
-        :param strict: raise InputError for a message that cannot be used, instead of passing it
-            over and counting it.
+        :param raw: return serialised messages.
+        :param verify: return serialised messages of the topic's type, with unchecked contents.
+        :param strict: raise InputError for an unusable message, instead of skipping and counting
+            it.
         """
         topic = self._contract.topic(name)
         profile = qos_profile(topic.qos)
@@ -172,7 +175,7 @@ class Endpoints:
                                   None if strict else self.refusals.note)
 
     def release(self, slot: PolledSubscription) -> None:
-        """Give a subscription up."""
+        """Destroy a subscription."""
         self._node.destroy_subscription(slot.subscription)
 
     def service(self, name: str, callback: Callable[[Any, Any], Any],

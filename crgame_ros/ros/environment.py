@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The environment a ROS process needs: loopback only, and where the ROS wheels are."""
+"""The environment that a ROS process needs: loopback only, and the path of the ROS wheels."""
 
 from collections.abc import Iterator
 from importlib.machinery import EXTENSION_SUFFIXES
@@ -22,7 +22,7 @@ DOMAIN_IDS = range(1, 102)
 # DDSI-RTPS 9.6.1.1: the ports of a domain start at PB + DG * domain and fill DG ports.
 PORT_BASE = 7400
 PORTS_PER_DOMAIN = 250
-# DDS listens below the ports that Linux hands out by default; what it only sends from is above.
+# DDS listens below Linux's ephemeral ports; the ports that it only sends from are above.
 EPHEMERAL_PORT = 32768
 
 
@@ -54,7 +54,7 @@ def require_ros() -> None:
     """
     Check that there is an rclpy for this Python; call it before the first ``import rclpy``.
 
-    :raises CrgameError: if there is none, saying what to do.
+    :raises CrgameError: if there is none; the message says what to do.
     """
     python = f'Python {sys.version_info.major}.{sys.version_info.minor} ({sys.executable})'
     spec = find_spec('rclpy')
@@ -93,11 +93,11 @@ def prepare_environment() -> None:
 
 def free_domain_id() -> int:
     """
-    Choose a ``ROS_DOMAIN_ID`` of which no process on this machine uses a port now.
+    Choose a ``ROS_DOMAIN_ID`` whose ports no process on this machine uses now.
 
-    The choice is random, so that processes that ask at the same time get different ones.
+    The choice is random, so that simultaneous callers get different ids.
 
-    :return: a domain id from 1 to 101, the range whose ports Linux does not hand out by default.
+    :return: a domain id from 1 to 101, the range whose ports Linux does not assign by default.
     :raises CrgameError: if every domain is in use.
     """
     used = {(port - PORT_BASE) // PORTS_PER_DOMAIN
@@ -121,7 +121,7 @@ def listening_beyond_loopback() -> list[str]:
     for entry in os.listdir('/proc/self/fd'):
         try:
             inodes.add(os.readlink(f'/proc/self/fd/{entry}').removeprefix('socket:').strip('[]'))
-        except FileNotFoundError:  # the descriptor of this very listing
+        except FileNotFoundError:  # the descriptor of this listing itself
             continue
     found = []
     for table in ('udp', 'udp6', 'tcp', 'tcp6'):
@@ -133,7 +133,7 @@ def listening_beyond_loopback() -> list[str]:
 
 
 def _prepend(variable: str, entry: str) -> None:
-    """Put an entry at the front of a path variable unless it is in it."""
+    """Prepend an entry to a path variable unless it is already there."""
     entries = [part for part in os.environ.get(variable, '').split(os.pathsep) if part]
     if entry not in entries:
         os.environ[variable] = os.pathsep.join([entry, *entries])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the recorder has heard of a run so far, as it says itself."""
+"""The topics of a run that the recorder reports as received."""
 
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.ros.endpoints import Endpoints
@@ -12,10 +12,10 @@ OFFSET = 'clock_offset_ns'
 
 class HeardTopics:
     """
-    Listens to the recorder while a run waits for its start.
+    The recorder's reports while a run waits for its start.
 
-    Two companions may not know of each other yet, though the simulation knows both: what one says
-    would be missing in the recording.
+    Two companions may not have discovered each other yet, though the simulation has discovered
+    both. The recording would then lack the messages of one.
 
     :param endpoints: of sim_node.
     :param clock_offset_ns: of the run [ns]
@@ -28,7 +28,7 @@ class HeardTopics:
         self._names: set[str] = set()
 
     def missing(self, wanted: set[str]) -> set[str]:
-        """Return the topics of which the recorder has no message yet."""
+        """Return the topics from which the recorder has no message yet."""
         while (message := self._slot.pop()) is not None:
             for status in message.status:
                 values = read_status(status).values
@@ -38,5 +38,5 @@ class HeardTopics:
         return wanted - self._names
 
     def close(self) -> None:
-        """Listen no more."""
+        """Release the subscription."""
         self._endpoints.release(self._slot)

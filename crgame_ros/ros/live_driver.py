@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
                 say: Callable[[str], object], world: 'Callable[[], PolicyWorld]') -> DriverSource:
     """
-    Make a driver.
+    Build a driver source.
 
     :param text: source as the game or the parameter names it.
     :param timeline: text of the timeline, if the game carries it.
     :param vehicle_id: for messages.
     :param joy_map: device map for an external joy node.
-    :param say: tells the user something in one line.
-    :param world: gives what a policy looks at.
-    :raises InputError: if the source names nothing that can be used, or is a recording: what comes
-        as messages arrives when it can, while recorded commands belong to their cycles.
+    :param say: logs a line for the user.
+    :param world: returns the world of a policy.
+    :raises InputError: if the source is unusable, or is a recording: recorded commands belong to
+        fixed cycles, while messages arrive at any time.
     """
     source = parse_source(text)
     if source.has_timeline:
@@ -47,7 +47,7 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
         raise InputError('a recording is repeated by the simulation itself', vehicle_id,
                          f'name it as the driver in the game: {text}')
     if source.kind == 'policy':
-        # Others should not wait for what it needs.
+        # Imported here, so that other drivers do not wait for its imports.
         from crgame_ros.ros.live_policy import LivePolicyDriver
         return LivePolicyDriver(source.argument, vehicle_id, world())
     if source.kind == 'joy':
@@ -59,5 +59,5 @@ def live_driver(text: str, timeline: str, vehicle_id: str, joy_map: str,
         say(f'{vehicle_id}: not driven: {device.problem}')
         device.close()
         return IdleDriver()
-    # A device that is named may be plugged in later: until then the seat's watchdog stops the car.
+    # A named device may be plugged in later; until then the seat's watchdog stops the car.
     return EvdevDriver(device)

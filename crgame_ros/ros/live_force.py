@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Force feedback of a live seat: a thread of its own, so that no command waits for a motor."""
+"""Force feedback of a live seat, in a separate thread, so that no command waits for a motor."""
 
 from collections.abc import Callable
 import threading
@@ -14,18 +14,18 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from sensor_msgs.msg import JointState
 
 REFRESH_S = 0.008
-# How often a motor is looked for.
+# Period of the search for a motor [s].
 LOOK_S = 0.1
 
 
 class LiveForce:
     """
-    Refreshes the force of a seat's wheel from what sim_node and drivability_node publish.
+    The force of a seat's wheel, updated from the messages of sim_node and drivability_node.
 
     :param endpoints: of the node.
     :param vehicle_id: of the seat.
-    :param driving: tells whether the seat obeys the wheel now.
-    :param say: tells the user something in one line.
+    :param driving: returns whether the wheel drives the seat now.
+    :param say: logs a line for the user.
     """
 
     def __init__(self, endpoints: Endpoints, vehicle_id: str, driving: Callable[[], bool],
@@ -41,7 +41,7 @@ class LiveForce:
 
     def begin(self, device: EvdevDevice, vehicle: VehicleParameters) -> None:
         """
-        Push the wheel of a device, unless what is plugged in has no motor.
+        Start the force on a device's wheel, unless the device has no motor.
 
         :param vehicle: that it steers.
         """
@@ -57,7 +57,7 @@ class LiveForce:
         self._thread.start()
 
     def end(self) -> None:
-        """Let go of the wheel; the device must still be open."""
+        """Stop the force on the wheel; the device must still be open."""
         if self._thread is not None:
             self._ended.set()
             self._thread.join()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A human's seat that a policy drives in a live run."""
+"""A driver source that lets a policy drive a human's seat in a live run."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
 class PolicyWorld:
     """
-    The run that a policy looks at; a node has one, whoever drives.
+    The run that a policy observes; a node has one, whatever drives.
 
     :param endpoints: of the node.
     """
@@ -29,12 +29,12 @@ class PolicyWorld:
         self._begin: Callable[[], object] = lambda: None
 
     def follow(self, begin: Callable[[], object]) -> None:
-        """Call somebody where a run begins, from now on."""
+        """Call a function at the beginning of each run from now on."""
         self._begin = begin
 
     def steps(self) -> list[WorldStep]:
         """
-        Take what has come.
+        Return the steps that have come.
 
         :raises CrgameError: if a document cannot be used.
         """
@@ -48,7 +48,7 @@ class PolicyWorld:
         return list(self._world.steps())
 
     def _again(self) -> None:
-        """Begin the same run anew: a recording is played once more."""
+        """Restart the same run, because a recording is played again."""
         if self.scenario is not None:
             self._world.begin(self.scenario)
             self._begin()
@@ -56,9 +56,10 @@ class PolicyWorld:
 
 class LivePolicyDriver(DriverSource):
     """
-    Drives as the policy of `policy:FILE.py:load` says, on the states that sim_node publishes.
+    The driver of `policy:FILE.py:load`, whose policy acts on the states that sim_node publishes.
 
-    A policy that fails is told as a problem of the seat, which then brakes as for a lost device.
+    A policy that fails is reported as a problem of the seat, which then brakes as for a lost
+    device.
 
     :param name: `FILE.py:load`.
     :param vehicle_id: of the seat.
@@ -79,11 +80,11 @@ class LivePolicyDriver(DriverSource):
 
     @property
     def connected(self) -> bool:
-        """Whether the policy has seen the run and can drive."""
+        """Return whether the policy has received the run and can drive."""
         return self._driver is not None and self._latest_n >= 0 and self.problem is None
 
     def poll(self, now_s: float) -> bool:
-        """Look at what has happened since, and decide at scenario steps."""
+        """Observe the new steps, and choose an action at scenario steps."""
         decided = False
         try:
             for step in self._world.steps():
@@ -91,7 +92,7 @@ class LivePolicyDriver(DriverSource):
                     self._driver.see(step.n, step.states, step.objects if step.tick else None)
                     self._latest_n, decided = step.n, decided or step.tick
         except Exception as error:
-            # A user's code may raise anything; its seat must not stay in its hands.
+            # A user's code may raise anything; it must not keep the seat then.
             text = str(error) if isinstance(error, CrgameError) else f'{type(error).__name__}: ' \
                 f'{error}'
             self.problem = InputError(f'the policy has failed ({text})', self._vehicle_id,
@@ -103,7 +104,7 @@ class LivePolicyDriver(DriverSource):
         return RELEASED if self._driver is None else self._driver.command(n, dt_s)
 
     def _begin(self) -> None:
-        """Take the seat in a run."""
+        """Begin to drive the seat in a run."""
         scenario = self._world.scenario
         assert scenario is not None
         self._driver, self._latest_n, self.problem = None, -1, None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What comes in on a topic, from whomever: bounded, decoded and checked by the contract."""
+"""Incoming messages from any peer: bounded, decoded and checked by the contract."""
 
 from collections.abc import Callable, Mapping
 import importlib
@@ -16,9 +16,9 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
-# No place, speed or acceleration is beyond this [m], [m/s], [m/s^2], no stamp or time below 0.
+# Largest position, speed and acceleration [m], [m/s], [m/s^2]; no stamp or time is below 0.
 LARGEST = 1e9
-# Reports of refusals are so far apart [s], their reasons no longer than this.
+# Time between reports of refusals [s], and the greatest length of their reasons.
 REPORT_S = 1.0
 LONGEST_REASON = 300
 
@@ -31,7 +31,7 @@ def message_type(type_name: str) -> Any:
 
 class MessageValidator:
     """
-    Reads the messages of one topic.
+    The validator of one topic's messages.
 
     :param topic: its row in the contract.
     :param name: of the topic in this run.
@@ -45,7 +45,7 @@ class MessageValidator:
 
     def bound(self, data: bytes) -> bytes:
         """
-        Check the length of a serialised message, before anything is made of it.
+        Check the length of a serialised message before it is decoded.
 
         :raises InputError: if it is longer than the contract allows.
         """
@@ -68,7 +68,7 @@ class MessageValidator:
         try:
             return deserialize_message(data, self._type)
         except Exception as error:
-            # Whatever the middleware makes of bytes that are no such message.
+            # The middleware may raise anything for bytes that are no such message.
             raise InputError(f'is no {self._topic.type_name} ({type(error).__name__})',
                              self.name) from error
 
@@ -76,7 +76,7 @@ class MessageValidator:
         """
         Decode a serialised message.
 
-        :raises InputError: if it is none of the topic's type, or is not what the contract says.
+        :raises InputError: if it is not of the topic's type, or violates the contract.
         """
         message = self._decode(data)
         if self._check is not None:
@@ -101,7 +101,7 @@ def _check_trajectory(message: Any, topic: Topic) -> None:
             raise ValueError(f'point {index} has {len(values)} numbers for {joints} joints')
         if point.time_from_start.sec < 0:
             raise ValueError(f'point {index} is before the stamp')
-    # All at once: a look at each row costs more than at their numbers.
+    # All rows at once: a check of each row costs more than that of its numbers.
     _check_numbers(np.frombuffer(b''.join(
         values for point in points for values in (point.positions, point.velocities))),
         topic.finite)
@@ -109,11 +109,11 @@ def _check_trajectory(message: Any, topic: Topic) -> None:
 
 
 def _check_numbers(values: Any, finite: bool) -> None:
-    """Refuse what is no magnitude of this world; NaN stands for absence where that may be."""
+    """Check that numbers have plausible magnitudes; NaN means absent where it is allowed."""
     if not len(values):
         return
     size = np.abs(values)
-    # Written so that NaN fails the first of them.
+    # Written so that NaN fails the first comparison.
     good = (size <= LARGEST).all() if finite else not (size > LARGEST).any()
     if not good:
         worst = values[int(np.argmax(~(size <= LARGEST)))]
@@ -173,10 +173,10 @@ CHECKS: Mapping[str, Callable[[Any, Topic], None]] = {
 
 class Refusals:
     """
-    Counts what a node refuses, by topic, and tells of it on /diagnostics.
+    The counts of a node's refusals by topic, published on /diagnostics.
 
     :param node: whose.
-    :param diagnostics: of the node; told once a second at most.
+    :param diagnostics: of the node; used once a second at most.
     """
 
     def __init__(self, node: Node, diagnostics: Diagnostics) -> None:
@@ -186,7 +186,7 @@ class Refusals:
         self._told_s = -math.inf
 
     def note(self, where: str, reason: str) -> None:
-        """Count a refusal; tell of it unless another was told of just now."""
+        """Count a refusal; publish it unless another one was published just before."""
         self.counts[where] = self.counts.get(where, 0) + 1
         now_s = time.monotonic()
         if now_s - self._told_s < REPORT_S:

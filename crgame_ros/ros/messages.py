@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import Joy
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-# Of what the simulation itself publishes of its state, in covariances: far below what it resolves,
-# and not 0, which filters cannot invert and some take for "unknown" [m^2], [rad^2], …
+# Variance of exact states in covariances: far below the simulation's resolution, but not 0, which
+# filters cannot invert and some read as "unknown" [m^2], [rad^2], …
 EXACT_VARIANCE = 1e-9
 NS_PER_S = 1_000_000_000
 
@@ -73,7 +73,7 @@ class StateMessage:
         self.accelerations = np.frombuffer(point.accelerations)
 
     def stamp(self, stamp_ns: int) -> JointTrajectory:
-        """Set the stamp and give the message."""
+        """Set the stamp and return the message."""
         set_time(self.message.header.stamp, stamp_ns)
         return self.message
 
@@ -82,7 +82,7 @@ class SeriesMessage:
     """
     A JointTrajectory of many points, built once and refilled in place.
 
-    Building one anew costs 10 µs a point, refilling 1 µs.
+    Building a new one costs 10 µs per point, refilling 1 µs.
 
     :param names: joint names.
     :param times_ns: (P) time from the stamp of each point [ns]
@@ -100,14 +100,14 @@ class SeriesMessage:
 
     @classmethod
     def for_series(cls, series: JointSeries, before: 'SeriesMessage | None') -> 'SeriesMessage':
-        """Return the message from before, unless the series has other joints or points."""
+        """Return the previous message, or a new one if the series has other joints or points."""
         if before is not None and before._names == series.names \
                 and len(before._views) == len(series.times_ns):
             return before
         return cls(series.names, series.times_ns)
 
     def fill(self, series: JointSeries) -> JointTrajectory:
-        """Take a series of the same joints and times over, and give the message."""
+        """Refill the message from a series of the same joints and times, and return it."""
         set_time(self.message.header.stamp, series.stamp_ns)
         for index, (positions, velocities, accelerations) in enumerate(self._views):
             positions[:] = series.positions[index]
@@ -120,7 +120,7 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
     """
     Return a driver's command as a message (contract: /<v>/driver_command).
 
-    :param source: who speaks, as /seats names it.
+    :param source: of the command, as /seats names it.
     """
     message = Joy(axes=array('f', (command.throttle, command.brake, command.steering)),
                   buttons=array('i', (
@@ -133,7 +133,7 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
 
 def from_joy(message: Joy, where: str) -> DriverCommand:
     """
-    Read a driver's command; what its buttons do not tell is off.
+    Read a driver's command; functions without a button are off.
 
     :raises InputError: if axes or buttons are missing.
     """

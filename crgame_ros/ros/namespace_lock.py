@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A namespace of a ROS domain, held by one simulation."""
+"""A lock on a namespace of a ROS domain, held by one simulation."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +15,7 @@ from crgame_ros.errors import InputError
 @contextmanager
 def hold_namespace(domain: str, namespace: str) -> Iterator[None]:
     """
-    Hold a place while a graph runs there; the kernel lets go of it with the process.
+    Hold a namespace while a graph runs in it; the kernel releases it with the process.
 
     :param domain: ROS_DOMAIN_ID.
     :raises InputError: if another graph of this user holds it.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The frame around every node: environment, start, clean end, one-line errors."""
+"""The main function of every node: environment, start, clean end, one-line errors."""
 
 from collections.abc import Callable
 import ctypes
@@ -19,22 +19,22 @@ PARENT_VARIABLE = 'CRGAME_PARENT_PID'
 NICE_VARIABLE = 'CRGAME_NICE'
 PR_SET_PDEATHSIG = 1
 PR_SET_NAME = 15
-# At this signal a node prints what its threads are at.
+# At this signal a node prints the stacks of its threads.
 TELL_WHERE = signal.SIGUSR1
 
 
-# Who has lost its parent has so long to end in good order; it is looked for so often [s].
+# A node that has lost its parent has this long to end in good order; period of that check [s].
 _ALONE, _GRACE_S, _LOOK_S = 'alone', 40.0, 2.0
 
 
 class StopFlag:
-    """Raised by SIGINT and SIGTERM; a node's loop looks at it and ends in good order."""
+    """A flag that SIGINT and SIGTERM set; a node's loop polls it and ends in good order."""
 
     def __init__(self) -> None:
         self.requested = False
 
     def listen(self) -> None:
-        """Take SIGINT and SIGTERM over from Python."""
+        """Replace Python's handlers of SIGINT and SIGTERM."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
 
@@ -56,10 +56,11 @@ def die_with_parent() -> None:
     """
     Ask the kernel to end this process when the one that started the graph dies.
 
-    It ends in good order, or, where that takes too long because something hangs, at once: nobody
-    else is left to see to it.
+    It ends in good order. If that takes too long because something hangs, it ends at once, because
+    no parent is left to end it.
 
-    Only where that one asked for it (`CRGAME_PARENT_PID`): a node started by hand lives on.
+    This applies only if the parent requested it (`CRGAME_PARENT_PID`): a node started by hand goes
+    on.
     """
     parent = os.environ.get(PARENT_VARIABLE)
     if parent is None:
@@ -72,7 +73,7 @@ def die_with_parent() -> None:
 
 
 def _end_alone(parent: int) -> None:
-    """End this process some time after its parent, whatever its main thread waits for."""
+    """End this process some time after its parent, even if its main thread hangs."""
     while os.getppid() == parent:
         time.sleep(_LOOK_S)
     time.sleep(_GRACE_S)
@@ -88,12 +89,12 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     """
     Run a node until it is done, interrupted or shut down.
 
-    Signals are ours, not rclpy's: its handlers invalidate the context at once, so that nothing
-    could be published or drained at the end. Exits with code 0 at the end or after a signal, 2 on
-    bad input and 1 on any other known error, always with one line that says why.
+    Signals are handled here, not by rclpy: its handlers invalidate the context at once, so that
+    nothing could be published or drained at the end. The exit code is 0 at the end or after a
+    signal, 2 on bad input and 1 on any other known error, always with a one-line reason.
 
-    :param create: makes the node, once rclpy is up.
-    :param args: command line, the process's own where None.
+    :param create: builds the node, once rclpy is initialised.
+    :param args: command line; that of the process where None.
     """
     faulthandler.register(TELL_WHERE)
     name_process(Path(sys.argv[0]).stem)
@@ -115,8 +116,9 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = create()
-        # Planners and recorder give way to the simulation and the driver. The middleware's
-        # threads, which are there by now, do not: they hold locks that these wait for.
+        # Planners and the recorder yield processor time to the simulation and the driver. The
+        # middleware's threads, which already exist, do not: they hold locks that the simulation
+        # and the driver wait for.
         os.nice(int(os.environ.get(NICE_VARIABLE, '0')))
         node.run(stop)
     except CrgameError as error:
@@ -129,8 +131,8 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-        # What nodes freeze, and what they hold in circles through rclpy's compiled part, would
-        # never be let go of; other compiled packages complain of that in dozens of lines.
+        # Objects that nodes froze, and reference cycles through rclpy's compiled part, would never
+        # be freed. Other compiled packages report such leaks in dozens of lines.
         gc.unfreeze()
         gc.enable()
         if node is not None:

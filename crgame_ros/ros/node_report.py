@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a companion node tells of itself once a second on /diagnostics."""
+"""The status of a companion node, published once a second on /diagnostics."""
 
 from collections.abc import Mapping
 import time
@@ -14,7 +14,7 @@ PERIOD_S = 1.0
 
 class NodeReport:
     """
-    Collects how long pieces of work take, and publishes a status now and then.
+    The durations of pieces of work, and a status published once a second.
 
     :param endpoints: of the node.
     :param name: of the status: node and subject.
@@ -27,7 +27,7 @@ class NodeReport:
         self._sent_s = 0.0
 
     def worked(self, duration_s: float) -> bool:
-        """Take how long a piece of work took [s]; tell whether a report is due."""
+        """Note the duration of a piece of work [s]; return whether a report is due."""
         self._durations_s.append(duration_s)
         return time.monotonic() - self._sent_s > PERIOD_S
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that are numbers: a whole number is one, too."""
+"""Number parameters, which accept whole numbers too."""
 
 import math
 from typing import Any
@@ -14,11 +14,11 @@ from rclpy.parameter import Parameter
 def declare_number(node: Node, name: str, default: float, description: str,
                    bounds: tuple[float, float], *, read_only: bool = True) -> float:
     """
-    Declare a parameter that takes `2` as well as `2.0`, and give its value.
+    Declare a parameter that accepts `2` as well as `2.0`, and return its value.
 
     :param bounds: least and greatest value.
-    :param read_only: whether it is given at the start alone.
-    :raises InputError: if what was given at the start is no number within the bounds.
+    :param read_only: whether it can be set at the start only.
+    :raises InputError: if the value at the start is no number within the bounds.
     """
     value = node.declare_parameter(name, default, ParameterDescriptor(
         description=description, read_only=read_only, dynamic_typing=True,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node that looks on at a run, and tells what it sees."""
+"""A base class of nodes that observe a run and publish their findings."""
 
 from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
@@ -22,7 +22,7 @@ Observer = TypeVar('Observer', bound=RunObserver)
 
 class ObserverNode(Node, ABC, Generic[Observer]):
     """
-    Gives each published state to an observer, a new one for each run.
+    A node that passes each published state to an observer, a new one for each run.
 
     :param name: of the node.
     """
@@ -38,7 +38,7 @@ class ObserverNode(Node, ABC, Generic[Observer]):
     @abstractmethod
     def make(self, run: ObservedRun) -> Observer:
         """
-        Make the observer of a run.
+        Build the observer of a run.
 
         :raises CrgameError: if the run cannot be observed; the node then waits for the next one.
         """
@@ -46,14 +46,14 @@ class ObserverNode(Node, ABC, Generic[Observer]):
     @abstractmethod
     def publish(self, observer: Observer, stamp_ns: int) -> None:
         """
-        Publish what there is to say of a state, which has just been observed.
+        Publish the findings on a state that has just been observed.
 
         :param stamp_ns: of the state [ns]
         """
 
     @property
     def epoch(self) -> int:
-        """Epoch of the run that is observed; -1 before the first."""
+        """Return the epoch of the observed run; -1 before the first."""
         return -1 if self._scenario is None else self._scenario.game.epoch
 
     def run(self, stop: StopFlag) -> None:
@@ -70,7 +70,7 @@ class ObserverNode(Node, ABC, Generic[Observer]):
             for step in self._world.steps():
                 self._observe(step)
         except CrgameError as error:
-            # Documents that cannot be used, or a map that breaks while it is read.
+            # Unusable documents, or a map that breaks while it is read.
             self._observer = None
             self.get_logger().error(f'{error}; nothing is checked until the next game')
 
@@ -83,7 +83,7 @@ class ObserverNode(Node, ABC, Generic[Observer]):
             None if game.occupancy is None else TiledOccupancy(game.occupancy)))
 
     def _begin_anew(self) -> None:
-        """Observe the same run from its start: a recording is played once more."""
+        """Observe the same run from its start, because a recording is played again."""
         if self._scenario is not None:
             self._begin(self._scenario)
 

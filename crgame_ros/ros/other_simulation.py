@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Noticing that a simulation of another machine, or of another user, runs in our namespace."""
+"""Detection of a simulation of another machine or user in the same namespace."""
 
 import time
 
@@ -8,26 +8,27 @@ from crgame_ros.errors import InputError
 from crgame_ros.ros.endpoints import Endpoints
 from rclpy.node import Node
 
-# A simulation says how it goes once a second, whatever it does [s].
+# Time to wait for a simulation's state, which is published every second [s].
 ALIVE_S = 6.0
 
 
 def refuse_another(node: Node, until_s: float) -> None:
     """
-    Check that no other simulation speaks here: two on the same topics would mix everything.
+    Check that no other simulation publishes here: two on the same topics would mix.
 
-    On this machine a lock tells (`namespace_lock`); this is about other machines, and other users.
+    On this machine a lock ensures that (`namespace_lock`); this check covers other machines and
+    users.
 
     :param node: in the namespace in question.
-    :param until_s: how long others may take to be discovered, by the steady clock.
-    :raises InputError: if one does.
+    :param until_s: until when others may be discovered, on the steady clock.
+    :raises InputError: if another one publishes.
     """
     endpoints = Endpoints(node)
     while time.monotonic() < until_s and not node.count_publishers('clock'):
         time.sleep(0.02)
     if not node.count_publishers('clock'):
         return
-    # Who was killed a moment ago is still listed: whoever lives says so every second.
+    # A process killed a moment ago is still listed; a live one publishes every second.
     heard = endpoints.polled('/diagnostics')
     until_s = time.monotonic() + ALIVE_S
     while time.monotonic() < until_s:

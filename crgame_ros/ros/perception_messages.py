@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an AV's perception knows, in the types that ROS tools expect."""
+"""The results of an AV's perception in standard ROS types."""
 
 from array import array
 import math
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import LaserScan
 
 Array = NDArray[np.float64]
-# Places of x, y and yaw in the 6 x 6 covariance of a pose.
+# Indices of x, y and yaw in the 6 x 6 covariance of a pose.
 POSE_PLACES = (0, 1, 5)
 
 
@@ -43,7 +43,8 @@ class LocalizationMessage:
         pose.pose.orientation.z = math.sin(0.5 * estimate.yaw)
         pose.pose.orientation.w = math.cos(0.5 * estimate.yaw)
         twist.twist.linear.x, twist.twist.angular.z = estimate.speed, estimate.yaw_rate
-        # What the filter has no state for is as the world or the vehicle's own sensors have it.
+        # Quantities that the filter does not estimate come from the world or the vehicle's own
+        # sensors.
         known, covariance = np.diag([EXACT_VARIANCE] * 6), perception.covariance
         place = np.ix_(POSE_PLACES, POSE_PLACES)
         pose.covariance = _at_least(known, place, covariance[:3, :3])
@@ -52,7 +53,7 @@ class LocalizationMessage:
 
 
 def _at_least(known: Array, place: tuple[Any, ...], part: Array) -> Array:
-    """Return a covariance (36) with a part that the filter has, which may know it exactly, too."""
+    """Return a covariance (36) with the filter's part, bounded below by the exact variance."""
     covariance = known.copy()
     covariance[place] = part
     np.fill_diagonal(covariance, np.maximum(covariance.diagonal(), known.diagonal()))
@@ -61,7 +62,7 @@ def _at_least(known: Array, place: tuple[Any, ...], part: Array) -> Array:
 
 class ScanMessages:
     """
-    What each sensor's rays have hit.
+    The scans of the sensors: the hits of their rays.
 
     :param endpoints: of the node.
     :param av_id: the AV.
@@ -73,7 +74,7 @@ class ScanMessages:
         self._sent: dict[str, int] = {}
 
     def publish(self, scheduler: ScenarioScheduler, perception: Perception) -> None:
-        """Publish every scan that is new."""
+        """Publish every new scan."""
         for spec, n, scan in perception.scans:
             if self._sent.get(spec.name) == n:
                 continue

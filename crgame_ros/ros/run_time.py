@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the time of a run goes on, or has begun anew, as in a recording that is played again."""
+"""Detection of a run's time running back, as in a recording that is played again."""
 
 from enum import Enum
 import time
@@ -8,18 +8,18 @@ import time
 from rclpy.node import Node
 
 USUAL_NS = 1_000_000_000
-# So many in a row have to agree that time is somewhere else: a single one is somebody's error.
+# This many stamps in a row must agree that time has jumped: a single one may be an error.
 AGREEING = 3
-# Of a run whose game nobody publishes people hear after so long [s].
+# Time after which a run without a published game is reported [s].
 PATIENCE_S = 2.0
 
 
 class TimeCourse(Enum):
     """
-    How a message follows the ones before.
+    The relation of a message to the previous ones.
 
-    ON as it should; AHEAD and BEHIND far from them, perhaps somebody's error; BACK proves, with
-    those BEHIND just before it, that time has run back: a recording is played again.
+    ON is the usual case. AHEAD and BEHIND are far from them, perhaps by an error. BACK, together
+    with the BEHIND just before it, proves that time has run back: a recording is played again.
     """
 
     ON = 'on'
@@ -30,9 +30,9 @@ class TimeCourse(Enum):
 
 class RunTime:
     """
-    Follows the stamps of one topic.
+    The course of time in the stamps of one topic.
 
-    :param usual_ns: how much later than the one before a message may be, without further ado [ns].
+    :param usual_ns: largest usual time from one message to the next [ns].
     """
 
     def __init__(self, usual_ns: int = USUAL_NS) -> None:
@@ -41,7 +41,7 @@ class RunTime:
         self._elsewhere_ns: list[int] = []
 
     def follow(self, stamp_ns: int) -> TimeCourse:
-        """Take the stamp of the next message [ns]."""
+        """Return how the stamp of the next message [ns] follows the previous ones."""
         if self._at_ns is None or 0 <= stamp_ns - self._at_ns <= self._usual_ns:
             self._at_ns = stamp_ns
             self._elsewhere_ns.clear()
@@ -60,10 +60,10 @@ class RunTime:
 
 class GameAwaited:
     """
-    Says once that a run is heard of whose game is not known.
+    A warning, given once, that messages of a run arrive whose game is unknown.
 
     :param node: that waits.
-    :param what: it cannot do then.
+    :param what: what the node cannot do without the game.
     """
 
     def __init__(self, node: Node, what: str) -> None:
@@ -74,9 +74,9 @@ class GameAwaited:
 
     def check(self, known: bool, heard: bool) -> None:
         """
-        Take in how it stands.
+        Update the state, and warn if the game is missing for too long.
 
-        :param known: whether the game is.
+        :param known: whether the game is known.
         :param heard: whether a message of a run has come.
         """
         if known:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The run as `/scenario/xml`, `/scenario/objects` and `/scenario/game` describe it together."""
+"""The description of a run: `/scenario/xml`, `/scenario/objects` and `/scenario/game` together."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,8 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario, scenario_digest
 
-# The game is read first: it is published last, so that what it speaks of is mostly there.
+# The game is read first: it is published last, so that the documents it refers to are mostly
+# there.
 KINDS = ('game', 'xml', 'objects')
 
 
@@ -25,7 +26,7 @@ class ScenarioSet:
     Documents that belong together.
 
     :param loaded: the scenario; the same object as before while its text is the same.
-    :param objects: everything that can appear; the driven vehicles are those of the game.
+    :param objects: all objects that can appear; the driven vehicles are those of the game.
     :param game: the resolved game.
     :param texts: the documents as they came: xml, objects, game.
     """
@@ -37,17 +38,17 @@ class ScenarioSet:
 
     @property
     def driven(self) -> tuple[ObjectDescription, ...]:
-        """Driven vehicles, in the order of `/vehicles/state`."""
+        """Return the driven vehicles, in the order of `/vehicles/state`."""
         return tuple(item for item in self.objects if item.role.is_ego)
 
     @property
     def others(self) -> tuple[ObjectDescription, ...]:
-        """Everything else, in the order of `/traffic/objects`."""
+        """Return all other objects, in the order of `/traffic/objects`."""
         return tuple(item for item in self.objects if not item.role.is_ego)
 
 
 class DocumentCollector:
-    """Puts documents together, whoever receives them and in whatever order they come."""
+    """The collector of matching documents, in whatever order they come."""
 
     def __init__(self) -> None:
         self._texts: dict[str, str] = {}
@@ -56,10 +57,10 @@ class DocumentCollector:
 
     def add(self, kind: str, text: str) -> None:
         """
-        Take a document.
+        Add a document.
 
         :param kind: xml, objects or game.
-        :raises InputError: if it cannot be read: the one before stays.
+        :raises InputError: if it cannot be read; the previous one stays.
         """
         if kind == 'game':
             parse_game_document(text)
@@ -69,7 +70,7 @@ class DocumentCollector:
 
     def complete(self) -> ScenarioSet | None:
         """
-        Return the set, once, when the documents belong together and one of them is new.
+        Return the set, once, when the documents match and one of them is new.
 
         :raises CrgameError: if a document cannot be read.
         """
@@ -90,7 +91,7 @@ class DocumentCollector:
 
 class ScenarioDocuments:
     """
-    Reads the three documents without an executor.
+    The three documents, read without an executor.
 
     :param endpoints: of the node that reads them.
     """
@@ -115,6 +116,6 @@ class ScenarioDocuments:
                     self._collector.add(kind, document.data)
                     fresh = True
                 except InputError as error:
-                    # The one before goes on.
+                    # The previous one goes on.
                     self._refusals.note(f'/scenario/{kind}', str(error))
         return self._collector.complete() if fresh else None

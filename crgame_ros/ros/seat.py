@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One vehicle's seat in a live run: the latest command of whoever drives it."""
+"""One vehicle's seat in a live run: the latest command of its driver."""
 
 from typing import TYPE_CHECKING
 
@@ -12,31 +12,31 @@ from crgame_ros.ros.endpoints import PolledSubscription
 from crgame_ros.ros.messages import from_joy
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 
-if TYPE_CHECKING:  # The driver's process needs it not, and it takes long to load.
+if TYPE_CHECKING:  # The driver's process does not need it, and it takes long to load.
     from crgame_ros.driver.replay_driver import ReplayDriver
 
 NS = 1e-9
-# The driver that the game names, an AV's planner, and the recorded take-over of one; anything
-# else names a driver of its own.
+# The game's own driver, an AV's planner, and the recorded take-over of an AV; any other source
+# names its own driver.
 GAME = 'game'
 PLANNER = 'planner'
 REPLAY = 'replay'
-# Commands of its driver that a seat takes in one cycle.
+# Commands of its driver that a seat reads in one cycle.
 COMMAND_DEPTH = 10
-# A page with somebody's hands on the controls says so every 50 ms [ns].
+# A page with a driver's hands on the controls publishes that every 50 ms [ns].
 PRESENT_NS = 500_000_000
 
 
 class Seat:
     """
-    One vehicle's seat: the latest command of its source, and how old it is on the steady clock.
+    One vehicle's seat: the latest command of its source, and its age on the steady clock.
 
-    :param vehicle_id: whose seat.
-    :param driver: who drives it by the game, a driver source or the AV's planner.
-    :param home: source by which the game's driver speaks.
-    :param commands: where the commands come from.
-    :param clock_offset_ns: simulation time of step 0; older commands are of a run before [ns]
-    :param recording: drives while nobody else has the seat, cycle by cycle, whenever that comes.
+    :param vehicle_id: of the seat.
+    :param driver: the driver by the game: a driver source or the AV's planner.
+    :param home: source name of the game's driver.
+    :param commands: subscription to the commands.
+    :param clock_offset_ns: simulation time of step 0; older commands belong to a previous run [ns]
+    :param recording: drives cycle by cycle while no other driver has the seat.
     """
 
     def __init__(self, vehicle_id: str, driver: str, home: str, commands: PolledSubscription,
@@ -46,12 +46,12 @@ class Seat:
         self.home = home
         self.source = home
         self.commands = commands
-        # Decided before a command takes a place among those of a cycle.
+        # Decided before a command counts among those of a cycle.
         commands.wanted = self._is_for_us
         self.recording = recording
-        # Whether an AV is driven as it was while somebody had taken it over.
+        # Whether an AV repeats a recorded take-over.
         self.taken_over_again = False
-        # Whom a cockpit has put into the seat.
+        # The person that a cockpit has put into the seat.
         self.tenant: SeatOccupant | None = None
         self._where = f'/{vehicle_id}/driver_command'
         self._watchdog = SeatWatchdog()
@@ -60,34 +60,34 @@ class Seat:
         self._clock_offset_ns = clock_offset_ns
         self.malformed = 0
         self.outdated = 0
-        # Commands of others, who have not got the seat.
+        # Number of commands from sources that do not have the seat.
         self.passed_over = 0
 
     @property
     def losses(self) -> int:
-        """How often the driver has fallen silent."""
+        """Return the number of times that the driver has fallen silent."""
         return self._watchdog.losses
 
     @property
     def lost(self) -> bool:
-        """Whether the driver is silent now."""
+        """Return whether the driver is silent now."""
         return self._watchdog.lost and self.source != PLANNER
 
     @property
     def ready(self) -> bool:
-        """Whether the person in the seat is ready to begin."""
+        """Return whether the person in the seat is ready to begin."""
         return self.tenant is not None and self.tenant.here and self.tenant.ready
 
     @property
     def published_source(self) -> str:
-        """Whose commands the vehicle obeys, as /seats says it."""
+        """Return the source that drives the vehicle, as in /seats."""
         return REPLAY if self.taken_over_again and self.source == PLANNER else self.source
 
     def obey(self, source: str, now_ns: int) -> None:
         """
-        Take commands from another source; what was commanded last holds until it speaks.
+        Accept commands from another source; the last command holds until its first one.
 
-        Not so after a loss: the pedals that the lost driver held must not come back.
+        After a loss it does not hold: the pedals that the lost driver held must not come back.
         """
         if self.source == PLANNER:
             self._watchdog.reset()
@@ -98,7 +98,7 @@ class Seat:
         self._heard_ns = now_ns
 
     def restart_timeout(self, now_ns: int) -> None:
-        """Count silence from now on: a pause is no loss; who was lost before it still is."""
+        """Restart the timeout: a pause is no loss; a driver lost before it remains lost."""
         if self._heard_ns is not None and not self._watchdog.lost:
             self._heard_ns = now_ns
 
@@ -112,7 +112,7 @@ class Seat:
         return True
 
     def listen(self, now_ns: int) -> bool:
-        """Take the latest command that has come; tell whether there was any so far."""
+        """Read the latest command; return whether any has come so far."""
         for _ in range(COMMAND_DEPTH):
             try:
                 message = self.commands.pop()
@@ -130,11 +130,11 @@ class Seat:
 
     @property
     def repeats_recording(self) -> bool:
-        """Whether a recording drives, or will: messages are not for such a seat."""
+        """Return whether a recording drives now or later; such a seat ignores messages."""
         return self.recording is not None and self.source == self.home
 
     def repeats(self, n: int) -> bool:
-        """Return whether cycle n is driven as in the recording."""
+        """Return whether cycle n repeats the recording."""
         return self.recording is not None and self.repeats_recording and self.recording.drives(n)
 
     def awaits_driver(self, now_ns: int) -> bool:
@@ -146,10 +146,10 @@ class Seat:
 
     def command(self, now_ns: int, dt_s: float, speed: float, n: int = 0) -> DriverCommand | None:
         """
-        Return the command for this cycle; released, then gentle braking, after a loss.
+        Return the command for this cycle; after a loss, released pedals, then gentle braking.
 
-        :param n: the cycle, which only a recording needs to know.
-        :return: None for an AV that nobody has taken over.
+        :param n: the cycle, which only a recording needs.
+        :return: None for an AV that no driver has taken over.
         """
         recording = self.recording if self.repeats_recording else None
         self.taken_over_again = self.source == PLANNER and self.repeats(n)

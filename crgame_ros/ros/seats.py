@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who drives what in a live run: one source a seat, changed by orders on /seats/order."""
+"""The drivers of a live run: one source per seat, changed by orders on /seats/order."""
 
 from collections.abc import Iterable, Iterator, MutableMapping
 from dataclasses import replace
@@ -30,14 +30,14 @@ if TYPE_CHECKING:  # The driver's process needs neither, and they take half a se
     from crgame_ros.simulation.setup import Setup
 
 
-# Further changes are told as one: people change seats a few times, a flood does it for ever.
+# Further changes count as one: people change seats a few times, a flood without end.
 MAX_SPELLS = 500
 Driven = tuple[str, str, str, SeatPerson | None]
 
 
 class SeatSpells:
     """
-    The stretches of a run, in the order in which they began.
+    The periods of a run with one driver per seat, in the order in which they began.
 
     :param epoch: of the run.
     """
@@ -49,7 +49,7 @@ class SeatSpells:
 
     def note(self, n: int, now: Iterable[Driven]) -> None:
         """
-        Take who drives from step n on.
+        Note the drivers from step n on.
 
         :param now: seat, source, the game's driver and the person, of each seat that is driven.
         """
@@ -61,11 +61,11 @@ class SeatSpells:
         for seat, item in driven.items():
             if seat not in self._last:
                 self._begin(seat, DrivingSpell(*item, n))
-        # Nothing was driven in a stretch of no steps.
+        # Nothing was driven in a period without steps.
         self._spells = [item for item in self._spells if item.until_n != item.from_n]
 
     def document(self) -> str:
-        """Write `/seats/drivers`."""
+        """Return the text of `/seats/drivers`."""
         return spells_document(self._epoch, self._spells)
 
     def _begin(self, seat: str, spell: DrivingSpell) -> None:
@@ -85,9 +85,9 @@ class Seats:
     :param endpoints: of sim_node.
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
-    :param sources: what people ordered so far, by seat; outlives a reset.
-    :param recorded: what drives seats as in a recording; None for nothing.
-    :param tenants: who is in which seat; outlives a reset.
+    :param sources: ordered sources by seat; kept across resets.
+    :param recorded: recorded inputs that drive seats; None for none.
+    :param tenants: occupants by seat; kept across resets.
     """
 
     def __init__(self, endpoints: Endpoints, setup: 'Setup', clock_offset_ns: int,
@@ -116,22 +116,22 @@ class Seats:
             seat.source = sources.get(seat.id, seat.home)
             tenant = self._tenants.get(seat.id)
             if tenant is not None and seat.source == COCKPIT:
-                # Who was ready for the run before says so anew.
+                # Readiness does not carry over to the next run.
                 seat.tenant = replace(tenant, ready=False)
 
     @property
     def slots(self) -> list[PolledSubscription]:
-        """Every subscription, to release it."""
+        """Return every subscription, to release it."""
         return [self._orders, *(seat.commands for seat in self.all)]
 
     def listen(self, now_ns: int) -> None:
-        """Take the commands that have come by now, so that the cycle has less to read."""
+        """Read the commands that have come by now, so that the cycle has less to read."""
         for seat in self.all:
             if seat.source != PLANNER and not seat.repeats_recording:
                 seat.listen(now_ns)
 
     def interval_s(self, n: int) -> float | None:
-        """Return the interval of cycle n as recorded [s]; None where no human repeats it."""
+        """Return the recorded interval of cycle n [s]; None where no human repeats it."""
         return self._intervals_s[n] if any(seat.repeats(n) for seat in self.humans) else None
 
     def commands(self, now_ns: int, dt_s: float,
@@ -145,21 +145,23 @@ class Seats:
               for seat, av in zip(self.avs, simulation.avs, strict=True))]
 
     def awaited(self, now_ns: int) -> tuple[str, ...]:
-        """Name the seats whose driver must come before the run can begin."""
+        """Return the ids of the seats whose driver must come before the run can begin."""
         return tuple(seat.id for seat in self.humans if seat.awaits_driver(now_ns))
 
     @property
     def cockpit_seats(self) -> list[Seat]:
-        """Return the seats that the game leaves to people at pages, and that nobody else has."""
+        """
+        Return the seats that the game leaves to people at pages and that no other source has.
+        """
         return [seat for seat in self.humans if seat.home == seat.source == COCKPIT]
 
     def document(self) -> str:
-        """Write /seats."""
+        """Return the text of `/seats`."""
         return json.dumps({seat.id: seat_entry(seat.published_source, seat.driver, seat.tenant)
                            for seat in self.all})
 
     def driven(self) -> Iterator[Driven]:
-        """Yield what each seat is driven by, but for AVs that follow their plans."""
+        """Yield the driver of each seat, except for AVs that follow their plans."""
         for seat in self.all:
             if seat.published_source != PLANNER:
                 person = None if seat.tenant is None or not seat.tenant.here \
@@ -174,10 +176,10 @@ class Seats:
 
     def apply_orders(self, now_ns: int) -> tuple[bool, list[str]]:
         """
-        Obey the orders that have come; a flood waits its turn.
+        Apply the orders that have come; the rest of a flood waits.
 
         :param now_ns: steady clock [ns]
-        :return: whether anything changed, and why orders were refused
+        :return: whether anything changed, and the reasons of refusals
         """
         changed, refusals = False, []
         for _ in range(MAX_ORDERS):
@@ -206,11 +208,11 @@ class Seats:
         return (seat.source, seat.tenant) != before
 
     def _assign(self, seat: Seat, source: str, now_ns: int) -> None:
-        """Let another source have a seat."""
+        """Assign a seat to another source."""
         if source == PLANNER != seat.home:
             raise InputError(f'{seat.id} has no planner', ORDER_TOPIC, 'give game')
         if source in (GAME, PLANNER):
-            # Given back for good: in a game to come its own driver has the seat.
+            # Returned for good: in the next game its own driver has the seat.
             source = seat.home
             self._sources.pop(seat.id, None)
         else:
@@ -221,7 +223,7 @@ class Seats:
             seat.obey(source, now_ns)
 
     def _assign_to_cockpit(self, seat: Seat, demand: SeatDemand, now_ns: int) -> None:
-        """Put a person at a page into a seat, unless another one was quicker."""
+        """Put a person at a page into a seat unless it is already occupied."""
         sits = None if seat.tenant is None else seat.tenant.person
         taker = demand.person
         if sits is not None and (taker is None or sits.id not in (taker.id, demand.displaced)):
@@ -235,7 +237,7 @@ class Seats:
                          if same and seat.tenant is not None else SeatOccupant(taker))
 
     def _seat_person(self, seat: Seat, demand: SeatDemand) -> None:
-        """Take what is said of the person in a seat."""
+        """Update the person in a seat."""
         tenant = seat.tenant
         if tenant is None:
             raise InputError(f'no person has {seat.id}', ORDER_TOPIC, 'claim it')
@@ -251,5 +253,5 @@ class Seats:
 
 
 def _home(driver: str) -> str:
-    """Return the source by which the driver that the game names speaks."""
+    """Return the source name of the game's driver."""
     return COCKPIT if parse_source(driver).kind == COCKPIT else GAME

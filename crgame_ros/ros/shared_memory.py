@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Shared memory that killed processes left: half-made ports that others wait for, and the rest."""
+"""Shared memory left by killed processes: half-made ports that block others, and other files."""
 
 from contextlib import suppress
 import fcntl
@@ -13,22 +13,22 @@ SHARED_MEMORY = Path('/dev/shm')
 PORT = re.compile(r'fastrtps_port\d+')
 SEGMENT = re.compile(r'fastrtps_[0-9a-f]{16}')
 # Fast DDS 2.14 makes a port with boost's managed_open_or_create, which keeps a state in the first
-# four bytes: 0 uninitialised, 1 being initialised, 2 initialised, 3 corrupted. Who opens a port
-# that is not initialised waits for its maker, alive or not.
+# four bytes: 0 uninitialised, 1 being initialised, 2 initialised, 3 corrupted. A process that
+# opens a port that is not initialised waits for its maker, alive or not.
 INITIALISED = (2).to_bytes(4, 'little')
 # Far longer than making a port takes on a busy machine [s].
 PATIENCE_S = 2.0
-# Whoever makes a segment maps and locks it well within this time [s].
+# The maker of a segment maps and locks it well within this time [s].
 YOUNG_S = 60.0
 LOOK_S = 0.05
 
 
 def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> list[str]:
     """
-    Remove the ports that nobody will ever finish; wait for those that may just be in the making.
+    Remove the ports that will never be finished; wait for those that may still be in the making.
 
-    The ports of all ROS domains share their names. A process that was killed at the wrong moment
-    would keep every later one that comes to its port from starting.
+    The ports of all ROS domains share their names. A process killed at the wrong moment would
+    block the start of every later one that uses its port.
 
     :param folder: where Fast DDS keeps its ports.
     :return: names of the ports that were removed
@@ -41,7 +41,7 @@ def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> list[str]:
                     port.unlink()
                     removed.append(port.name)
             except OSError:
-                # Gone meanwhile, or another user's, for whom only they can do this.
+                # Gone meanwhile, or owned by another user, who alone can remove it.
                 continue
         if not any(_is_young(port) for port in half_made):
             break
@@ -51,29 +51,28 @@ def remove_half_made_ports(folder: Path = SHARED_MEMORY) -> list[str]:
 
 def remove_stale(folder: Path = SHARED_MEMORY, *, ports: bool = False) -> tuple[int, int]:
     """
-    Remove what Fast DDS left there whose processes are gone.
+    Remove files of Fast DDS whose processes are gone.
 
-    Files of this user alone, which no process that can be seen has mapped and whose lock nobody
-    holds: the kernel lets go of both with the process, however that ended.
+    These are files of this user only, which no visible process has mapped and whose lock no
+    process holds. The kernel releases both with the process, however that ended.
 
     :param folder: where Fast DDS keeps them.
-    :param ports: remove ports, too, 50 kB each. Their names are used again: one that somebody is
-        opening at this very moment would be lost to the others, so it is for people to choose
-        that moment.
-    :return: how many were removed, and their size on the disk of memory [bytes]
+    :param ports: remove ports too, 50 kB each. Their names are reused: a port that another process
+        is just opening would be lost to the others, so the user chooses the moment.
+    :return: number of files removed, and their size in shared memory [bytes]
     """
     if not folder.is_dir():
         return 0, 0
     left = [path for path in sorted(folder.iterdir())
             if (SEGMENT.fullmatch(path.name) or ports and PORT.fullmatch(path.name))
             and _is_left(path)]
-    # Every process is asked only where something may be left.
+    # The processes are searched only where a file may be left.
     mapped = _mapped(folder) if left else set()
     count = size = 0
     for path in left:
         if path.name in mapped:
             continue
-        # Gone meanwhile, or not ours.
+        # Gone meanwhile, or another user's.
         with suppress(OSError):
             blocks = path.stat().st_blocks
             path.unlink()
@@ -85,12 +84,12 @@ def remove_stale(folder: Path = SHARED_MEMORY, *, ports: bool = False) -> tuple[
 
 
 def _locks_of(path: Path) -> tuple[Path, Path]:
-    """Return the files by which readers hold a segment or port, alone or together."""
+    """Return the lock files of a segment or port, for exclusive and shared access."""
     return path.with_name(f'{path.name}_el'), path.with_name(f'{path.name}_sl')
 
 
 def _is_left(path: Path) -> bool:
-    """Return whether a file is this user's, not young, and nobody holds its locks."""
+    """Return whether a file is this user's, not young, and no process holds its locks."""
     try:
         found = path.stat()
         return found.st_uid == os.getuid() and time.time() - found.st_mtime >= YOUNG_S \
@@ -100,7 +99,7 @@ def _is_left(path: Path) -> bool:
 
 
 def _mapped(folder: Path) -> set[str]:
-    """List the files of a folder that processes have mapped, as far as these can be seen."""
+    """Return the names of a folder's files that visible processes have mapped."""
     found: set[str] = set()
     mark = f' {folder}/'
     for process in Path('/proc').iterdir():
@@ -115,7 +114,7 @@ def _mapped(folder: Path) -> set[str]:
 
 
 def _is_free(lock: Path) -> bool:
-    """Return whether nobody holds a lock file, which a file need not have."""
+    """Return whether no process holds a lock file, which may be absent."""
     try:
         descriptor = os.open(lock, os.O_RDONLY | os.O_CLOEXEC)
     except FileNotFoundError:

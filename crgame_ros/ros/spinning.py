@@ -11,17 +11,17 @@ from crgame_ros.ros.node_main import StopFlag
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 
-# A waiting executor doesn't see a signal: look at the flag so often [s].
+# A waiting executor does not notice a signal: the flag is polled at this period [s].
 LOOK_S = 0.1
-# What an input causes is told so often, while it goes on [s].
+# Period of log lines about a persistent failure [s].
 COMPLAIN_S = 1.0
 
 
 def attempt(node: Node, work: Callable[[], None]) -> None:
     """
-    Do a piece of work, and say in one line if it fails.
+    Do a piece of work, and log one line if it fails.
 
-    What nobody thought of, in a message that somebody sent, must cost that message, not the node.
+    An unforeseen error in a received message must cost only that message, not the node.
     """
     try:
         work()
@@ -34,10 +34,10 @@ def attempt(node: Node, work: Callable[[], None]) -> None:
 
 def prompt_executor() -> Executor:
     """
-    Make the executor that runs a callback soonest after its message has come.
+    Return the executor that runs a callback soonest after its message has come.
 
-    rclpy's own for events costs 70 µs a message, the ordinary one 260 µs. It knows no groups of
-    callbacks, so nothing may be polled; where rclpy is too old to have it, the ordinary one works.
+    rclpy's events executor costs 70 µs per message, the ordinary one 260 µs. It supports no
+    callback groups, so nothing may be polled. An older rclpy without it uses the ordinary one.
     """
     try:
         from rclpy.experimental import EventsExecutor
@@ -51,7 +51,7 @@ def spin(node: Node, stop: StopFlag, executor: Executor | None = None) -> None:
     """
     Run a node's callbacks until asked to stop.
 
-    :param executor: an ordinary one where None.
+    :param executor: the ordinary one where None.
     """
     executor = executor or SingleThreadedExecutor()
     executor.add_node(node)
@@ -64,7 +64,7 @@ def poll(node: Node, stop: StopFlag, period_s: float, work: Callable[[], None]) 
     """
     Call `work` periodically until asked to stop, and once more then.
 
-    Parameters and services of the node are served now and then.
+    Parameters and services of the node are served at intervals.
 
     :param period_s: pause between two calls [s]
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two processes that exchange messages: what `crgame doctor` sees of DDS on this machine."""
+"""Two processes that exchange messages, for `crgame doctor` to check DDS on this machine."""
 
 import json
 import statistics
@@ -59,7 +59,7 @@ def listen() -> None:
 
 
 def main() -> None:
-    """Be one of the two, as the command line says: talk or listen."""
+    """Run one of the two, as the command line says: talk or listen."""
     prepare_environment()
     {'talk': talk, 'listen': listen}[sys.argv[1]]()
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the frames of the messages are: map to <v>/base_link, and from there to the sensors."""
+"""The frames of the messages: map to <v>/base_link, and from there to the sensors."""
 
 from collections.abc import Iterable, Sequence
 import math
@@ -31,14 +31,14 @@ def transform(parent: str, child: str, pose: Iterable[float], stamp_ns: int) -> 
 
 def vehicle_transforms(vehicle_ids: Sequence[str], poses: Iterable[Iterable[float]],
                        stamp_ns: int) -> list[TransformStamped]:
-    """Place each vehicle's rear axle, `<v>/base_link`, by its x, y [m] and yaw [rad] in map."""
+    """Return the pose of each rear axle, `<v>/base_link`: x, y [m] and yaw [rad] in map."""
     return [transform(MAP, f'{vehicle}/base_link', pose, stamp_ns)
             for vehicle, pose in zip(vehicle_ids, poses, strict=True)]
 
 
 def sensor_transforms(avs: Iterable[DrivenAv], stamp_ns: int) -> list[TransformStamped]:
     """
-    Place the sensors of each AV, `<av>/<sensor>`, on its `base_link`.
+    Return the pose of each AV's sensors, `<av>/<sensor>`, on its `base_link`.
 
     :param avs: of the game document.
     """
@@ -67,17 +67,17 @@ class Transforms:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody listens."""
+        """Return whether there are subscribers."""
         return self.available and self._moving.get_subscription_count() > 0
 
     def place_sensors(self, avs: Iterable[DrivenAv], stamp_ns: int) -> None:
-        """Publish where the sensors of a game are mounted; late joiners get it, too."""
+        """Publish the mounting of a game's sensors, latched."""
         if self.available:
             self._fixed.publish(self._message(transforms=sensor_transforms(avs, stamp_ns)))
 
     def place_vehicles(self, vehicle_ids: Sequence[str], poses: Iterable[Iterable[float]],
                        stamp_ns: int) -> None:
-        """Publish where the vehicles are, if anybody listens; see `vehicle_transforms`."""
+        """Publish the vehicles' poses if there are subscribers; see `vehicle_transforms`."""
         if self.wanted:
             self._moving.publish(self._message(
                 transforms=vehicle_transforms(vehicle_ids, poses, stamp_ns)))

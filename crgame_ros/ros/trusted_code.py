@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The code that a node may run: what its own parameters name, and what the game files name."""
+"""The code that a node may run: that named by its own parameters and by the game files."""
 
 import json
 from pathlib import Path
@@ -12,12 +12,12 @@ from rclpy.node import Node
 
 class TrustedCode:
     """
-    Refuses code that only a message names; each node checks a name before it is loaded.
+    The check against code that only a message names; each node makes it before it loads code.
 
-    Declares the parameter `roster`.
+    It declares the parameter `roster`.
 
     :param node: the node that loads code.
-    :param named: what the node's own parameters name.
+    :param named: the names in the node's own parameters.
     """
 
     def __init__(self, node: Node, *named: str) -> None:
@@ -29,12 +29,12 @@ class TrustedCode:
 
     def check(self, name: str, where: str) -> None:
         """
-        Let a name pass that is no code, such as `idm`, or code that is trusted.
+        Check that a name is no code, such as `idm`, or trusted code.
 
         :param name: of a planner, sensor, driver or model: `module:Class`, `FILE.py:Class` and
             `policy:FILE.py:load` are code.
-        :param where: what is to run it, for messages.
-        :raises InputError: if it is code that neither the node nor a game file names.
+        :param where: the part that is to run it, for messages.
+        :raises InputError: if it is code that neither the node's parameters nor a game file names.
         """
         if ':' in name and name not in self._named and name not in self._listed():
             raise InputError('is code that only a message names: it is not run',
@@ -42,7 +42,7 @@ class TrustedCode:
                              'name it in the game file, or to the node that runs it')
 
     def _listed(self) -> tuple[str, ...]:
-        # Read each time: sim_node writes it anew for each game.
+        # Read each time, because sim_node rewrites it for each game.
         try:
             return tuple(json.loads(self._roster.read_text(encoding='utf-8'))['code']
                          if self._roster else ())

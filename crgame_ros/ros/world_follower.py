@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from trajectory_msgs.msg import JointTrajectory
 
 FloatArray = NDArray[np.float64]
-# Kept while their other half is on its way; both are published within a millisecond. States are
-# those of some seconds: who was held up by a busy machine misses none of them.
+# Messages kept until their counterpart arrives; both are published within a millisecond. States of
+# several seconds are kept, so that a delayed node on a busy machine misses none.
 MAX_WAITING, MAX_STATES = 50, 1000
 
 
@@ -52,12 +52,12 @@ class WorldStep:
 
 class WorldFollower:
     """
-    Puts the states of vehicles and `/traffic/objects` together, in order and without a gap.
+    The states of vehicles and `/traffic/objects`, combined in order and without a gap.
 
     :param endpoints: of the node.
     :param states: topic of the vehicles, at every step or at scenario time steps alone.
-    :param begin_anew: is called where the run begins again, as in a recording that is played once
-        more, before the first of its steps is given.
+    :param begin_anew: called where the run begins again, as in a recording that is played again,
+        before the first of its steps is returned.
     """
 
     def __init__(self, endpoints: Endpoints, states: str,
@@ -72,14 +72,14 @@ class WorldFollower:
         self._latest: ObjectStates | None = None
 
     def begin(self, scenario: ScenarioSet) -> None:
-        """Follow another run; what has come of it already stays."""
+        """Follow another run; messages of it that have already come are kept."""
         self._scenario = scenario
         self._reader = WorldMessages(scenario.objects)
         self._objects_by_n.clear()
         self._latest = None
 
     def drop(self) -> None:
-        """Let go what has come: of a run that is not known it may be the end."""
+        """Discard the received messages, which may be the end of an unknown run."""
         self._receive_states()
         self._waiting.clear()
 
@@ -117,14 +117,14 @@ class WorldFollower:
             try:
                 self._objects_by_n[n] = self._reader.object_states(message)
             except InputError:
-                # Of the game before or after this one.
+                # From the game before or after this one.
                 continue
-            # Those of a far future, which nobody has seen yet, are somebody's invention.
+            # Objects of a far future step are erroneous.
             while len(self._objects_by_n) > MAX_WAITING:
                 del self._objects_by_n[max(self._objects_by_n)]
 
     def _complete(self, scenario: ScenarioSet, message: JointTrajectory) -> WorldStep | None:
-        """Return a step, None if its objects are still on their way; n < 0: of another run."""
+        """Return a step, None if its objects have not come yet; n < 0: of another run."""
         scheduler = scenario.game.scheduler
         n = scheduler.step_of_stamp(from_time(message.header.stamp))
         nothing = np.empty((0, 4))
@@ -139,7 +139,7 @@ class WorldFollower:
         tick = scheduler.is_tick(n)
         if tick:
             fresh = self._objects_by_n.pop(n, None)
-            # Objects come in order: behind newer ones, those of this tick never will.
+            # Objects come in order: after newer ones, those of this tick never come.
             if fresh is None and max(self._objects_by_n, default=-1) < n \
                     and len(self._waiting) < MAX_WAITING // 2:
                 return None

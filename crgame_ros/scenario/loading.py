@@ -174,7 +174,7 @@ def _read(data: bytes, source: str) -> tuple[Scenario, list[PlanningProblem], li
     try:
         with _captured_remarks() as remarks:
             scenario, problems = XMLFileReader(data).open()
-    except Exception as error:  # commonroad-io raises whatever its code stumbles over
+    except Exception as error:  # commonroad-io can raise any exception
         text = str(error) or 'no further explanation'
         raise InputError(f'commonroad-io cannot read it ({type(error).__name__}: {text[:200]})',
                          _element_of(error, source), 'compare it with the CommonRoad format'

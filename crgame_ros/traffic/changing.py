@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""When agents change lanes, and who makes room for them (FS M3)."""
+"""Decisions of agents to change lanes, and of others to make room for them (FS M3)."""
 
 from dataclasses import dataclass
 import math
@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 LOOK_BEHIND = 120.0
 MAX_LANES_BEHIND = 32
 MAX_LANES_AHEAD = 12
-# Who is beside has to be clear of the own width by this [m].
+# A vehicle in the lane beside is in the way if nearer than this to the side of the agent [m].
 SIDE_MARGIN = 0.15
 # No vehicle is longer [m].
 LONG = 25.0
@@ -45,18 +45,18 @@ LONG = 25.0
 
 class Beside(NamedTuple):
     """
-    The lanes beside agents (N), and who is ahead and behind there.
+    The lanes beside agents (N), with the leader and the follower there.
 
     :param lane: (N)
     :param s: (N) of the agent's centre there [m]
     :param d: (N) [m]
     :param turn: (N) its heading against the lane's [rad]
-    :param lead_gap: (N) bumper to bumper, inf where nobody is ahead [m]
+    :param lead_gap: (N) bumper to bumper, inf without a leader [m]
     :param lead_speed: (N) [m/s]
-    :param leader: (N) row of `Entries` of who is ahead, -1 where nobody is.
-    :param follow_gap: (N) bumper to bumper, inf where nobody is behind [m]
+    :param leader: (N) row of `Entries` of the leader, -1 without one.
+    :param follow_gap: (N) bumper to bumper, inf without a follower [m]
     :param follow_speed: (N) [m/s]
-    :param follower: (N) the agent behind; -1 where there is none or it is no agent.
+    :param follower: (N) the agent behind; -1 without a follower or if it is no agent.
     """
 
     lane: IntArray
@@ -75,7 +75,7 @@ class Beside(NamedTuple):
 def find_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                 lane: IntArray, entries: Entries) -> Beside:
     """
-    Look into the lanes beside agents.
+    Find the leaders and followers in the lanes beside agents.
 
     :param following: (D, L) next lane to a destination, or -1.
     :param slots: (N) the agents.
@@ -95,7 +95,7 @@ def find_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots
 def _find_all_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                      entries: Entries, result: Beside, pending_lane: IntArray,
                      pending_offset: FloatArray) -> None:
-    """Write what is beside all agents; `pending_…` is room to note lanes in."""
+    """Write leaders and followers beside all agents; `pending_…` is room to list lanes."""
     lane = result.lane
     for i, slot in enumerate(slots):
         yaw = agents.yaw[slot]
@@ -111,7 +111,7 @@ def _find_all_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, 
 @bare
 def _find_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                 entries: Entries, result: Beside, i: int) -> None:
-    """Find who is next ahead in the lane beside and those that follow on the route."""
+    """Find the leader in the lane beside and in the lanes that follow it on the route."""
     speed, half = agents.speed[slot], 0.5 * agents.width[slot] + SIDE_MARGIN
     horizon = 30.0 + 3.0 * speed + speed**2 / 4.0
     lane, offset = result.lane[i], -result.s[i]
@@ -135,7 +135,7 @@ def _find_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
 def _find_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entries,
                  result: Beside, i: int, pending_lane: IntArray,
                  pending_offset: FloatArray) -> None:
-    """Find who is next behind, in the lane or those that lead to it."""
+    """Find the follower in the lane beside or in the lanes that lead to it."""
     half = 0.5 * agents.width[slot] + SIDE_MARGIN
     pending_lane[0], pending_offset[0] = result.lane[i], -result.s[i]
     done, pending = 0, 1
@@ -156,7 +156,8 @@ def _find_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entri
             if gap < result.follow_gap[i]:
                 result.follow_gap[i], result.follow_speed[i] = gap, entries.speed[n]
                 result.follower[i] = max(entries.owner[n], -1)
-            # Those sorted before begin, and so end, farther behind; the longest are excepted.
+            # Entries sorted before begin farther behind, so they end there too; LONG covers the
+            # longest.
             if found and entries.rear[n] + offset < -LONG:
                 break
         if not found and offset > -LOOK_BEHIND:
@@ -169,29 +170,29 @@ def _find_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entri
 
 BoolArray = NDArray[np.bool_]
 
-# After a change, time without another one; and with which the next for speed is thought of [s].
+# After a change, time without another one [s].
 CALM = 4.0
-# After any change, time without one for speed; and how often agents think of those [s].
+# After any change, time without one for speed; interval at which agents consider those [s].
 CONTENT = 12.0
 THOUGHT = 1.0
-# With less room than this to an obstacle the way out of the lane is as short as possible [m].
+# With less room than this to an obstacle a lane change is as short as possible [m].
 TIGHT = 10.0
-# A change is as long as so many lengths of the vehicle at least.
+# A change is at least this many lengths of the vehicle long.
 LENGTHS = 2.7
-# Share of the braking that is needed, with which somebody stops for who stands at a lane's end.
+# An agent that stops for another at a lane's end brakes by this factor harder than needed.
 LETTING_IN = 1.1
-# Who has not got far in a change for so long gives it up [s].
+# An agent that has stood this long [s] before this share of its change gives the change up.
 GIVE_UP = 5.0
 STARTED = 0.4
-# Who has got farther does so after so many times as long.
+# Beyond that share it gives up after this many times as long.
 LATER = 5
-# A lane that is blocked too is worth changing into if it goes on for so much longer [m].
+# A lane that is blocked too is worth changing into if its blockage is this much farther [m].
 BEYOND = 25.0
 
 
 @dataclass(frozen=True)
 class Wish:
-    """Agents (N) that want into the lane beside them: side, urgency, room before an obstacle."""
+    """Agents (N) that intend to change lanes: side, urgency, room before an obstacle."""
 
     slots: IntArray
     side: IntArray
@@ -200,7 +201,7 @@ class Wish:
     beside: Beside
 
     def select(self, rows: NDArray[np.bool_]) -> 'Wish':
-        """Pick some of them."""
+        """Return some of them."""
         if rows.all():
             return self
         columns: list[Any] = [column[rows] for column in self.beside]
@@ -210,13 +211,13 @@ class Wish:
 
 class LaneChanges:
     """
-    Decides on lane changes, for the route, past slow leaders and where a lane ends.
+    Decisions on lane changes: for the route, past slow leaders and where a lane ends.
 
     :param graph: the lanes.
     :param routes: where agents go.
     :param conflicts: of the lanes.
-    :param followers: their car-following models.
-    :param drivers: who change lanes, and how politely (MOBIL).
+    :param followers: the agents' car-following models.
+    :param drivers: whether drivers change lanes, and how politely (MOBIL).
     :param cooperative: whether others make room.
     :param time_step_s: Delta t_c [s]
     """
@@ -238,14 +239,14 @@ class LaneChanges:
         self._patience = max(1, round(self._courtesy.patience / time_step_s))
 
     def finish(self, k: int, agents: Agents) -> None:
-        """End the changes that have come to their end, and those that come to nothing."""
+        """End the changes that are complete, and those that make no progress."""
         stuck = _finish(agents.table, self._give_up)
         if len(stuck):
             graph, lane = self._graph, agents.source[stuck]
             center, _ = centers_of(agents.table, stuck)
             guess = agents.s[stuck] * graph.length[lane] / graph.length[agents.lane[stuck]]
             s, d, _ = graph.project(lane, center[:, 0], center[:, 1], guess)
-            # Into the lane whose middle is nearer.
+            # The agent goes to the lane whose middle is nearer.
             back = np.abs(d) < np.abs(agents.d[stuck])
             returns = stuck[back]
             agents.lane[returns], agents.s[returns], agents.d[returns] = (
@@ -257,13 +258,14 @@ class LaneChanges:
                limit: FloatArray, acceleration: FloatArray, at: Situations, standing: BoolArray,
                entries: Entries, way: Ways) -> None:
         """
-        Begin lane changes, and have those brake who make room.
+        Begin lane changes, and make other agents brake to make room.
 
         :param slots: (A) of the agents.
         :param desired: (A) desired speeds [m/s]
-        :param limit: (A) acceleration with which nobody gets too fast, in any lane [m/s^2]
-        :param acceleration: (A) that they want in their own lanes; lowered where courtesy asks
-            for it [m/s^2]
+        :param limit: (A) greatest acceleration that keeps to the allowed speeds, in any lane
+            [m/s^2]
+        :param acceleration: (A) wanted in the agents' own lanes; lowered where courtesy asks for
+            it [m/s^2]
         :param standing: (E) which entries are obstacles that stand for good.
         :param way: of the agents.
         """
@@ -291,7 +293,7 @@ class LaneChanges:
 
     def _judge(self, agents: Agents, wish: Wish, desired: FloatArray,
                acceleration: FloatArray, limit: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """Return whose gap is safe, and what each gains by changing (MOBIL) [m/s^2]."""
+        """Return for each wish whether the gap is safe, and the gain (MOBIL) [m/s^2]."""
         followers, beside = self._followers, wish.beside
         speed = agents.speed[wish.slots]
         there = followers.for_agents(wish.slots).acceleration(
@@ -355,14 +357,14 @@ class LaneChanges:
                           float(beside.follow_speed[i]))
 
     def _relieve(self, agents: Agents, slot: int, gap: float, speed: float) -> None:
-        """Let a driver open a gap that a change has shortened without haste (Hidas 2005)."""
+        """Set the relief with which a driver slowly reopens a shortened gap (Hidas 2005)."""
         if self._cooperative and np.isfinite(gap):
             wanted = self._followers.for_agents(np.array([slot])).desired_gap(np.array([speed]))
             agents.relief[slot] = max(agents.relief[slot], relief_at_change(
                 float(gap), float(wanted[0])))
 
     def _make_room(self, agents: Agents, wish: Wish, yielding: FloatArray) -> None:
-        """Let followers beside, and agents that have to fall back, open the gaps (Hidas 2005)."""
+        """Make followers beside, and agents that fall back, open the gaps (Hidas 2005)."""
         beside, slots = wish.beside, wish.slots
         speed = agents.speed[slots]
         known = beside.follower >= 0
@@ -383,10 +385,11 @@ class LaneChanges:
     def _yield_to_merging(self, agents: Agents, slots: IntArray, wish: Wish, way: Ways,
                           yielding: FloatArray) -> None:
         """
-        Have somebody stop for each who has stood long enough where the own lane ends.
+        Make one agent stop for each agent that has stood long enough where its lane ends.
 
-        It is the first on the lane beside who can do so without haste: those who are nearer and
-        faster pass. Who has been let in moves, and the next one has to stand as long (zipper).
+        The nearest agent on the lane beside that can stop gently does so. Agents that are nearer
+        and too fast pass. An agent that has been let in moves on, and the next one in its lane has
+        to stand as long again (zipper).
         """
         rules = self._courtesy
         speed = agents.speed[slots]
@@ -403,14 +406,14 @@ class LaneChanges:
             row, room = row[fits], room[fits]
             first = int(room.argmin())
             who = int(slots[row[first]])
-            # A little more than needed: less is needed then, and it stays the one who stops.
+            # By braking a little harder than needed it remains the agent that stops.
             braking = LETTING_IN * agents.speed[who]**2 / (2.0 * room[first])
             yielding[who] = min(yielding[who], -braking)
 
 
 @compiled
 def _finish(agents: AgentTable, give_up: int) -> IntArray:
-    """End changes that have come to their end; list the agents whose come to nothing."""
+    """End changes that are complete; return the agents whose changes make no progress."""
     stuck = np.empty(len(agents.x), np.int64)
     count = 0
     for i in range(len(agents.x)):
@@ -427,10 +430,10 @@ def _finish(agents: AgentTable, give_up: int) -> IntArray:
 
 
 def _blocked(wish: Wish, standing: BoolArray) -> BoolArray:
-    """Return whose way in the lane beside is blocked by something that stands there."""
+    """Return whether each lane beside is blocked by an obstacle that stands there."""
     leader = wish.beside.leader
     blocked = np.zeros(len(leader), dtype=bool)
     known = leader >= 0
     blocked[known] = standing[leader[known]]
-    # Side by side obstacles of which this one is farther are still a way forward.
+    # An obstacle much farther ahead than the one in the own lane does not count.
     return blocked & (wish.beside.lead_gap < wish.room + BEYOND)

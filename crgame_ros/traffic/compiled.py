@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Compiling the loops over agents: numba, with a cache on disk."""
+"""Compilation of the loops over agents with numba and a cache on disk."""
 
 from collections.abc import Callable
 from typing import Any, cast, TypeVar
@@ -29,9 +29,10 @@ def _choose_cache(function: Callable[..., Any]) -> None:
 
 def inlined(function: Function) -> Function:
     """
-    Compile a function into those that call it.
+    Compile a function inline into its callers.
 
-    For small ones in inner loops: tables are passed by value, some hundred words of them.
+    It is meant for small functions in inner loops: a call passes tables by value, which are some
+    hundred words.
     """
     _choose_cache(function)
     return cast(Function, numba.njit(error_model='numpy', inline='always')(function))
@@ -45,12 +46,12 @@ def compiled(function: Function) -> Function:
 
 def bare(function: Function) -> Function:
     """
-    Compile a function that makes no arrays, without counting the references to those it is given.
+    Compile a function that makes no arrays, without counting references to its arguments.
 
-    numba counts each array of a table wherever some of it is looked at, which takes more time than
-    all the rest of a short loop.
+    numba counts references to each array of a table wherever the table is used. That takes more
+    time than the rest of a short loop.
     """
     _choose_cache(function)
-    # Not among numba's documented options.
+    # numba does not document `_nrt`.
     options: dict[str, Any] = {'cache': True, 'error_model': 'numpy', '_nrt': False}
     return cast(Function, numba.njit(**options)(function))

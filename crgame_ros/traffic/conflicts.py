@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where lanes cross or merge, and who has the right of way there."""
+"""The places where lanes cross or merge, and the right of way there."""
 
 import heapq
 from typing import NamedTuple
@@ -18,23 +18,25 @@ import shapely
 
 # Two vehicles meet where their lanes' centres are closer than a vehicle's width and a margin [m].
 WIDTH = 2.6
-# The same for trucks; the widest vehicle allowed, and the widest that counts as a car [m].
+# The same for trucks; width of the widest vehicle, and of the widest that counts as a car [m].
 WIDE, WIDEST, NARROW = 3.4, 2.55, 2.1
-# Between the sides of vehicles that pass: across each other's way, and in opposite directions [m].
+# Room between the sides of vehicles: where their ways cross, and where they pass each other in
+# parallel [m].
 CROSSING_MARGIN, PASSING_MARGIN = 0.8, 0.1
 # Lanes whose headings differ by more than this over a conflict are the two ways of one road.
 ONCOMING = 2.6
-# And by less than this those beside each other, without being neighbours in the file [rad].
+# Lanes whose headings differ by less than this run side by side, even if the file does not call
+# them neighbours [rad].
 ALONGSIDE = 0.2
 TURN = 0.45
-# A sign counts for the way behind it as far as this, while no other way joins [m].
+# A sign applies to the lanes that follow within this distance, until another lane joins [m].
 SIGN_REACH = 80.0
-# The way around a roundabout is no longer [m], and its radii differ by no larger factor.
+# A roundabout is no longer than this [m], and its radii differ by at most this factor.
 LARGEST_ROUNDABOUT, ROUND = 200.0, 1.4
 # Neighbours whose centres come as near as this join [m].
 JOINING = 1.2
-# Ways that join are one from where their centres are as near as this; what is left is no shorter
-# than a car [m].
+# Lanes that merge count as one from where their centres are this near; the merge before that is at
+# least as long as a car [m].
 JOINED, SHORTEST_MERGE = 0.8, 5.0
 _YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
 _PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
@@ -42,19 +44,20 @@ _PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
 
 class ConflictTable(NamedTuple):
     """
-    The rows (C) of `Conflicts`, and what they mean for lanes (L) and two widths of vehicle.
+    The rows (C) of `Conflicts`, and their extent on lanes (L) for two widths of vehicle.
 
-    :param first, rows: (L) first row of each lane, and how many it has.
+    :param first, rows: (L) first row of each lane, and number of its rows.
     :param lane, other: (C) lane of the row; the same conflict seen from the other lane.
     :param start, end: (2, C) arc lengths between which cars, or wide vehicles, touch [m]
     :param distance: (C) between the centre lines where they are nearest [m]
     :param margin: (C) between the sides of vehicles that pass each other there [m]
-    :param priority: (C) 1: this lane goes first, -1: the other, 0: whoever comes first; 2 and -2
-        the same where a roundabout is entered: also if the other stands.
+    :param priority: (C) 1: this lane has the right of way, -1: the other lane has it, 0: first
+        come, first served; 2 and -2: the same at the entry of a roundabout, even while the vehicle
+        with the right of way stands.
     :param merges: (C) whether the lanes join for good.
-    :param entry, leave: (2, L) where the first conflict of a lane begins, and where one is out of
-        everybody's way behind the last, for narrow and for wide vehicles; inf and 0 without one
-        [m]
+    :param entry, leave: (2, L) arc length at which the first conflict of a lane begins, and at
+        which a vehicle is clear of the last one, for narrow and for wide vehicles; inf and 0
+        without one [m]
     """
 
     first: IntArray
@@ -85,8 +88,8 @@ class Conflicts:
     The rows of a lane are `first[lane]:first[lane] + count[lane]`.
 
     :param graph: the lanes.
-    :param movements: of the lanes; made anew if not given.
-    :param side: on which vehicles keep.
+    :param movements: of the lanes; computed if not given.
+    :param side: of the road on which vehicles drive.
 
     Attribute `table`: the rows; its columns for cars are `lane`, `other`, `start`, `end` and
     `priority`.
@@ -99,7 +102,7 @@ class Conflicts:
         rows: list[tuple[int, int, _Stretch]] = []
         for i, j in _candidates(graph):
             here, there = _stretch(graph, i, j), _stretch(graph, j, i)
-            # Neighbours share a border; where one ends they may run into each other all the same.
+            # Neighbours share a border, but where one lane ends they may still merge.
             if here is None or there is None or _is_fork(graph, i, j, here, there):
                 continue
             rows += [(i, j, here), (j, i, there)]
@@ -118,10 +121,10 @@ class Conflicts:
         self.priority: IntArray = np.array(
             [_priority(movements, side, self.rank, ring, r[0], r[1]) for r in rows],
             dtype=np.int64)
-        # The ways join for good: one goes on behind the other.
+        # The lanes join for good: their vehicles continue one behind the other.
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
-        # Who has got that far is out of everybody's way.
+        # A vehicle that has got this far is clear of the conflict.
         clear = end.copy()
         joined = np.array([r[2].joined for r in rows], dtype=np.float64)[self.merges]
         clear[:, self.merges] = np.minimum(end[:, self.merges], np.maximum(
@@ -141,7 +144,7 @@ class Conflicts:
         return len(self.lane)
 
     def tapers(self) -> NDArray[np.bool_]:
-        """Return which lanes (L) end in a merge in which others go first, without a turn."""
+        """Return which lanes (L) end in a merge without a turn in which they have to yield."""
         graph = self._graph
         start = graph.yaw[graph.first[self.lane]] - graph.yaw[graph.first[self.lane[self.other]]]
         result = np.zeros(len(graph), dtype=bool)
@@ -169,10 +172,10 @@ def _same_way(graph: LaneGraph, i: int, j: int) -> bool:
 
 class _Stretch(NamedTuple):
     """
-    Where a lane is within reach of another: for cars and for wide vehicles [m].
+    The stretch of a lane within reach of another: for cars and for wide vehicles [m].
 
-    :param joined: from there on both are one up to their ends: whoever is on one is ahead of, or
-        behind, whoever is on the other, and nobody has to have left it before the next goes there.
+    :param joined: arc length from which both lanes are one up to their ends: vehicles on them
+        follow each other, and the next may enter before the first has left.
     """
 
     start: tuple[float, float]
@@ -188,13 +191,14 @@ def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
     there = cKDTree(np.stack((graph.x[b], graph.y[b]), axis=-1))
     distance, nearest = there.query(np.stack((graph.x[a], graph.y[a]), axis=-1))
     turn = np.abs(np.angle(np.exp(1j * (graph.yaw[a] - graph.yaw[b][nearest]))))
-    # Who comes towards one, or drives beside, keeps to the lane as well: little room is enough.
+    # Vehicles that come towards each other or drive side by side keep to their lanes: little room
+    # is enough.
     about = turn[distance < WIDE]
     beside = bool((about < ALONGSIDE).all()) and float(distance.min()) > PASSING_MARGIN + NARROW
     margin = PASSING_MARGIN if beside or bool((about > ONCOMING).all()) else CROSSING_MARGIN
     reach = 0.5 * (WIDEST + WIDEST) + margin
     close = np.flatnonzero(distance < min(reach, WIDE))
-    # Touching ends are those of consecutive ways, of which nobody gets into the other's.
+    # Lanes whose ends touch follow each other: vehicles on them are not in each other's way.
     if not len(close) or (distance.min() > 0.5 * WIDTH and len(close) < 4):
         return None
     near = np.flatnonzero(distance < min(reach, WIDTH))
@@ -208,7 +212,7 @@ def _stretch(graph: LaneGraph, i: int, j: int) -> _Stretch | None:
 
 
 def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch) -> bool:
-    """Return whether two lanes only part: they begin together, or one ends where other begins."""
+    """Return whether two lanes only part: they begin together, or one ends where one begins."""
     here, there = (first.start[0], first.end[0]), (second.start[0], second.end[0])
     a, b = int(graph.first[i]), int(graph.first[j])
     between = float(np.hypot(graph.x[a] - graph.x[b], graph.y[a] - graph.y[b]))
@@ -220,7 +224,7 @@ def _is_fork(graph: LaneGraph, i: int, j: int, first: _Stretch, second: _Stretch
 
 
 def _rank(graph: LaneGraph, lane: int) -> int:
-    """Return what signs before a lane say: 2 priority, 0 yield, 1 nothing."""
+    """Return the rank that signs before a lane give it: 2 priority, 1 no sign, 0 yield."""
     roads = graph.network.lanelet_network
     current, distance, seen = lane, 0.0, {lane}
     while True:
@@ -239,7 +243,7 @@ def _rank(graph: LaneGraph, lane: int) -> int:
 
 
 def roundabouts(graph: LaneGraph) -> NDArray[np.bool_]:
-    """Return which lanes (L) go around in a small circle."""
+    """Return which lanes (L) belong to a roundabout: a small closed circle."""
     result = np.zeros(len(graph), dtype=bool)
     for lane in range(len(graph)):
         way = () if result[lane] else _way_around(graph, lane)
@@ -254,7 +258,7 @@ def roundabouts(graph: LaneGraph) -> NDArray[np.bool_]:
 
 
 def _way_around(graph: LaneGraph, lane: int) -> tuple[int, ...]:
-    """Return the lanes of the shortest way from a lane back to it; none if that is long."""
+    """Return the lanes of the shortest way from a lane back to itself; none if it is too long."""
     heap: list[tuple[float, tuple[int, ...]]] = [(float(graph.length[lane]), (lane,))]
     seen = {lane}
     while heap:
@@ -272,9 +276,10 @@ def _way_around(graph: LaneGraph, lane: int) -> tuple[int, ...]:
 def _priority(movements: Movements, side: DrivingSide, rank: IntArray, ring: NDArray[np.bool_],
               i: int, j: int) -> int:
     """
-    Decide between two lanes.
+    Return the right of way of lane i over lane j, as in `ConflictTable.priority`.
 
-    Signs, then who goes around, then the turn across yields, then priority to the right.
+    Signs decide first. Then traffic in a roundabout has the right of way, then a turn across
+    oncoming traffic yields, and then priority to the right holds.
     """
     inside = 2 if ring[i] != ring[j] else 1
     if rank[i] != rank[j]:
@@ -282,7 +287,7 @@ def _priority(movements: Movements, side: DrivingSide, rank: IntArray, ring: NDA
         return (inside if ring[i] == first else 1) * (1 if first else -1)
     if ring[i] != ring[j]:
         return 2 if ring[i] else -2
-    # Between the ways over the whole junction: a lanelet may be the end of a turn only.
+    # Movements through the whole junction count: a lanelet may be only the end of a turn.
     turn = wrap_pi(float(movements.heading[j] - movements.heading[i]))
     if abs(turn) > 2.2:
         across = [_turns_across(movements, side, lane) for lane in (i, j)]
@@ -290,7 +295,7 @@ def _priority(movements: Movements, side: DrivingSide, rank: IntArray, ring: NDA
     if abs(turn) < 0.6:
         bend = [abs(float(movements.angle[lane])) for lane in (i, j)]
         return 0 if abs(bend[0] - bend[1]) < 0.2 else 1 if bend[0] < bend[1] else -1
-    # Who comes from the right drives to the left.
+    # A vehicle that comes from the right has a heading turned to the left.
     return -1 if (turn > 0.0) is not side.priority_to_left else 1
 
 

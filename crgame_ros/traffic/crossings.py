@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Crossing and merging: who goes first, by right of way and gap acceptance."""
+"""Crossing and merging by right of way and gap acceptance."""
 
 import math
 
@@ -22,23 +22,24 @@ from crgame_ros.traffic.meetings import (
 from crgame_ros.vehicle.state import STANDING
 import numpy as np
 
-# Nearer to where one waits is first there [m].
+# An agent nearer than this to its waiting place is the first there [m].
 AT_LINE = 3.0
-# Who can halt with this lets somebody go who has waited very long [m/s^2].
+# An agent that can halt with this braking lets another go that has waited very long [m/s^2].
 MERCY = 1.5
-# A grant ends so far behind its junction [m].
+# A grant ends this far behind its junction [m].
 PASSED = 1.0
 
 
 class Crossings:
     """
-    Lets agents into junctions.
+    The admission of agents to junctions.
 
     An agent waits before a junction until it is let in. It is let in for all conflicts of the
-    junction at once: when everybody who has the right of way, and everybody already let in, gets
-    to them in sufficient time before or after it, and there is room behind. One is let in after
-    the other; among those let in whoever was first goes first, unless that one waits for the
-    other itself. Who stands in a circle of waiting is found by `waiting`.
+    junction at once. This happens when all vehicles that have the right of way, and all already
+    let in, pass the conflicts in sufficient time before or after it, and there is room behind the
+    junction. Agents are let in one after the other. Among agents that were let in, the one let in
+    first goes first, unless it waits for the other itself. `waiting` finds agents that wait for
+    each other in a circle.
 
     :param conflicts: of the lanes.
     :param rules: of passing.
@@ -54,12 +55,13 @@ class Crossings:
     def halts(self, k: int, agents: Agents, way: Ways, passage: Passages, arrivals: Arrivals,
               situation: Situation, elapsed_s: float) -> tuple[FloatArray, BoolArray]:
         """
-        Let agents (A) in, and tell where the others halt.
+        Let agents (A) into junctions, and return where the others halt.
+
+        The agent for which one halts is written to `Agents.blocker`.
 
         :param elapsed_s: time since the last call [s]
-        :return: (A) distance of the front from where it has to halt, or inf [m]; for whom is
-            noted in `Agents.blocker`. And (A) who is first before a junction behind which there
-            is no room.
+        :return: (A) distance of the front from where it has to halt, or inf [m], and (A) whether
+            an agent is the first before a junction behind which there is no room.
         """
         return _halts(self._conflicts, self._rules, self._ticks, elapsed_s, k,
                       agents.table, way, passage, arrivals, situation)
@@ -79,10 +81,10 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     halt = np.full(count, math.inf)
     for i, slot in enumerate(slots):
-        # Nobody is let in past somebody who waits before the same junction.
+        # No agent is let in past another that waits before the same junction.
         stopped[i] = min(at.light[i], at.queued[i]) < passage.hold[i] + 2.0
         full[i] = is_full(rules, promised, agents, slot, way, passage, at, i)
-    # For who has waited very long others leave the room behind the junction.
+    # Other agents leave the room behind the junction to an agent that has waited very long.
     first = full & ~stopped
     next_in = first & (agents.waits[slots] > ticks[3])
     meeting = meet(conflicts, rules, agents, way, passage, arrivals, at, stopped | full, first,
@@ -97,7 +99,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
         slot = slots[i]
         if passage.first[i] < 0 or halt[i] < math.inf:
             continue
-        # Those let in before it take room as well.
+        # Agents let in before it take room as well.
         full[i] = full[i] or is_full(rules, promised, agents, slot, way, passage, at, i)
         if passage.hold[i] < -1.0 or _may_enter(
                 rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
@@ -114,11 +116,11 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
 
 @compiled
 def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, i: int) -> None:
-    """Let an agent into its next junction: it holds no more before that."""
+    """Let an agent into its next junction, so that it no longer waits before it."""
     if agents.grant[slot] < 0:
         agents.grant_hold[slot] = passage.hold[i]
     else:
-        # It stays the first where it is already.
+        # It keeps its rank in the junction that it is in.
         agents.before[slot], agents.before_until[slot] = agents.grant[slot], agents.until[slot]
         passage.before[i] = passage.granted[i]
     agents.grant[slot] = k
@@ -129,17 +131,17 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
 
 @compiled
 def _is_near(speed: float, hold: float) -> bool:
-    """Return whether a junction is so near that one asks to be let in."""
+    """Return whether a junction is so near that an agent asks to be let in."""
     return hold < 10.0 + 1.5 * speed + speed * speed / (2.0 * MERCY)
 
 
 @compiled
 def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> None:
-    """Take back what agents were granted that have passed their junction."""
+    """End the grants of agents that have passed their junction."""
     for i, slot in enumerate(slots):
         if agents.grant[slot] < 0:
             continue
-        # A lane may be on the way again later: how far it is counts as well.
+        # The same lane may come again later on the way, so the distance counts as well.
         agents.grant_left[slot] -= agents.speed[slot] * dt_s
         agents.grant_hold[slot] -= agents.speed[slot] * dt_s
         ahead = False
@@ -153,7 +155,7 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
 @compiled
 def _see_junctions(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Passages,
                    dt_s: float) -> None:
-    """Let those who yield late see a junction at the last tick at which hard braking is enough."""
+    """Mark when late drivers notice a junction: at the last tick at which hard braking helps."""
     for i, slot in enumerate(slots):
         hold = agents.grant_hold[slot] if agents.grant[slot] >= 0 else passage.hold[i]
         speed = agents.speed[slot]
@@ -163,13 +165,13 @@ def _see_junctions(rules: CrossingRules, agents: AgentTable, slots: IntArray, pa
 
 @compiled
 def _heeds(agents: AgentTable, slot: int) -> bool:
-    """Return whether an agent yields to whom it has to: late ones do not before they see it."""
+    """Return whether an agent obeys the right of way: a late one does once it has noticed."""
     return bool(agents.sees[slot] or not agents.late[slot])
 
 
 @compiled
 def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
-    """Order agents: who insists, then who has stood for longest, then the lower number."""
+    """Return the order of agents: those that insist, then longest standing, then lower number."""
     key = np.empty(len(slots))
     for i, slot in enumerate(slots):
         key[i] = -agents.waits[slot] - (1e9 if agents.insists_until[slot] > k else 0.0)
@@ -179,7 +181,7 @@ def _in_turn(k: int, agents: AgentTable, slots: IntArray) -> IntArray:
 @compiled
 def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, i: int) -> bool:
-    """Return whether an agent gives up its right to enter, while that is easy, or late."""
+    """Return whether an agent gives up its grant; only a late driver does so by hard braking."""
     slot = at.slots[i]
     speed, hold = agents.speed[slot], agents.grant_hold[slot]
     easy = speed**2 <= 2.0 * rules.withdrawal * hold
@@ -198,7 +200,7 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable,
                passage: Passages, meeting: Meetings, at: Situation, stopped: BoolArray,
                full: BoolArray, i: int) -> bool:
-    """Return whether an agent is let in now; note for whom it waits otherwise."""
+    """Return whether an agent is let in now; write what it waits for otherwise."""
     slot = at.slots[i]
     speed = agents.speed[slot]
     if not _is_near(speed, passage.hold[i]):
@@ -223,7 +225,7 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 @compiled
 def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
-    """Return whether an agent lets somebody go first who has waited very long."""
+    """Return whether an agent lets another go first that has waited very long."""
     who = meeting.who[n]
     if who < 0 or meeting.apart[n] or agents.insists_until[at.slots[i]] > k:
         return False
@@ -248,7 +250,7 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
     if is_let_in(agents, them, passage, who, meeting.theirs[n]):
         return True
     waits, theirs = agents.waits[slot], agents.waits[them]
-    # Among those who stand, whoever has stood for longest goes first.
+    # Of two standing agents the one that has stood longer goes first.
     longer = waits > theirs or (waits == theirs and i < who)
     patient = meeting.priority[n] > -2 and waits > ticks[0] and theirs > 0 and longer
     patient |= meeting.courteous[n] and waits > (ticks[1] if meeting.joins[n] else ticks[3])
@@ -258,7 +260,7 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
 @compiled
 def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
                  at: Situation, i: int) -> float:
-    """Return the distance at which who was let in halts before a conflict that is taken."""
+    """Return the distance at which an agent that was let in halts before a taken conflict."""
     slot = at.slots[i]
     result = math.inf
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
@@ -266,7 +268,7 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
         if meeting.apart[n] or meeting.into[n] >= result or (
                 meeting.step[n] > passage.granted[i]):
             continue
-        # Who cannot stop before it any more had better be quick.
+        # An agent that cannot stop before the conflict any more drives on.
         if agents.speed[slot]**2 > 8.0 * max(meeting.into[n], 0.1):
             continue
         if who < 0:
@@ -284,12 +286,12 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
 @compiled
 def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
-    """Return whether the other of a meeting, who was let in, goes before an agent that was."""
+    """Return whether the other of a meeting goes before an agent, both having been let in."""
     who = meeting.who[n]
     slot, them = at.slots[i], at.slots[who]
     grant = _admission_tick(agents, slot, passage, i, meeting.step[n])
     theirs = _admission_tick(agents, them, passage, who, meeting.theirs[n])
-    # Who stands behind the agent, or waits for it, lets it go.
+    # An agent whose leader is this one lets it go.
     if agents.leader[them] == slot:
         return False
     if agents.insists_until[slot] > k and agents.speed[them] < 1.0:

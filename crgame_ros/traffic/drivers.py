@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What drivers make of what they have decided: late, not quite, or not at all."""
+"""Desired speeds, habits and imperfections of the agents' drivers."""
 
 from crgame_ros.game.events import ALL_AGENTS, TrafficChange
 from crgame_ros.game.traffic_spec import MAX_REACTION_TIME, TrafficSpec
@@ -10,33 +10,34 @@ from crgame_ros.traffic.leaders import Followers
 import numpy as np
 from numpy.typing import NDArray
 
-# Nobody wants to drive at less of the limit; and who wants a speed of its own does not look at it.
+# Least share of the speed limit that a driver desires; share of a driver whose own desired speed
+# replaces the limit.
 LEAST, UNLIMITED = 0.1, 1e6
 
 
 class DesiredSpeeds:
     """
-    Gives newcomers their desired speeds, and changes those of agents on the road.
+    The desired speeds of newcomers and of agents on the road.
 
     :param mean: of desired speed over speed limit.
-    :param spread: its standard deviation between drivers.
+    :param spread: its relative standard deviation between drivers.
     :param generator: of random numbers.
     """
 
     def __init__(self, mean: float, spread: float, generator: np.random.Generator) -> None:
         self._first_mean = self._mean = mean
         self._spread, self._random = spread, generator
-        # What events said of single agents, and of all: factor and own limit [m/s].
+        # Factor and own limit [m/s] that events have set for single agents, and for all.
         self._said: dict[int, tuple[float, float]] = {}
         self._said_of_all: tuple[float, float] | None = None
 
     def draw(self, agents: Agents, slot: int) -> None:
-        """Give an agent a share of the limit at random."""
+        """Draw an agent's share of the speed limit at random."""
         deviation = float(np.clip(self._random.standard_normal(), -2.0, 2.0))
         self._settle(agents, slot, max(LEAST, self._mean * (1.0 + self._spread * deviation)))
 
     def record(self, agents: Agents, slot: int, factor: float) -> None:
-        """Give an agent the share of the limit that it was recorded with."""
+        """Set an agent's share of the speed limit to the recorded one."""
         self._settle(agents, slot, factor * (self._mean / self._first_mean))
 
     def _settle(self, agents: Agents, slot: int, factor: float) -> None:
@@ -45,7 +46,7 @@ class DesiredSpeeds:
             slot, self._said_of_all or (factor, agents.type_top[slot]))
 
     def change(self, change: TrafficChange, agents: Agents, slots: IntArray) -> None:
-        """Let agents want other speeds; the mean of all is changed, not who is how far from it."""
+        """Change desired speeds; of all agents it is the mean, not the deviation of each."""
         factor, speed = change.speed_factor, change.desired_speed
         if factor is None and speed is None:
             return
@@ -64,21 +65,22 @@ class DesiredSpeeds:
             agents.factor[slot], agents.top[slot] = said
 
 
-# [m/s]
+# Below this speed drivers brake without reaction time [m/s].
 WALKING = 2.0
 
 
 class Drivers:
     """
-    The habits and failings of the agents' drivers (A); without any nothing is drawn at random.
+    The habits and failings of the agents' drivers (A); without any, no random number is drawn.
 
-    :param spec: of those that begin.
-    :param agents: whose `late` is set.
+    :param spec: of the traffic at the start.
+    :param agents: the agents; their `late` is set.
     :param followers: their car-following models.
     :param time_step_s: Delta t_c [s]
     :param generator: of random numbers.
 
-    Attributes (A): `run_lights`: who ignores traffic lights; `politeness`; `change_lanes`.
+    Attributes (A): `run_lights`: whether a driver ignores traffic lights; `politeness`;
+    `change_lanes`.
     """
 
     def __init__(self, spec: TrafficSpec, agents: Agents, followers: Followers,
@@ -92,7 +94,7 @@ class Drivers:
         agents.late[:] = self._some(spec.late_yielders)
         self._imperfection = np.full(count, spec.imperfection)
         self._delay = np.full(count, self._ticks(spec.reaction_time))
-        # What was decided at the last ticks; NaN for those who were not there.
+        # Decisions of the last ticks; NaN for agents that were absent.
         self._decided = np.full((self._ticks(MAX_REACTION_TIME) + 1, count), np.nan)
         self._last_k = -2**62
 
@@ -105,7 +107,7 @@ class Drivers:
         return round(seconds / self._time_step_s)
 
     def change(self, change: TrafficChange, slots: IntArray) -> None:
-        """Let drivers drive otherwise from their next decision on, but for desired speeds."""
+        """Change all but the desired speeds of drivers from their next decision on."""
         for values, value in (
                 (self.politeness, change.politeness), (self.change_lanes, change.lane_changes),
                 (self.run_lights, change.red_runner), (self._agents.late, change.late_yielder),
@@ -118,7 +120,7 @@ class Drivers:
             self._followers.change(slots, change.options)
 
     def do(self, k: int, agents: Agents, slots: IntArray, wanted: FloatArray) -> FloatArray:
-        """Return the accelerations (A) that come of those that are wanted (A) [m/s^2]."""
+        """Return the accelerations (A) after reaction time and imperfection [m/s^2]."""
         if self._imperfection.any():
             failure = self._imperfection[slots] * self._followers.max_acceleration[slots]
             wanted = wanted - failure * self._random.random(len(slots)) * (
@@ -131,7 +133,7 @@ class Drivers:
             decided[k % size] = np.nan
             decided[k % size, slots] = wanted
             before = decided[(k - self._delay[slots]) % size, slots]
-            # At walking pace the foot is on the brake.
+            # At walking pace the foot is on the brake: braking takes no reaction time.
             ready = np.isnan(before) | ((agents.speed[slots] < WALKING) & (wanted < before))
             wanted = np.where(ready, wanted, before)
         return wanted

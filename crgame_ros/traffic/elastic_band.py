@@ -15,11 +15,11 @@ from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
-# Stiffness of an obstacle: that of the band at a node is 4 m / step, about 80, where it swerves
-# once, and up to 6 (m / step)^4 where it is squeezed between obstacles on both sides.
+# Stiffness of an obstacle. The band's own stiffness at a node is 4 m / step, about 80, where it
+# swerves once, and up to 6 (m / step)^4 where it is squeezed between obstacles on both sides.
 REPULSION = 1e8
 ITERATIONS = 100
-# Less intrusion than this is none [m].
+# Less intrusion than this counts as none [m].
 ENOUGH = 5e-4
 # A band that intrudes further than this could not be bent as wanted [m].
 TOLERANCE = 0.02
@@ -35,8 +35,8 @@ class Bands(NamedTuple):
     :param slope: (L, S) d'
     :param curvature: (L, S) d'', to be added to the lane's own [1/m]
     :param blocked_lane: (B,) lanes that are blocked
-    :param blocked_s: (B,) where: the near edge of what blocks, for agents behind it the rear of a
-        standing leader; by lane, then along it [m]
+    :param blocked_s: (B,) arc length of the near edge of the blockage, which agents behind it
+        treat as the rear of a standing leader; sorted by lane, then along it [m]
     """
 
     d: Array
@@ -54,7 +54,7 @@ class Bands(NamedTuple):
 
 class ElasticBand:
     """
-    Plan the references of lanes around standing obstacles (FS M1).
+    A planner of the lanes' references around standing obstacles (FS M1).
 
     An elastic band in the sense of Quinlan and Khatib (1993) and Gu et al. (2015): internal
     forces contract it to the centre line and keep it smooth, obstacles repel it. In the lane's
@@ -67,9 +67,8 @@ class ElasticBand:
     one narrow obstacle that needs an offset D the solution is D (1 + x / m) exp(-x / m) at the
     distance x, with the greatest curvature D / m^2. With m = t v the swerve takes D / t^2 of
     lateral acceleration at the lane's speed v. Where obstacles follow each other too closely for
-    that, it bends as much as they demand: agents have to slow down for the curvature that they
-    find. The reference of a lane is kept until something changes: obstacles that stand still cost
-    time once.
+    that, the band bends more sharply, and agents slow down for its curvature. The reference of a
+    lane is kept until something changes, so that standing obstacles cost time only once.
 
     :param step: distance between nodes [m]
     :param clearance: wanted between the sides of a vehicle and an obstacle (ours) [m]
@@ -80,9 +79,10 @@ class ElasticBand:
     :param min_band_length: shortest m (ours) [m]
     :param max_curvature: a band that needs more is blocked: about that of a car's turning circle
         of 12 m [1/m]
-    :param wide_half_width: of the widest vehicles: the band is theirs too wherever there is room
-        for them with the least clearance; None without such [m]
-    :param keeps_left: whether traffic does; between equal sides the band takes the road's middle
+    :param wide_half_width: of the widest vehicles: the band suits them too wherever there is room
+        for them with the least clearance; None without such vehicles [m]
+    :param keeps_left: whether traffic does; between equal sides the band takes the one towards the
+        middle of the road
     """
 
     def __init__(self, step: float = 1.0, clearance: float = 0.5, min_clearance: float = 0.2,
@@ -117,7 +117,7 @@ class ElasticBand:
         :param left: (L, S) room to the left of the centre line at s = 0, step, ...: half the
             lane and what may be borrowed of its neighbour; 0 beyond the end of the lane [m]
         :param right: (L, S) to the right [m]
-        :param speed: (L,) that swerves are to be comfortable for [m/s]
+        :param speed: (L,) at which swerves are comfortable [m/s]
         :param obstacles: all of them, of any lane
         """
         d = np.zeros_like(left)
@@ -159,7 +159,7 @@ class ElasticBand:
             if worst is None:
                 return d, sorted(blocked)
             if for_wide and self._rules.wide_half_width > self._rules.half_width:
-                # What bends too much for the widest may do for the others.
+                # A band that is too sharp for the widest vehicles may suit the others.
                 return self._relax_lane(left, right, speed, obstacles, False)
             nearest = min(passages, key=lambda passage: max(
                 passage.first - worst, worst - passage.first - len(passage.low), 0))
@@ -230,9 +230,9 @@ def _band(low: Array, high: Array, stiffness: float) -> Array:
 
 def _peaks(intrusion: Array, sign: int) -> NDArray[np.intp]:
     """
-    Find where a band intrudes most: the ends and the worst node of each stretch where it does.
+    Find where a band intrudes most: the ends and the worst node of each stretch of intrusion.
 
-    :return: (k, 2) nodes, and the sign of the force that would help
+    :return: (k, 2) nodes, and the sign of the force that pushes the band out
     """
     nodes = np.flatnonzero(intrusion > ENOUGH)
     if not len(nodes):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who is really in the way of whom, and how hard one has to brake for that."""
+"""Encounters of two agents: whether they touch, and how hard one has to brake."""
 
 import math
 
@@ -19,35 +19,38 @@ from crgame_ros.traffic.motion import onward
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.pursuit import curve_shift, swing_out
 
-# Harder than this is braked only where it takes that to halt behind somebody [m/s^2].
+# Agents brake harder than this only where they cannot halt behind a leader otherwise [m/s^2].
 FIRMEST = 3.9
-# Whoever is ahead is expected to brake with this, if it doesn't brake harder already [m/s^2].
+# A leader is expected to brake with this, if it doesn't brake harder already [m/s^2].
 THEIRS = 4.0
 # Room left when that happens [m].
 LAST_GAP = 0.3
-# Who drives across has been waited for or will be gone; this much is no alarm yet [m/s^2].
+# For an agent that drives across no braking is considered until this much is needed to halt before
+# it: the right of way has usually settled the encounter [m/s^2].
 ALARM = 2.0
-# Brakings that are tried, from the gentlest on [m/s^2]; up to `SMOOTH` they take `ONSET` [s].
+# Decelerations that are tried, the gentlest first; up to `SMOOTH` [m/s^2] they set in after
+# `ONSET` [s].
 TRIED = (2.0, 3.0, 3.9, 6.0, 8.0)
 SMOOTH, ONSET = 3.0, 0.3
-# Hardest braking does no harm when they touch so soon [s].
+# If contact is this near and no braking avoids it, the hardest is used [s].
 LAST_MOMENT = 1.0
-# With more than this nobody brakes for somebody who appears beside its way [m/s^2].
+# Agents brake no harder than this for another that appears beside their way [m/s^2].
 GENTLY = 2.0
-# So far ahead both are followed, and at such times [s].
+# Both agents are predicted for this time, in these steps [s].
 FORESEEN, STEP = 3.0, 0.15
-# Who comes from the side leaves offset and heading that it has now behind in so much way [m].
+# The present offset and heading error of a predicted agent decay over this distance [m].
 STRAIGHTENS = 5.0
-# Room that two keep, each around itself: beside, and so many times that before and behind [m];
-# while they brush past each other in lanes of their own it is little.
+# Room that each of two agents keeps beside it [m], and how many times as much before and behind;
+# for agents that brush past each other in lanes of their own the room beside is smaller [m].
 BESIDE, BEFORE, BRUSH_BESIDE = 0.1, 2.5, 0.03
-# So far ahead of who brushes past is looked [s], and who stands asks whether it can creep [m/s].
+# How far ahead a brush is predicted [s], and the speed assumed for a standing agent [m/s].
 BRUSH_TIME, CREEP = 1.2, 0.5
-# And in so many lanes of the way.
+# In how many lanes of the way a brush is predicted.
 BRUSH_LANES = 3
-# Slower along the road than this it is crossed, not driven along [m/s].
+# Slower along the road than this an obstacle crosses the road [m/s].
 ACROSS = 2.0
-# Between passing and the arrival of who walks into the way [s], and beside it [m].
+# Time between passing and the arrival of a person that walks into the way [s], and room beside
+# [m].
 SPARE_TIME, SPARE_ROOM = 0.4, 0.4
 
 
@@ -55,14 +58,14 @@ SPARE_TIME, SPARE_ROOM = 0.4, 0.4
 def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, entries: Entries,
              pairs: Pairs, corridor: Corridors, wanted: FloatArray, result: FloatArray) -> None:
     """
-    Lower accelerations (A) to what a model of car following wants, or the encounter demands.
+    Lower accelerations (A) to what the car-following model wants, or the encounter demands.
 
-    Behind who drives the same way nothing above `FIRMEST` unless that is what it takes to halt
-    when the other does. For another agent that drives across only the last moment to brake
-    counts, and nothing if both pass each other as they go; for who walks into the way nothing
-    if one has passed before.
+    Behind a leader in the same direction braking is `FIRMEST` at most, unless more is needed to
+    halt when the leader does. For another agent that drives across, only the last moment to brake
+    counts, and there is no braking if both pass each other as they go. For an object that moves
+    into the way from the side there is none if the agent passes before.
 
-    :param corridor: what agents (A) take.
+    :param corridor: room that agents (A) take.
     :param wanted: (P) by the model [m/s^2]
     """
     for p in range(len(pairs.agent)):
@@ -89,10 +92,10 @@ def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, entries:
 def brush(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
           entries: Entries, way: Ways, result: FloatArray) -> None:
     """
-    Lower accelerations (A) so that agents don't touch who pokes into their lanes from another.
+    Lower accelerations (A) so that agents don't touch others that reach into their lanes.
 
-    Where ways part, join or turn beside each other somebody may be in none's way and yet touch.
-    Of two the one that is behind brakes; for who stands everybody does.
+    Where lanes fork, merge or turn beside each other, two agents may touch although neither is
+    the other's leader. Of the two the one behind brakes. For a standing agent all others brake.
     """
     for i, slot in enumerate(slots):
         reach = 0.5 * agents.length[slot] + 3.0 + BRUSH_TIME * agents.speed[slot]
@@ -114,7 +117,7 @@ def brush(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntA
 @bare
 def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
              other: int) -> float:
-    """Return the acceleration with which an agent does not touch another, inf for any [m/s^2]."""
+    """Return the acceleration with which an agent does not touch another, inf if any [m/s^2]."""
     east, north = agents.x[other] - agents.x[slot], agents.y[other] - agents.y[slot]
     mine = east * math.cos(agents.yaw[slot]) + north * math.sin(agents.yaw[slot])
     theirs = -east * math.cos(agents.yaw[other]) - north * math.sin(agents.yaw[other])
@@ -136,7 +139,7 @@ def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: in
 def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
                   slot: int) -> bool:
     """
-    Return whether somebody cannot help touching an agent that has just appeared on its own way.
+    Return whether another agent, even with gentle braking, touches one that has just appeared.
 
     :param slots: (A) of the agents on the road.
     """
@@ -156,7 +159,7 @@ def is_in_the_way(lanes: LaneTable, following: IntArray, agents: AgentTable, slo
 @bare
 def _passes_before(agents: AgentTable, slot: int, entries: Entries, n: int, gap: float,
                    low: float, high: float) -> bool:
-    """Return whether an agent has passed when somebody beside its way gets there."""
+    """Return whether an agent has passed before an object beside its way gets there."""
     aside, drift = entries.aside[n], entries.drift[n]
     if aside > 0.1:
         rest = low - SPARE_ROOM - (entries.high[n] - max(drift, 0.0))
@@ -180,7 +183,7 @@ def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, sl
     braking = _gentlest(lanes, following, agents, slot, speed, other, FORESEEN, BESIDE)
     if braking < math.inf:
         return braking
-    # Nothing that this one does helps now; the other may do something.
+    # No braking of this agent helps now, but the other may react.
     return TRIED[-1] if soon < LAST_MOMENT else FIRMEST
 
 
@@ -199,10 +202,10 @@ def _gentlest(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: i
 def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int, speed: float,
            other: int, braking: float, foreseen: float, beside: float) -> float:
     """
-    Return when two agents touch if one brakes and the other goes on as it does, or inf [s].
+    Return when two agents touch if one brakes and the other drives on as now, or inf [s].
 
-    :param speed: of the one [m/s]
-    :param foreseen: how far ahead it is looked [s]; 0 tells whether they touch now.
+    :param speed: of the one that brakes [m/s]
+    :param foreseen: time of the prediction [s]; 0 checks whether they touch now.
     :param beside: room around each [m]
     """
     mine, theirs = _start(lanes, agents, slot), _start(lanes, agents, other)
@@ -224,7 +227,7 @@ def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
 
 @inlined
 def _rolled(speed: float, braking: float, time: float) -> float:
-    """Return the way within a time when braking [m]."""
+    """Return the distance driven within a time when braking [m]."""
     if braking > 0.0:
         time = min(time, speed / braking)
     return speed * time - 0.5 * braking * time * time
@@ -232,7 +235,7 @@ def _rolled(speed: float, braking: float, time: float) -> float:
 
 @inlined
 def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
-    """Return where the rear axle is in the lane, besides where it steers for, and how it turns."""
+    """Return s of the rear axle, its offset from where it steers for, and its heading error."""
     lane = agents.lane[slot]
     s, d, yaw = project_on(lanes, lane, agents.x[slot], agents.y[slot],
                            agents.s[slot] - agents.rear_to_center[slot], 2)
@@ -241,7 +244,7 @@ def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, floa
 
 @inlined
 def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float) -> float:
-    """Return how far to the left of a bend's middle the rear axle runs [m]."""
+    """Return how far to the left of the lane's centre line the rear axle runs [m]."""
     front = agents.rear_to_center[slot] + 0.5 * agents.length[slot]
     at = lanes.line[nearest_row(lanes, lane, s)]
     return curve_shift(at.curvature, front) + swing_out(at.swing, at.swing_long, front)
@@ -250,7 +253,7 @@ def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float)
 @bare
 def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                 start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
-    """Foresee x, y and heading of an agent's centre after some way along its route [m, rad]."""
+    """Predict x, y and heading of an agent's centre after a distance on its route [m, rad]."""
     lane, s = onward(lanes, following, agents.destination[slot], agents.lane[slot],
                      start[0] + way)
     x, y, yaw = point_on(lanes, lane, s)
@@ -265,7 +268,7 @@ def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
 @bare
 def _overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
              width: float, other_length: float, other_width: float) -> bool:
-    """Return whether two rectangles, given by half their sizes, overlap: no axis parts them."""
+    """Return whether two rectangles, given by half their sizes, overlap (separating axes)."""
     cos, sin = abs(math.cos(other_yaw - yaw)), abs(math.sin(other_yaw - yaw))
     for turn, along, aside, their_along, their_aside in (
             (yaw, length, width, other_length, other_width),

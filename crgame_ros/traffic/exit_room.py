@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Room behind junctions: who queues there, and to whom it is promised."""
+"""Room behind junctions: the queues there, and the room promised to agents let in."""
 
 import math
 from typing import NamedTuple
@@ -14,9 +14,9 @@ from crgame_ros.traffic.meetings import CrossingRules, Situation
 from crgame_ros.traffic.placement import Entries
 import numpy as np
 
-# A leader that is faster drives on [m/s].
+# A leader that is faster is not expected to stop [m/s].
 DRIVES_ON = 3.0
-# Between those who queue [m].
+# Gap between vehicles in a queue [m].
 QUEUE_GAP = 2.0
 
 
@@ -24,10 +24,10 @@ QUEUE_GAP = 2.0
 def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
            passage: Passages) -> tuple[FloatArray, FloatArray]:
     """
-    Look at who is ahead of agents (A), before a junction or behind it.
+    Find the queues ahead of agents (A), before a junction or behind it.
 
-    Whoever drives on makes room, but no farther than to where it waits before its next junction,
-    and those in between queue behind it.
+    A leader that drives on makes room, but no farther than to its own waiting place before its
+    next junction. The vehicles in between queue behind it.
 
     :return: `Situation.rear_stop` and `Situation.queued`
     """
@@ -52,10 +52,10 @@ def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
 
 class Promises(NamedTuple):
     """
-    Room promised to those let into junctions who have not left them yet.
+    Room promised to agents that were let into junctions and have not left them yet.
 
     :param behind: (L) at the beginning of each lane behind a junction [m]
-    :param through: (L) of that, to those who get there through each lane [m]
+    :param through: (L) the part of it promised to agents that get there through each lane [m]
     """
 
     behind: FloatArray
@@ -65,7 +65,7 @@ class Promises(NamedTuple):
 @compiled
 def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, passage: Passages,
             i: int) -> None:
-    """Keep room behind its junction for an agent that was let in."""
+    """Reserve room behind its junction for an agent that was let in."""
     step = passage.granted[i]
     if 0 <= step < way.depth[i] - 1:
         room = agents.length[slot] + QUEUE_GAP
@@ -78,7 +78,7 @@ def is_full(rules: CrossingRules, promised: Promises, agents: AgentTable, slot: 
             passage: Passages, at: Situation, i: int) -> bool:
     """Return whether there is no room for an agent behind its next junction."""
     step = passage.last[i]
-    # Whoever goes there through the same lane is ahead, and was counted there.
+    # Agents that go there through the same lane are leaders and already count in `rear_stop`.
     taken = 0.0
     if 0 <= step < way.depth[i] - 1:
         taken = promised.behind[way.lane[i, step + 1]] - promised.through[way.lane[i, step]]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who will be in which conflict when: the passages of agents, and the ways of all others."""
+"""Arrivals at conflicts: the passages of agents through junctions, and the ways of others."""
 
 import math
 from typing import NamedTuple
@@ -15,11 +15,11 @@ from crgame_ros.traffic.placement import Entries
 import numpy as np
 from numpy.typing import NDArray
 
-# With less room than this before a conflict nobody waits inside the junction [m].
+# Agents do not wait inside a junction with less room than this before a conflict [m].
 WAITING_ROOM = 15.0
-# But with more than this, besides its own length, in a junction too long to be seen whole [m].
+# In a junction longer than an agent sees it waits with more room than this beyond its length [m].
 BETWEEN = 3.0
-# How far ahead others are expected, at their present speed [s]; and how much farther [m].
+# How far ahead others are predicted, at their present speed [s], plus this distance [m].
 OTHERS_TIME = 8.0
 OTHERS_REACH = 15.0
 MAX_BRANCHES = 6
@@ -27,7 +27,7 @@ MAX_BRANCHES = 6
 
 class Arrivals(NamedTuple):
     """
-    Who comes to which conflict (R rows), in the order of the conflicts.
+    The arrivals of vehicles at conflicts (R rows), in the order of the conflicts.
 
     :param begin: (C + 1) rows at which those of each conflict begin.
     :param who: (R) row of the agent, or -1 - n for the n-th of the others.
@@ -51,12 +51,12 @@ class Arrivals(NamedTuple):
 
 class Passages(NamedTuple):
     """
-    The next junction on the way of each agent (A) that it was not let into yet.
+    The next junction on the way of each agent (A) to which it has no grant yet.
 
-    :param granted: (A) step of the way at which what it was let into ends, -1 without that;
-        `before` the same of what it was let into before, while it is still in there.
-    :param first: (A) step of the way at which it begins, -1 without one.
-    :param last: (A) at which it ends.
+    :param granted: (A) step of the way at which the junctions end that it was let into, -1
+        without one; `before` the same of the junction let into before, while it is still in it.
+    :param first: (A) step of the way at which the next junction begins, -1 without one.
+    :param last: (A) step at which it ends.
     :param hold: (A) distance of the agent's front from where it waits [m]
     :param end: (A) distance of its centre from the end of the last conflict [m]
     """
@@ -111,7 +111,8 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
             else:
                 break
         if last >= 0 and result.end[i] + WAITING_ROOM > way.horizon[i]:
-            # It may go on behind what is seen: better to wait where most room is than anywhere.
+            # The junction may go on beyond the horizon: the agent plans to wait where there is
+            # most room.
             result.last[i], result.end[i] = last, end
     return result
 
@@ -138,9 +139,9 @@ def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: Agen
              slots: IntArray, entries: Entries, drives: NDArray[np.bool_],
              widths: FloatArray) -> Arrivals:
     """
-    List the conflicts on the ways of agents, that of the lane just left included, and of others.
+    Return the arrivals at conflicts of agents, including the lane just left, and of others.
 
-    Others may go on by whatever way there is.
+    Others may take any branch of the road.
 
     :param drives: (O) which of the others are vehicles.
     :param widths: (O) of the others [m]
@@ -199,7 +200,7 @@ def _note(found: Arrivals, n: int, who: int, conflict: int, into: float, out: fl
 @compiled
 def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int, width: float,
             found: Arrivals, used: int) -> tuple[Arrivals, int]:
-    """Note the conflicts that one of the others may come to, along all branches."""
+    """Add the conflicts that one of the others may come to, along all branches."""
     speed = max(entries.speed[n], 0.0)
     reach = OTHERS_REACH + OTHERS_TIME * speed
     lane = np.full(MAX_BRANCHES**2, -1, np.int64)
@@ -239,7 +240,7 @@ def _grown(found: Arrivals) -> Arrivals:
 
 @compiled
 def _by_conflict(found: Arrivals, used: int, conflicts: int) -> Arrivals:
-    """Put arrivals in the order of their conflicts; those of one stay in order."""
+    """Return arrivals sorted by conflict; those of one conflict keep their order."""
     result = _empty(conflicts, used)
     for n in range(used):
         result.begin[found.conflict[n] + 1] += 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where compiled loops over agents are kept, and whether they are; this loads no compiler."""
+"""The cache of compiled loops over agents; this module loads no compiler."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ _IMPORT = re.compile(r'^from crgame_ros\.((?:traffic|vehicle)\.\w+) import', re.
 
 @cache
 def cache_root() -> Path:
-    """Choose the folder of all compiled code: beside the sources, or else the user's cache."""
+    """Return the folder of all compiled code: beside the sources, or else the user's cache."""
     chosen = os.environ.get('NUMBA_CACHE_DIR')
     if chosen:
         return Path(chosen)
@@ -45,7 +45,7 @@ def digest(module: str) -> str:
 
 
 def marker() -> Path:
-    """Return which file says that everything is compiled."""
+    """Return the file that marks that everything is compiled."""
     return cache_root() / f'compiled-{digest("warm_up")}.done'
 
 
@@ -61,7 +61,7 @@ def compile_now() -> None:
 
 @contextmanager
 def compiling_when_idle() -> Iterator[None]:
-    """Compile what is not compiled yet in processor time that nothing else wants, silently."""
+    """Compile what is not compiled yet, in idle processor time and without output."""
     if marker().exists():
         yield
         return

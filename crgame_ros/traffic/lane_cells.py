@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which lanes are near a point: a grid over the map, made once."""
+"""The lanes near a point: a grid over the map, built once."""
 
 import math
 from typing import NamedTuple
@@ -21,10 +21,10 @@ class CellTable(NamedTuple):
     The cells with lanes, as arrays.
 
     :param origin_x, origin_y: corner of the grid [m]
-    :param columns, rows: of cells in y and in x.
-    :param keys: (K) of the cells with lanes, ascending, by rows; `row_starts` (rows + 1) of those
-        of each row, `starts` (K + 1) of their lanes.
-    :param lanes: (N) of all cells, one cell behind the other.
+    :param columns, rows: number of cells in y and in x.
+    :param keys: (K) of the cells with lanes, ascending, by rows; `row_starts` (rows + 1) index of
+        each row's first key, `starts` (K + 1) index of each cell's first lane.
+    :param lanes: (N) of all cells, cell by cell.
     :param guesses: (N) arc length of the lane nearest to the cell [m]
     :param turning: (L) greatest angle between any two parts of a lane [rad]
     :param widest: (L) greatest distance from its middle to its edge [m]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Changing lanes (FS M3): the path of a change, its motives and the gaps that allow it."""
+"""Lane changes (FS M3): the path of a change, its incentives and the gaps that allow it."""
 
 from dataclasses import dataclass
 import math
@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 
 # Greatest |f''| of f(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2 -+ sqrt(3) / 6.
 PEAK = 10.0 / math.sqrt(3.0)
-# A change is as long as this at least [m].
+# Least length of a change [m].
 SHORTEST_CHANGE = 12.0
-# Advantage below which nobody changes lanes (Kesting, Treiber and Helbing 2007: 0.1) [m/s^2].
+# Least advantage for a free change (Kesting, Treiber and Helbing 2007: 0.1) [m/s^2].
 CHANGE_THRESHOLD = 0.2
 
 
@@ -68,7 +68,7 @@ def quintic(offset: Array, slope: Array, curvature: Array, target: Array,
 @inlined
 def offset_at(curve: Array, x: float, length: float) -> float:
     """
-    Evaluate the path of a lane change (FS 4).
+    Return the lateral offset on the path of a lane change (FS 4).
 
     :param curve: (6,) from `quintic`
     :param x: distance since the start of the change; clipped to [0, L], so that behind its end the
@@ -84,17 +84,17 @@ def offset_at(curve: Array, x: float, length: float) -> float:
 @dataclass(frozen=True)
 class GapAcceptance:
     """
-    The gaps that a driver takes, in front of and behind the own place in the target lane.
+    The gaps that a driver accepts ahead of and behind its place in the target lane.
 
-    After Hidas (2005): a gap has to leave a least distance, and more of it where the vehicle
-    behind is faster; a change that is forced takes less. The headway share and the numbers are
-    ours. The limits of braking are MOBIL's safety criterion (Kesting et al. 2007).
+    After Hidas (2005): a gap has a least length, and a greater one where the vehicle behind is
+    faster. A forced change accepts less. The headway share and the numbers are ours. The limits
+    of braking are MOBIL's safety criterion (Kesting et al. 2007).
 
     :param standstill_gap: least gap at any speed [m]
-    :param closing_time: by which a gap grows per speed difference [s]
-    :param headway: by which a gap grows per speed of the vehicle behind, in no hurry [s]
+    :param closing_time: increase of the gap per speed difference [s]
+    :param headway: increase of the gap per speed of the vehicle behind, at urgency 0 [s]
     :param forced_headway: the same at urgency 1 [s]
-    :param deceleration: hardest braking that a change may cause, in no hurry [m/s^2]
+    :param deceleration: hardest braking that a change may cause, at urgency 0 [m/s^2]
     :param forced_deceleration: the same at urgency 1, b_safe of Kesting et al. [m/s^2]
     """
 
@@ -110,8 +110,8 @@ class GapAcceptance:
         """
         Return the least gap between two vehicles after a change.
 
-        :param behind_speed: (A,) of the one behind [m/s]
-        :param ahead_speed: (A,) of the one ahead [m/s]
+        :param behind_speed: (A,) of the vehicle behind [m/s]
+        :param ahead_speed: (A,) of the vehicle ahead [m/s]
         :param urgency: (A,) 0 to 1
         :return: (A,) bumper to bumper [m]
         """
@@ -123,15 +123,15 @@ class GapAcceptance:
                 follow_speed: Array, own_acceleration: Array, follow_acceleration: Array,
                 urgency: Array | float = 0.0) -> NDArray[np.bool_]:
         """
-        Return who may change now; all arguments are (A,).
+        Return whether each vehicle may change now; all arguments are (A,).
 
         :param speed: of the vehicle that wants to change [m/s]
         :param lead_gap: to the vehicle that would be ahead; inf where there is none [m]
         :param lead_speed: its speed; any value where there is none [m/s]
         :param follow_gap: from the vehicle that would be behind; inf where there is none [m]
         :param follow_speed: its speed; any value where there is none [m/s]
-        :param own_acceleration: answer of the car-following model to the new leader [m/s^2]
-        :param follow_acceleration: answer of the new follower's model [m/s^2]
+        :param own_acceleration: of the car-following model behind the new leader [m/s^2]
+        :param follow_acceleration: of the new follower's model behind the vehicle [m/s^2]
         :param urgency: 0 for a free change, up to 1 for a forced one
         """
         hardest = self.deceleration + urgency * (self.forced_deceleration - self.deceleration)
@@ -161,16 +161,16 @@ def incentive(here: Array, there: Array, others: Array | float = 0.0,
 def urgency(distance: float, speed: float, changes: float = 1.0, horizon: float = 15.0,
             shortest: float = 100.0) -> float:
     """
-    Return the hurry of a change that the route asks for, growing towards the last place for it.
+    Return the urgency of a change for the route, which grows towards the last place for it.
 
-    0 until the time horizon, then linear up to 1 where the lane change has just its length left;
-    every further lane to cross moves both back by as much (ours).
+    It is 0 until the time horizon, then rises linearly to 1 where just the length of a lane change
+    is left. Every further lane to cross moves both places back by as much (ours).
 
     :param distance: to the last place for the change, inf where none is needed [m]
     :param speed: [m/s]
     :param changes: lanes to cross
-    :param horizon: time before that place at which the hurry begins [s]
-    :param shortest: distance at which it begins at least [m]
+    :param horizon: time before that place at which the urgency begins [s]
+    :param shortest: least distance at which it begins [m]
     :return: from 0 to 1
     """
     last = lane_change_length(speed) * changes

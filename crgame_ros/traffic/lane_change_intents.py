@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who wants to change lanes, and to which side."""
+"""Intents of agents to change lanes, and to which side."""
 
 import math
 from typing import NamedTuple
@@ -15,34 +15,34 @@ from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 
-# Where a lane ends, changes take no less than this: 2.5 m/s^2 to the side [s].
+# Least time of a change where a lane ends: it takes 2.5 m/s^2 to the side [s].
 SWERVE_TIME = 2.8
-# Agents think of changes for speed at the same tick up to so many, more of them spread over the
-# ticks.
+# Up to this number agents consider changes for speed at the same tick; more agents are spread over
+# the ticks.
 AT_ONCE = 50
-# Changes for speed are left alone where the route wants the lane within this distance [m].
+# No change for speed into a lane that the route leaves again within this distance [m].
 COMMITTED = 400.0
 SLOWEST = 3.0
 # The route's change begins this far before the last point where it is possible [m].
 PREPARE = 400.0
-# Nobody begins to change lanes this shortly before or in a junction [m].
+# No change begins this near before a junction, or in it [m].
 NO_CHANGE = 15.0
-# Who changes lanes before a junction can halt before it with this [m/s^2].
+# An agent that changes lanes before a junction can halt before it with this [m/s^2].
 BEFORE_JUNCTION = 2.0
-# Nor this near to an obstacle: the front would hit it [m].
+# No change begins this near to an obstacle: the front would hit it [m].
 TOO_NEAR = 5.0
-# Below `SLOWEST` nobody swings out with less room to the one ahead in the own lane [m].
+# Below `SLOWEST` no change begins with a smaller gap to the leader than this [m].
 OUT_OF_QUEUE = 7.0
 
 
 class Destinations(NamedTuple):
     """
-    What `Routes` knows of lanes (L) and destinations (D), and which lanes are in junctions.
+    The tables of `Routes` over lanes (L) and destinations (D), and the lanes in junctions.
 
     :param next, change, remaining, cost: (D, L)
     :param drops: (L)
     :param inside: (2, L) for narrow and for wide vehicles.
-    :param narrow: width of the widest that is narrow [m]
+    :param narrow: width of the widest narrow vehicle [m]
     """
 
     next: IntArray  # noqa: A003
@@ -56,9 +56,9 @@ class Destinations(NamedTuple):
 
 class Situations(NamedTuple):
     """
-    What agents (A) see in their own lanes.
+    The situation of agents (A) in their own lanes.
 
-    :param gap: to whatever is ahead, or inf [m]
+    :param gap: to the vehicle or obstacle ahead, or inf [m]
     :param blocked: gap to an obstacle that stands there, or inf [m]
     :param halt: distance of the front from where it halts, or inf [m]
     """
@@ -70,7 +70,7 @@ class Situations(NamedTuple):
 
 class LaneChangeIntents(NamedTuple):
     """
-    Agents (N) that want into the lane beside them, those on the left first.
+    Agents (N) that intend to change lanes, those to the left first.
 
     :param slots: of the agents.
     :param side: 1 to the left, -1 to the right.
@@ -91,10 +91,10 @@ def lane_change_intents(
         k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
         at: Situations, allowed: BoolArray, thoughts: int) -> LaneChangeIntents:
     """
-    List who may want to change to which side.
+    Return the agents that may intend to change lanes, and to which side.
 
-    :param allowed: who changes lanes, of all slots.
-    :param thoughts: ticks between two thoughts of changes for speed.
+    :param allowed: whether agents change lanes, of all slots.
+    :param thoughts: ticks after which an agent considers changes for speed again.
     """
     free = np.empty(len(slots), np.bool_)
     room = 2 * len(slots)
@@ -111,7 +111,7 @@ def lane_change_intents(
 
 @inlined
 def _no_change(speed: float) -> float:
-    """Return how far before a junction or a line nobody changes lanes any more [m]."""
+    """Return the distance before a junction or a line within which no change begins [m]."""
     return NO_CHANGE + speed**2 / (2.0 * BEFORE_JUNCTION)
 
 
@@ -133,8 +133,8 @@ def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slo
         return False
     rest = lanes.length[lane] - agents.s[slot]
     if to.drops[lane]:
-        # Where a lane ends there is no other place. Nor is the road left: what is too fast for
-        # the rest brakes instead.
+        # Where a lane ends there is no other place to change. An agent too fast for the rest
+        # brakes instead, so that it does not leave the road.
         return bool(rest > SWERVE_TIME * speed)
     if _is_inside(to, agents, slot, lane) or at.halt[i] < _no_change(speed):
         return False
@@ -152,13 +152,13 @@ def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slo
 def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots: IntArray,
           at: Situations, thoughts: int, free: BoolArray, side: int, found: LaneChangeIntents,
           used: int) -> int:
-    """Write who may want to change to a side, from a row on; return where that ends."""
+    """Write the intents to change to one side from row `used` on; return the next free row."""
     for i, slot in enumerate(slots):
         lane, destination = agents.lane[slot], agents.destination[slot]
         beside = lanes.left[lane] if side > 0 else lanes.right[lane]
         if not free[i] or beside < 0 or not math.isfinite(to.cost[destination, beside]):
             continue
-        # Who gets into a junction from the side was not let in.
+        # An agent that enters a junction by a lane change was not let in.
         if _is_inside(to, agents, slot, beside) and not to.drops[lane]:
             continue
         speed, s = agents.speed[slot], agents.s[slot]

@@ -30,10 +30,10 @@ PRIORITY_TO_THE_RIGHT = frozenset({'AUS', 'IND', 'IRL', 'NZL'})
 
 class DrivingSide(NamedTuple):
     """
-    What traffic does where.
+    The driving side of a road network.
 
-    :param keeps_left: on which side of the road it drives.
-    :param priority_to_left: whether, without signs, who comes from the left goes first.
+    :param keeps_left: whether traffic drives on the left side of the road.
+    :param priority_to_left: whether, without signs, traffic from the left has the right of way.
     """
 
     keeps_left: bool = False
@@ -45,9 +45,9 @@ RIGHT_HAND = DrivingSide()
 
 def driving_side(scenario: Scenario) -> DrivingSide:
     """
-    Return on which side traffic keeps: as the neighbours of its lanes do, or else its country.
+    Return the side on which traffic drives, from oncoming neighbour lanes or else the country.
 
-    Own maps, and published ones that were mirrored, may drive on another side than their country.
+    On own maps, and on published ones that were mirrored, the side may differ from the country's.
     """
     country = str(scenario.scenario_id.country_id)
     keeps_left = _by_neighbours(scenario.lanelet_network)
@@ -57,7 +57,7 @@ def driving_side(scenario: Scenario) -> DrivingSide:
 
 
 def _by_neighbours(roads: LaneletNetwork) -> bool | None:
-    """Return on which side oncoming lanes are; None where there are none, or as many on either."""
+    """Return whether oncoming lanes are on the right; None if none, or as many on either side."""
     left = sum(lane.adj_left is not None and lane.adj_left_same_direction is False
                for lane in roads.lanelets)
     right = sum(lane.adj_right is not None and lane.adj_right_same_direction is False
@@ -69,13 +69,13 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 STEP = 0.5
-# Tables and conflicts of so many lanes are made in 10 s, in half a gigabyte [m].
+# Greatest length of all lanes; its tables and conflicts take 10 s and half a gigabyte [m].
 MAX_LENGTH = 6e5
-# Published maps hold successors that begin elsewhere: such a link is no way to drive on [m].
+# Some successors in published maps begin elsewhere; a link with a greater gap is ignored [m].
 MAX_GAP = 1.0
-# Headings of published centre lines jump from vertex to vertex; smoothed over this length [m].
+# Headings of published centre lines jump at vertices; they are smoothed over this length [m].
 SMOOTHING = 4.0
-# Angles between lanes that matter [rad], and how far behind them one still turns [m].
+# Least angle between lanes that slows agents down [rad], and over which distance behind it [m].
 LEAST_KINK, KINK_REACH = 0.03, 4.0
 
 
@@ -83,7 +83,7 @@ class LaneGraph:
     """
     The lanelets for cars, tabulated every half metre; a lane is a position in `ids`.
 
-    The tables of all lanes lie one behind the other: those of a lane are
+    The tables of all lanes are concatenated: the rows of a lane are
     `first[lane]:first[lane] + count[lane]`, a distance `step[lane]` apart.
 
     :param network: the road network.
@@ -107,7 +107,7 @@ class LaneGraph:
         self.read_speed_limits(network)
         self.lateral_acceleration = lateral_acceleration
         curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
-        # What a curve allows of itself; a limit is scaled by each driver's own factor.
+        # The speed that the curve alone allows; a driver's factor scales only the speed limit.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
         self._slow_at_kinks(lateral_acceleration)
         self.table = LaneTable(
@@ -119,7 +119,7 @@ class LaneGraph:
         return len(self.ids)
 
     def read_speed_limits(self, network: RoadNetwork) -> None:
-        """Take over the speed limits of a network with the same lanelets [m/s]."""
+        """Read the speed limits of a network with the same lanelets [m/s]."""
         limits = [network.speed_limit(i) for i in self.ids]
         self.limit[:] = [self._default_speed if limit is None else limit for limit in limits]
 
@@ -163,13 +163,13 @@ class LaneGraph:
         self.left: IntArray = np.array([-1 if i is None else self.index.get(i, -1) for i in left])
         self.right: IntArray = np.array(
             [-1 if i is None else self.index.get(i, -1) for i in right])
-        # Neighbours of either direction share a border and no way.
+        # Neighbours of either direction share a border, but vehicles on them do not conflict.
         self.beside: list[set[int]] = [
             {self.index[j] for j in (x.adj_left, x.adj_right) if j in self.index}
             for x in lanelets]
 
     def _found(self, lane: int, lanelet: Lanelet) -> list[int]:
-        """Find where a lane goes on whose successors in the file are all impossible."""
+        """Find the followers of a lane whose successors in the file are all impossible."""
         if not lanelet.successor:
             return []
         end = int(self.first[lane] + self.count[lane] - 1)
@@ -177,7 +177,7 @@ class LaneGraph:
         return [int(i) for i in np.flatnonzero(near <= MAX_GAP) if self._joined(lane, int(i))]
 
     def _joined(self, lane: int, follower: int) -> bool:
-        """Return whether a lane goes on in another without a jump or a turn on the spot."""
+        """Return whether a lane continues in another without a jump or a turn on the spot."""
         end, start = int(self.first[lane] + self.count[lane] - 1), int(self.first[follower])
         gap = np.hypot(self.x[start] - self.x[end], self.y[start] - self.y[end])
         turn = abs(wrap_pi(float(self.yaw[start] - self.yaw[end])))
@@ -185,9 +185,9 @@ class LaneGraph:
 
     def _slow_at_kinks(self, lateral_acceleration: float) -> None:
         """
-        Let lanes that begin at an angle to the one before be entered slowly.
+        Lower the speed at the beginning of lanes that begin at an angle to the lane before.
 
-        Who steers for a point a time T ahead turns by the angle within T.
+        An agent that steers for a point a time T ahead turns by that angle within T.
         """
         for lane in range(len(self)):
             start, kink = int(self.first[lane]), self._kink(lane)
@@ -255,7 +255,7 @@ def smooth(values: FloatArray, width: float) -> FloatArray:
 
 
 def padded(rows: list[list[int]]) -> IntArray:
-    """Put lists of different length into one array, filled up with -1."""
+    """Return lists of different lengths as one array, padded with -1."""
     width = max(1, max((len(row) for row in rows), default=1))
     result = np.full((len(rows), width), -1, dtype=np.int64)
     for i, row in enumerate(rows):

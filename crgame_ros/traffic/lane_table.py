@@ -20,8 +20,8 @@ class Point(Protocol):
     :param x, y, yaw: [m, rad]
     :param curvature: [1/m]
     :param half_width: of the lane [m]
-    :param swing, swing_long: where a bend is too tight, how far to the left cars and long
-        vehicles swing out for the square of the distance from rear axle to front [1/m]; see
+    :param swing, swing_long: how far to the left cars and long vehicles swing out where a bend is
+        too tight, divided by the square of the distance from rear axle to front [1/m]; see
         `tight_lanes`.
     """
 
@@ -37,14 +37,14 @@ class Point(Protocol):
 
 
 class Points(Protocol):
-    """Points one behind the other: a structured array, whose records are rows of the cache."""
+    """A sequence of points: a structured array, with a record per point for cache locality."""
 
     def __getitem__(self, row: int) -> Point: ...
 
 
 def point_records(x: FloatArray, y: FloatArray, yaw: FloatArray, curvature: FloatArray,
                   half_width: FloatArray) -> Points:
-    """Put the columns of points into records."""
+    """Return the columns of points as records."""
     columns = {'x': x, 'y': y, 'yaw': yaw, 'cos': np.cos(yaw), 'sin': np.sin(yaw),
                'curvature': curvature, 'half_width': half_width, 'swing': np.zeros(len(x)),
                'swing_long': np.zeros(len(x))}
@@ -61,15 +61,15 @@ def column_of(points: Points, name: str) -> FloatArray:
 
 class LaneTable(NamedTuple):
     """
-    What `LaneGraph` knows, as arrays over lanes (L) and over the points of their centre lines.
+    The data of `LaneGraph` as arrays over lanes (L) and over the points of their centre lines.
 
     The points of a lane are `first[lane]:first[lane] + points[lane]`, `step[lane]` apart.
 
-    :param first, points: (L) first row of its points, and how many there are.
+    :param first, points: (L) first row of its points, and their number.
     :param length, step: (L) [m]
     :param limit: (L) speed limit [m/s]
     :param left, right: (L) neighbours of the same direction, or -1.
-    :param successors, predecessors: (L, S) filled up with -1.
+    :param successors, predecessors: (L, S) padded with -1.
     :param line: the points, a record each.
     """
 
@@ -87,7 +87,7 @@ class LaneTable(NamedTuple):
 
 @inlined
 def first_at_least(values: FloatArray | IntArray, low: int, high: int, least: float) -> int:
-    """Return the first row from `low` with at least a value, `high` if none before it has."""
+    """Return the first row in [low, high) whose value is at least `least`, or `high`."""
     while low < high:
         middle = (low + high) // 2
         if values[middle] < least:
@@ -131,7 +131,7 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
     """
     Find a position in the coordinates of a lane, near an arc length that is guessed.
 
-    Cosine and sine are interpolated, not computed: headings of neighbouring points are alike.
+    Cosine and sine are interpolated, because headings of neighbouring points are nearly equal.
 
     :param rounds: of correction; one is enough for a guess that is off by centimetres.
     :return: s [m], d [m] and the lane's heading there [rad]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who is ahead of whom: the ways of all agents over several lanes, and what is on them."""
+"""Leaders of agents: their ways over several lanes, and vehicles and obstacles on them."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_LANES = 40
-# Of what is in the way ahead so many are answered to, and so many that drive the same way.
+# Most entries ahead to which an agent responds, and most of them that do not cross its lane.
 MAX_AHEAD, MAX_LEADERS = 6, 2
 # A vehicle this far behind the beginning of a body may still be beside it [m].
 LONGEST = 25.0
@@ -27,7 +27,7 @@ class Ways(NamedTuple):
     """
     The lanes that agents (A) will drive, in steps (J).
 
-    :param lane: (A, J) of no meaning behind the end of the way, as the offsets.
+    :param lane: (A, J) undefined beyond the end of the way, like the offsets.
     :param offset: (A, J) from the agent's centre to the lane's beginning [m]; negative for the
         lane that it is in.
     :param depth: (A) steps of each way.
@@ -42,7 +42,7 @@ class Ways(NamedTuple):
 
 class Pairs(NamedTuple):
     """
-    What is ahead of agents (P pairs), in the order of the agents.
+    Pairs (P) of an agent and an entry ahead of it, in the order of the agents.
 
     :param agent: (P) row of the agent.
     :param entry: (P) row of `Entries`.
@@ -58,9 +58,9 @@ class Pairs(NamedTuple):
 
 class Corridors(NamedTuple):
     """
-    What agents (A) take of the road.
+    The room that agents (A) take on the road.
 
-    :param owner: (A) the agents, as entries name them.
+    :param owner: (A) the agents, as in `Entries.owner`.
     :param length: (A) [m]
     :param front: (A) from the rear axle to the front bumper [m]
     :param low, high: (A) right and left edge, from the reference [m]
@@ -75,7 +75,7 @@ class Corridors(NamedTuple):
 
 @inlined
 def look_distance(speed: float) -> float:
-    """Return how far ahead an agent looks: it stops in half of that, comfortably [m]."""
+    """Return how far ahead an agent looks: it stops comfortably within half of that [m]."""
     return 50.0 + 3.0 * speed + speed**2 / 4.0
 
 
@@ -83,10 +83,10 @@ def look_distance(speed: float) -> float:
 def ways(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
          lane: IntArray, s: FloatArray) -> Ways:
     """
-    Follow the routes of agents (A), each as far as it looks.
+    Return the ways of agents (A) along their routes, each as far as the agent looks.
 
     :param following: (D, L) next lane to a destination, or -1 (`Routes.next`).
-    :param lane, s: (A) where on the road they are looked at [m].
+    :param lane, s: (A) lane and arc length where the ways begin [m].
     """
     count = len(slots)
     way = Ways(np.empty((count, MAX_LANES), np.int64), np.empty((count, MAX_LANES)),
@@ -98,7 +98,7 @@ def ways(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntAr
 
 @compiled
 def own_ways(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray) -> Ways:
-    """Follow the routes of agents (A) from where they are; see `ways`."""
+    """Return the ways of agents (A) from where they are; see `ways`."""
     count = len(slots)
     way = Ways(np.empty((count, MAX_LANES), np.int64), np.empty((count, MAX_LANES)),
                np.empty(count, np.int64), np.empty(count))
@@ -126,7 +126,7 @@ def _follow(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int
 @compiled
 def corridors(agents: AgentTable, slots: IntArray, right: FloatArray,
               left: FloatArray) -> Corridors:
-    """Return what agents (A) take whose middles are between offsets (A) from the reference [m]."""
+    """Return the room of agents (A) whose centres are between offsets (A) from the reference."""
     count = len(slots)
     result = Corridors(slots, np.empty(count), np.empty(count), np.empty(count), np.empty(count))
     for i, slot in enumerate(slots):
@@ -139,7 +139,7 @@ def corridors(agents: AgentTable, slots: IntArray, right: FloatArray,
 @compiled
 def own_corridors(lanes: LaneTable, agents: AgentTable, slots: IntArray,
                   reference: FloatArray) -> Corridors:
-    """Return what agents (A) take between the reference that they follow and where they are."""
+    """Return the room of agents (A) between the reference that they follow and their place."""
     right, left = np.empty(len(slots)), np.empty(len(slots))
     for i, slot in enumerate(slots):
         off = agents.d[slot] - reference[nearest_row(lanes, agents.lane[slot], agents.s[slot])]
@@ -149,7 +149,7 @@ def own_corridors(lanes: LaneTable, agents: AgentTable, slots: IntArray,
 
 @inlined
 def first_from(entries: Entries, lane: int, rear: float) -> int:
-    """Return the first row of a lane whose entry begins at an arc length or behind it."""
+    """Return the first row of a lane whose entry begins at an arc length or beyond it."""
     return first_at_least(entries.rear, entries.begin[lane], entries.begin[lane + 1], rear)
 
 
@@ -157,7 +157,7 @@ def first_from(entries: Entries, lane: int, rear: float) -> int:
 def ahead(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
           reference: FloatArray) -> Pairs:
     """
-    Find what is ahead of each agent and in its way.
+    Find the entries that are ahead of each agent and in its way.
 
     :param reference: offset of the reference at each point of the lanes [m]; empty: none.
     """
@@ -215,7 +215,7 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
 
 @compiled
 def obstacles(pairs: Pairs, standing: NDArray[np.bool_], count: int) -> FloatArray:
-    """Return the least gap (count) of each agent to what stands for good, or inf."""
+    """Return the least gap (count) of each agent to an obstacle that stands for good, or inf."""
     result = np.full(count, np.inf)
     for p in range(len(pairs.agent)):
         if standing[pairs.entry[p]]:
@@ -226,10 +226,10 @@ def obstacles(pairs: Pairs, standing: NDArray[np.bool_], count: int) -> FloatArr
 @compiled
 def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, IntArray]:
     """
-    Find who is next ahead of each agent.
+    Find the leader of each agent.
 
-    :return: its gap (count), whose it is (count) and its row of `Entries` (count); inf, `FREE` and
-        -1 without one.
+    :return: the gap (count), the leader as in `AgentTable.leader` (count) and its row of `Entries`
+        (count); inf, `FREE` and -1 without one.
     """
     gap, leader = np.full(count, np.inf), np.full(count, FREE, np.int64)
     entry = np.full(count, -1, np.int64)
@@ -243,13 +243,13 @@ def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntA
 
 class Followers:
     """
-    Which car-following model moves which agent (A).
+    The car-following models of agents (A).
 
     :param name: of the model.
-    :param options: of everybody's at first.
-    :param count: of the agents.
+    :param options: of the model of all agents at first.
+    :param count: number of agents.
 
-    Attributes: `usual`, everybody's model at first; `max_acceleration` (A) [m/s^2]
+    Attributes: `usual`, the model of all agents at first; `max_acceleration` (A) [m/s^2]
     """
 
     def __init__(self, name: str, options: Mapping[str, Any], count: int) -> None:
@@ -257,19 +257,19 @@ class Followers:
         self._options: list[dict[str, Any]] = [dict(options)]
         self.usual: CarFollowing = CAR_FOLLOWING.create(name, options, 'traffic')
         self._models = [self.usual]
-        # The last row is for all who are no agents.
+        # The last row is for objects that are no agents.
         self._number = np.zeros(count + 1, dtype=np.int64)
         self.max_acceleration: FloatArray = np.full(count, self.usual.max_acceleration)
 
     def for_agents(self, slots: IntArray) -> 'CarFollowing | _Several':
-        """Return the model of agents (N), asked about just these; of slot -1 the usual one."""
+        """Return the model of agents (N), for arrays of just these; slot -1 has the usual one."""
         if len(self._models) == 1:
             return self.usual
         return _Several(self._models, self._number[slots])
 
     def change(self, slots: IntArray, options: Mapping[str, Any]) -> None:
         """
-        Let the models of agents have other options, besides those that they have.
+        Change some options of the models of agents.
 
         :raises InputError: for options that the model does not take.
         """
@@ -286,10 +286,10 @@ class Followers:
 
 class _Several:
     """
-    Several models, each for some of the agents (N) that are asked about.
+    Several models, each for some of the agents (N).
 
-    :param models: all there are.
-    :param number: (N) of each agent's.
+    :param models: all models.
+    :param number: (N) index of each agent's model.
     """
 
     def __init__(self, models: Sequence[CarFollowing], number: IntArray) -> None:

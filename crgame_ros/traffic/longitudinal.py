@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How fast agents want to drive, and how they accelerate behind whatever is ahead (FS M2)."""
+"""Desired speeds of agents, and their accelerations behind leaders and obstacles (FS M2)."""
 
 import math
 
@@ -17,29 +17,30 @@ from crgame_ros.vehicle.state import QUEUEING
 import numpy as np
 from numpy.typing import NDArray
 
-# With which agents slow down for a curve or a lower limit ahead [m/s^2].
+# Deceleration for a curve or a lower limit ahead [m/s^2].
 COASTING = 1.2
-# They look at the speeds allowed so far ahead, and are at them then [s].
+# Times ahead for which the allowed speeds are read, and in which agents reach them [s].
 LOOKS = (0.3, 0.6, 1.0)
-# With which agents halt at a line [m/s^2]; and before the end of a lane that they have not got
-# out of: at full speed as far as can be, for gaps are found there.
+# Deceleration to halt at a line, and before the end of a lane that the agent could not leave: the
+# latter is late, because gaps are found at speed [m/s^2].
 AT_LINE, AT_END = 1.6, 3.0
-# Lines are halted at with this gap [m], and a standing agent this near stays [m].
+# Agents halt at this gap before a line, and a standing agent this near to it stays [m].
 LINE_GAP, NEAR = 0.5, 0.3
-# Room before a standing obstacle from which one gets into the next lane [m].
+# Room that an agent needs before a standing obstacle to get into the next lane [m].
 SWING_OUT = 10.0
-# Of a short lane that ends this share is left to change lanes in.
+# Share of a short lane that ends which is kept for a lane change.
 REST_SHARE = 0.2
-# Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; what is wanted beyond
-# `EMERGENCY` is done at once [m/s^2].
+# Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; braking harder than
+# `EMERGENCY` sets in at once [m/s^2].
 JERK, RELEASE, EMERGENCY = 3.0, 4.0, 3.0
-# Whoever takes a bend with more than this share of what is comfortable gets to that within [s].
+# An agent above this share of the comfortable lateral acceleration approaches the comfortable speed
+# in STRAIGHTENING [s].
 ALMOST, STRAIGHTENING = 0.8, 0.5
 
 
 @compiled
 def envelope_of(lanes: LaneTable, speed: FloatArray) -> FloatArray:
-    """Return the speeds from which one slows down in time for what the same lane allows ahead."""
+    """Return the speeds from which agents slow down in time for lower ones ahead in the lane."""
     result = speed.copy()
     for lane in range(len(lanes.first)):
         first, gain = lanes.first[lane], 2.0 * COASTING * lanes.step[lane]
@@ -67,7 +68,7 @@ def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: 
 @compiled
 def _speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Ways,
             agents: AgentTable, slots: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return what is allowed now (A), and the acceleration (A) that keeps to what is ahead."""
+    """Return the allowed speeds (A), and the accelerations (A) that keep to those ahead."""
     desired, limit = np.empty(len(slots)), np.full(len(slots), math.inf)
     _fill_speeds(lanes, envelope, lateral, way, agents, slots, desired, limit)
     return desired, limit
@@ -83,22 +84,22 @@ def _fill_speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Wa
         for look in LOOKS:
             there = _allowed(lanes, envelope, way, i, factor, top, speed * look)
             limit[i] = min(limit[i], (there - speed) / look)
-        # Whoever comes out of a bend speeds up only as the wheels straighten.
+        # An agent that leaves a bend speeds up only as its wheels straighten.
         bend = abs(math.tan(agents.steering[slot])) / agents.wheelbase[slot]
         if speed * speed * bend > ALMOST * lateral:
             steady = (math.sqrt(lateral / bend) - speed) / STRAIGHTENING
             limit[i] = min(limit[i], max(steady, -COASTING))
-        # Whoever is much too fast, because a limit has changed, takes its time.
+        # An agent that is much too fast, because a limit has changed, slows down gently.
         limit[i] = max(limit[i], -2.0 * COASTING)
 
 
 @bare
 def halt_before(speed: float, distance: float, braking: float) -> float:
     """
-    Return the acceleration that halts a distance ahead.
+    Return the acceleration that halts an agent after a distance.
 
-    The speed follows sqrt(2 b d), looked at a moment ahead so that braking sets in smoothly; where
-    more is needed it is braked with at once.
+    The speed follows sqrt(2 b d), evaluated a moment ahead so that braking sets in smoothly. If
+    harder braking is needed, it sets in at once.
     """
     if distance >= math.inf:
         return math.inf
@@ -117,25 +118,27 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
          slots: IntArray, distance: FloatArray, blocked: FloatArray,
          swings: NDArray[np.bool_], wanted: FloatArray) -> None:
     """
-    Let agents (A) halt at lines, where there is room to get around obstacles, and at lane ends.
+    Lower accelerations so that agents (A) halt at lines, behind obstacles and at lane ends.
+
+    Behind an obstacle that it can pass in the next lane an agent leaves room to get around it.
 
     :param drops: (L) lanes that end on the road.
-    :param distance: (A) of the front from a line, or inf; obstacles are added [m]
+    :param distance: (A) of the front from a line, or inf; lowered for obstacles [m]
     :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
-    :param swings: who changes lanes, of all slots.
+    :param swings: whether agents change lanes, of all slots.
     :param wanted: (A) accelerations, which are lowered [m/s^2]
     """
     for i, slot in enumerate(slots):
         speed, lane = agents.speed[slot], agents.lane[slot]
         beside = lanes.left[lane] >= 0 or lanes.right[lane] >= 0
-        # Whoever is nearer already cannot make room any more.
+        # An agent that is nearer already cannot leave this room any more.
         if swings[slot] and beside and agents.source[slot] == NOBODY and (
                 blocked[i] > 0.5 * SWING_OUT):
             distance[i] = min(distance[i], blocked[i] - SWING_OUT)
         last = way.lane[i, way.depth[i] - 1]
         end = math.inf
         if drops[last]:
-            # Whoever halts there still has the room that a change of lanes takes.
+            # The agent halts with the room left that a lane change takes.
             end = (way.offset[i, way.depth[i] - 1] + lanes.length[last]
                    - 0.5 * agents.length[slot]
                    - min(SHORTEST_CHANGE, REST_SHARE * lanes.length[last]))
@@ -152,7 +155,7 @@ def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
     """
     result = np.empty(len(speed))
     for i in range(len(speed)):
-        # Nearer to the line before one brakes hard for that.
+        # The gap to the line gets smaller rather than that the agent brakes hard for it.
         easily = min(speed[i] * speed[i] / (2.0 * FIRMEST), light[i] - NEAR)
         result[i] = max(light[i] - LINE_GAP, easily)
     return result
@@ -161,7 +164,7 @@ def before_lines(speed: FloatArray, light: FloatArray) -> FloatArray:
 @compiled
 def smooth(agents: AgentTable, slots: IntArray, wanted: FloatArray, hardest: float,
            dt_s: float) -> None:
-    """Limit accelerations (A), and but for emergencies how fast they change [m/s^2]."""
+    """Limit accelerations (A) and, except in emergencies, their change in a step [m/s^2]."""
     for i, slot in enumerate(slots):
         speed, before = agents.speed[slot], agents.acceleration[slot]
         if speed <= 0.0:
@@ -170,7 +173,7 @@ def smooth(agents: AgentTable, slots: IntArray, wanted: FloatArray, hardest: flo
         if wanted[i] < -EMERGENCY:
             low = wanted[i]
         if speed < 1.0:
-            # Who has just begun to roll stops again at once.
+            # An agent that has just begun to roll may stop again at once.
             low = min(low, -EMERGENCY)
         if before < -EMERGENCY or speed < 1.0:
             high = math.inf
@@ -196,15 +199,16 @@ class Longitudinal:
         self._lateral = graph.lateral_acceleration
 
     def slow_for(self, speed: FloatArray) -> None:
-        """Take over what else limits speeds, at each point of the lanes [m/s]: swerves."""
+        """Set the speeds that swerves allow at each point of the lanes [m/s]."""
         self._envelope = envelope_of(self._graph.table, np.minimum(self._graph.curve_speed, speed))
 
     def speeds(self, way: Ways, agents: Agents,
                slots: IntArray) -> tuple[FloatArray, FloatArray]:
         """
-        Return the (A) speeds that limits and curves allow [m/s], those ahead in time.
+        Return the speeds (A) that limits and curves allow now, and the accelerations (A).
 
-        :return: and the accelerations (A) with which nobody gets too fast [m/s^2]
+        :return: [m/s]; with the accelerations agents slow down in time for lower speeds ahead
+            [m/s^2]
         """
         desired, limit = _speeds(self._graph.table, self._envelope, self._lateral, way,
                                  agents.table, slots)
@@ -218,9 +222,9 @@ class Longitudinal:
     def behind(self, agents: Agents, desired: FloatArray, pairs: Pairs, entries: Entries,
                corridor: Corridors) -> FloatArray:
         """
-        Return the acceleration (A) behind everything ahead; that of a free road at most.
+        Return the acceleration (A) behind all that is ahead; at most that of a free road.
 
-        :param corridor: what each agent takes.
+        :param corridor: room that each agent takes.
         """
         slots = corridor.owner
         speed = agents.speed[slots]
@@ -232,7 +236,8 @@ class Longitudinal:
             wanted = self._followers.for_agents(slots[who]).acceleration(
                 speed[who], desired[who], pairs.gap, entries.speed[entry],
                 agents.relief[slots[who]],
-                # Who changes lanes brakes for what is in the lane that it leaves.
+                # A vehicle that changes lanes may brake for a leader in the lane that it leaves:
+                # its acceleration says nothing about the new lane.
                 np.where(entries.claims[entry], 0.0, entries.acceleration[entry]))
             moderate(self._graph.table, self._following, agents.table, entries, pairs, corridor,
                      np.asarray(wanted, dtype=float), result)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who meets whom at conflicts, and whether both pass at different times anyway."""
+"""Meetings of vehicles at conflicts, and whether both pass at different times anyway."""
 
 import math
 from typing import NamedTuple
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 
-# How fast agents get to conflicts when they hurry, and out of them when they take their
-# time [m/s^2].
+# Acceleration of a fast agent towards a conflict, and of a slow one out of it [m/s^2].
 HURRY, TIMID = 1.8, 0.7
 
 
@@ -31,18 +30,19 @@ class CrossingRules(NamedTuple):
     :param gap_before: time between the agent leaving it and another getting there [s]; the
         agent's own time included, a crossing of 6 s accepts the 7 s to 8 s that the Highway
         Capacity Manual 2010 (table 19-11) gives as critical gaps.
-    :param patience: standing time after which whoever stands longest goes first, whatever the
-        right of way among those who stand [s]; own choice.
+    :param patience: standing time after which, among standing agents, the one that has stood
+        longest goes first, whatever the right of way [s]; own choice.
     :param acceleration: with which agents expect to cross [m/s^2]
-    :param deceleration: that others are expected to bear at most, to stop for the agent [m/s^2]
-    :param withdrawal: that agents take at most to give up a right that they had [m/s^2]
-    :param zipper: standing time after which those on the road let one merge, if they can slow
+    :param deceleration: hardest braking that others are expected to use to stop for the agent
+        [m/s^2]
+    :param withdrawal: hardest braking that agents use when they give up a grant [m/s^2]
+    :param zipper: standing time after which agents on the road let one merge, if they can slow
         down gently [s]; own choice.
-    :param mercy: the same for one that crosses [s]; own choice.
+    :param mercy: the same for an agent that crosses [s]; own choice.
     :param room: behind the junction, besides the agent's own length [m]
-    :param late: braking needed to halt before the junction, at which who yields late sees that it
-        has to; more than twice what is comfortable, little more than half of the hardest; own
-        choice [m/s^2]
+    :param late: braking needed to halt before the junction at which a late driver notices that it
+        has to yield; more than twice the comfortable one, little more than half of the hardest;
+        own choice [m/s^2]
     """
 
     gap_after: float = 0.7
@@ -59,14 +59,14 @@ class CrossingRules(NamedTuple):
 
 class Situation(NamedTuple):
     """
-    What agents (A) find before their next junction.
+    The situation of agents (A) before their next junction.
 
     :param slots: (A) of the agents.
     :param desired: (A) desired speeds [m/s]
     :param rear_stop: (A) distance to where the leader's rear will be if it stops [m]
     :param light: (A) distance of the front from a line with a red light, or inf [m]
     :param stop_sign: (A) whether a stop sign stands before the junction.
-    :param queued: (A) gap to the nearest who waits ahead and was not let in, or inf [m]
+    :param queued: (A) gap to the nearest vehicle that waits ahead and was not let in, or inf [m]
     """
 
     slots: IntArray
@@ -79,19 +79,19 @@ class Situation(NamedTuple):
 
 class Meetings(NamedTuple):
     """
-    Pairs (M) of an agent and somebody else who comes to the same conflict, in order of agents.
+    Pairs (M) of an agent and another that comes to the same conflict, in the order of agents.
 
     :param begin: (A + 1) rows of each agent.
     :param who: (M) row of the other agent, or -1 - n for the n-th of the others.
     :param step: (M) of the agent's way.
     :param theirs: (M) step of the other's way.
     :param into: (M) distance of the agent's front from the conflict [m]
-    :param priority: (M) of the agent.
+    :param priority: (M) of the agent, as in `ConflictTable`.
     :param apart: (M) whether both pass at different times anyway.
     :param inside: (M) whether the other is in the conflict.
     :param committed: (M) whether the other can no longer stop before it.
-    :param courteous: (M) whether the other can let the agent go without haste.
-    :param joins: (M) whether both go on behind each other.
+    :param courteous: (M) whether the other can let the agent go by slowing down gently.
+    :param joins: (M) whether the lanes merge.
     """
 
     begin: IntArray
@@ -112,12 +112,14 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
          passage: Passages, arrivals: Arrivals, at: Situation, stays: BoolArray,
          first: BoolArray, next_in: BoolArray) -> Meetings:
     """
-    Pair agents with everybody whose conflicts are theirs, and compare their times.
+    Pair agents with all others that come to the same conflicts, and compare their times.
 
-    :param stays: (A) who waits before a red light or a full junction: it comes to no conflict.
-    :param first: (A) of these, who is first before a full junction: it goes on around, and nobody
-        gets into a roundabout before it.
-    :param next_in: (A) whose the next room behind a full junction is: nobody takes it.
+    :param stays: (A) whether an agent waits before a red light or a full junction: it comes to no
+        conflict.
+    :param first: (A) whether it is the first before a full junction: in a roundabout, agents that
+        enter still yield to it.
+    :param next_in: (A) whether the next free room behind a full junction is its own: no other
+        agent takes it.
     """
     room = 64
     found = _empty(len(at.slots), room)
@@ -152,7 +154,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
 
 @compiled
 def is_let_in(agents: AgentTable, slot: int, passage: Passages, i: int, step: int) -> bool:
-    """Return whether an agent was let in so far on its way: not only into a junction before."""
+    """Return whether an agent was let into the junction at a step of its way."""
     return bool(agents.grant[slot] >= 0 and step <= passage.granted[i])
 
 

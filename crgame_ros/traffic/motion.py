@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Moving all agents along their lanes between two decisions."""
+"""Motion of all agents along their lanes between two decisions."""
 
 import math
 
@@ -26,7 +26,7 @@ LANES_AHEAD = 12
 
 class Motion:
     """
-    Steers agents along their references and moves them (FS M1: cheap tracking).
+    The motion of agents along their references (FS M1: cheap tracking).
 
     :param graph: the lanes.
     :param routes: where agents go.
@@ -57,7 +57,7 @@ def move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntAr
          reference: FloatArray, substeps: int, dt_s: float) -> None:
     """Move agents by some steps; see `Motion.move`."""
     for slot in slots:
-        # The sharpest bend as far as one looks where it is straight.
+        # The sharpest bend within the pursuit distance of a straight road.
         reach, bend = pursuit_distance(agents.speed[slot], 0.0), 0.0
         rear = agents.s[slot] - agents.rear_to_center[slot]
         for n in range(3):
@@ -86,7 +86,8 @@ def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
         steering = steer_towards(dx * cos + dy * sin, dy * cos - dx * sin, wheelbase, steering,
                                  MAX_STEERING, MAX_STEERING_RATE, dt_s)
         chord, half_turn, speed = drive(speed, steering, acceleration, wheelbase, dt_s)
-        # Half the turn on, drive, the other half: sine and cosine of such small angles.
+        # Turn by half the angle, drive the chord, turn by the other half; sine and cosine are
+        # series for small angles.
         turn_cos = 1.0 - 0.5 * half_turn**2 * (1.0 - half_turn**2 / 12.0)
         turn_sin = half_turn * (1.0 - half_turn**2 / 6.0 * (1.0 - half_turn**2 / 20.0))
         cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
@@ -128,7 +129,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
 @inlined
 def onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
            s: float) -> tuple[int, float]:
-    """Return the lane on a route, and the arc length there, for an arc length of an earlier."""
+    """Return the lane on a route and the arc length there, from those of an earlier lane."""
     for _ in range(LANES_AHEAD):
         if s <= lanes.length[lane]:
             break
@@ -143,7 +144,7 @@ def onward(lanes: LaneTable, following: IntArray, destination: int, lane: int,
 @bare
 def _go_over(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, s: float,
              x: float, y: float) -> tuple[int, float, float]:
-    """Take an agent over to the next lane where its own has ended; give it, s and d there [m]."""
+    """Move an agent to its next lane where its own has ended; return that lane, s and d [m]."""
     lane = agents.lane[i]
     length, onto = lanes.length[lane], following[agents.destination[i], lane]
     agents.previous[i], agents.lane[i] = lane, onto

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 import shapely
 
 UNDECIDED, STRAIGHT, LEFT, RIGHT = range(4)
-# Less than this is no turn [rad].
+# An angle below this is no turn [rad].
 TURN = 0.5
-# Turns that movements stand for, and how far off one that a file names may be [rad].
+# The nominal angle of each movement, and how far a named movement may differ from it [rad].
 HEADING = {STRAIGHT: 0.0, LEFT: 0.5 * math.pi, RIGHT: -0.5 * math.pi}
 PLAUSIBLE = math.pi / 3.0
 # Ways whose angles differ by less are one [rad].
 SAME = 0.3
-# Centre lines that come this near to each other meet: those of a junction [m].
+# Centre lines that come this near to each other meet: they belong to a junction [m].
 MEETING = 1.0
-# A light may stand so far before its junction; longer than the other nothing is one junction [m].
+# Greatest distance of a light before its junction, and greatest length of a junction [m].
 APPROACH, LONGEST = 60.0, 150.0
 MAX_PASSAGES = 64
 
@@ -34,9 +34,10 @@ class LanePassage(NamedTuple):
 
     :param lanes: in the order of travel.
     :param exit: the lane behind it, -1 where there is none.
-    :param movement: STRAIGHT, LEFT or RIGHT as the file names it: what the arrows of lights mean.
-    :param turn: the same as it is driven. At T-junctions files call what turns "straight on" and
-        what goes straight on "left": it is no left turn that has to yield.
+    :param movement: STRAIGHT, LEFT or RIGHT as the file names it, to which the arrows of lights
+        refer.
+    :param turn: the same as it is driven. At T-junctions files call a way that turns "straight
+        on", and one that goes straight on "left", which is no left turn that has to yield.
     :param heading: before the junction [rad]
     :param angle: by which it turns, positive to the left [rad]
     """
@@ -54,20 +55,20 @@ class Movements:
     The movements of all junctions: those that the file names, by geometry where it names none.
 
     A file names the first lanelets behind an incoming one. These may be part of several movements,
-    and turn by a few degrees only: the ways on from there to the exits decide.
+    and turn by a few degrees only. Therefore the whole ways from there to the exits decide.
 
     :param graph: the lanes.
 
     Attributes of each lane (L): `turn`, the movement inside junctions as it is driven, UNDECIDED
-    where several share a lane, and outside; `heading`, with which one comes to the junction, and
-    `angle`, by which the whole way turns there [rad]; of the lane itself where ways differ, and
+    where several share a lane, and outside; `heading` of the way before the junction and `angle`
+    by which the whole way turns there [rad], or those of the lane itself where ways differ, and
     outside.
     """
 
     def __init__(self, graph: LaneGraph) -> None:
         self._graph = graph
         self._inside = _inside(graph)
-        # What the file says: by incoming lane, the movements of the lanes that follow it.
+        # From the file: by incoming lane, the movements of the lanes that follow it.
         self._named: dict[int, dict[int, set[int]]] = {}
         for intersection in graph.network.lanelet_network.intersections:
             for incoming in intersection.incomings:
@@ -90,11 +91,11 @@ class Movements:
 
     def after(self, lane: int) -> IntArray:
         """
-        Return what decides about the movements of ways on from a lane, through the next junction.
+        Return the movements of the ways from a lane through the next junction, by lane.
 
-        :return: (L) the movement that a way from here belongs to if it leads over a lane;
-            UNDECIDED where that still depends on what follows, and everywhere else. The first lane
-            of a way that is decided counts.
+        :return: (L) the movement of a way from here that leads over a lane; UNDECIDED where it
+            still depends on later lanes, and everywhere else. The first decided lane of a way
+            counts.
         """
         result = np.zeros(len(self._graph), dtype=np.int64)
         _decide(result, ((passage.lanes + (passage.exit,) * (passage.exit >= 0), passage.movement)
@@ -102,7 +103,7 @@ class Movements:
         return result
 
     def is_first(self, lane: int) -> bool:
-        """Return whether the file names a lane as the first of a junction, and no incoming one."""
+        """Return whether the file names a lane as first of a junction but not as incoming."""
         return lane in self._first and lane not in self._named
 
     def _read(self, incoming: IntersectionIncomingElement) -> None:
@@ -125,7 +126,7 @@ class Movements:
             bool(self._inside[follower]) and follower not in self._named)
 
     def _ahead(self, lane: int) -> Iterator[LanePassage]:
-        """List the ways through the next junction from a lane on, at most `APPROACH` before it."""
+        """List the ways through the next junction, at most `APPROACH` behind a lane."""
         if self.is_first(lane):
             before = [int(i) for i in self._graph.predecessors[lane] if i >= 0]
             for previous in before or [-1]:
@@ -145,7 +146,7 @@ class Movements:
 
     def _through(self, before: int, first: int,
                  names: dict[int, set[int]] | None = None) -> list[LanePassage]:
-        """List the ways through a junction that begin with a lane; what comes before, or -1."""
+        """List the ways through a junction from its lane `first`; `before` that lane, or -1."""
         names = self._named.get(before, {}) if names is None else names
         named = sorted(names.get(first, ()))
         ways = list(self._ways(first))
@@ -192,7 +193,7 @@ class Movements:
 
 
 def _decide(result: IntArray, ways: Iterable[tuple[tuple[int, ...], int]]) -> None:
-    """Write down the movement of the lanes whose ways all have the same."""
+    """Write the movement of each lane whose ways all have the same."""
     found: dict[int, set[int]] = {}
     for lanes, movement in ways:
         for lane in lanes:
@@ -203,7 +204,7 @@ def _decide(result: IntArray, ways: Iterable[tuple[tuple[int, ...], int]]) -> No
 
 
 def _agree(result: FloatArray, ways: Iterable[tuple[tuple[int, ...], float]]) -> None:
-    """Write down the angles of the lanes whose ways all have nearly the same."""
+    """Write the angle of each lane whose ways all have nearly the same."""
     found: dict[int, list[float]] = {}
     for lanes, angle in ways:
         for lane in lanes:
@@ -220,7 +221,7 @@ def _inside(graph: LaneGraph) -> NDArray[np.bool_]:
     one, other = shapely.STRtree(lines).query(lines, predicate='dwithin', distance=MEETING)
     start = np.stack((graph.x, graph.y), axis=-1)[graph.first]
     end = np.stack((graph.x, graph.y), axis=-1)[graph.first + graph.count - 1]
-    # Published maps leave out links: what begins where another ends follows it all the same.
+    # Published maps leave out links: a lane that begins where another ends counts as linked.
     follows = np.hypot(*(end[one] - start[other]).T) < MEETING
     leads = np.hypot(*(end[other] - start[one]).T) < MEETING
     linked = (graph.successors[one] == other[:, None]).any(axis=1) | (

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""On which side of standing obstacles a lane can be driven, and with how much room."""
+"""The side on which a lane passes standing obstacles, and the room there."""
 
 from dataclasses import dataclass
 import math
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Sides whose offsets differ by less are equal: the one with more room is taken, then the middle's.
+# Sides whose offsets differ by less count as equal: more room decides, then the side towards the
+# middle of the road [m].
 TIE = 0.05
-# The band gives way to an obstacle by less than this.
+# An obstacle's clearance shrinks by less than this under the force of the band [m].
 SLACK = 1e-3
 EQUAL = 1e-9
 
@@ -36,7 +37,7 @@ class Obstacles(NamedTuple):
     half_width: Array
 
     def select(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> 'Obstacles':
-        """Pick some of them."""
+        """Return some of them."""
         return Obstacles(self.lane[chosen], self.s[chosen], self.d[chosen],
                          self.half_length[chosen], self.half_width[chosen])
 
@@ -67,8 +68,9 @@ class PassageRules:
     :param min_clearance: with less the lane is blocked [m]
     :param half_width: of the vehicles [m]
     :param half_length: of the vehicles, added before and behind each obstacle [m]
-    :param wide_half_width: of the widest ones, for whom the same way is made wherever there is
-        room for them; `half_width` at least [m]
+    :param wide_half_width: of the widest vehicles, which the way suits wherever there is room for
+        them; at least `half_width` [m]
+    :param left_first: whether the left side wins a tie.
     """
 
     clearance: float
@@ -99,15 +101,15 @@ class PassageRules:
     def choose(self, group: Obstacles, step: float, left: Array, right: Array,
                for_wide: bool = True) -> Passage | None:
         """
-        Choose the way past a group: through which of the slots between neighbours across.
+        Return the way past a group, through one of the slots between neighbours across.
 
-        A way with full clearance goes before one without, then the smaller offset, then more
-        room, then the side that goes first.
+        A way with full clearance is better than one without. Then the smaller offset decides,
+        then more room, then `left_first`.
 
         :param step: of the grid [m]
         :param left: (S,) room to the left of the centre line at the nodes [m]
         :param right: (S,) to the right [m]
-        :param for_wide: whether to look for one for the widest vehicles first.
+        :param for_wide: whether to look first for a way for the widest vehicles.
         :return: None where no way leaves the least clearance.
         """
         group = group.select(np.argsort(group.d, kind='stable'))
@@ -118,7 +120,7 @@ class PassageRules:
 
     def _best(self, group: Obstacles, half_width: float, step: float, left: Array,
               right: Array) -> Passage | None:
-        """Choose the way for vehicles of a width; the group is sorted by d."""
+        """Return the best way for vehicles of a width; the group is sorted by d."""
         reach = group.half_length + self.half_length
         first = max(math.floor((group.s - reach).min() / step), 0)
         last = min(math.ceil((group.s + reach).max() / step), len(left) - 1)
@@ -129,7 +131,7 @@ class PassageRules:
                           0.5 * (highs - lows)).min(axis=1)
         best, best_key = None, (True, math.inf, math.inf)
         slots = range(len(room))
-        # The side that goes first so wins a tie.
+        # The first slot tried wins a tie.
         for slot in reversed(slots) if self.left_first else slots:
             if room[slot] < self.min_clearance - EQUAL:
                 continue
@@ -150,10 +152,10 @@ class PassageRules:
     def _slots(self, group: Obstacles, half_width: float, nodes: Array,
                margin: float) -> tuple[Array, Array]:
         """
-        Bound the offset in each slot: slot j passes left of the first j, right of the others.
+        Return the bounds of each slot: slot j passes left of the first j, right of the others.
 
         :param group: sorted by d
-        :param margin: added along the lane, because the band is bound at nodes only [m]
+        :param margin: added along the lane, because the band is bounded only at nodes [m]
         :return: lowest and highest offset that touch nothing, both (m + 1, n) [m]
         """
         reach = group.half_length + self.half_length + margin

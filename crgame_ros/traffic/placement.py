@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which part of which lane is taken by whom."""
+"""The parts of lanes that vehicles, people and obstacles take."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,16 +12,16 @@ from crgame_ros.traffic.lane_table import angle_between, LaneTable, nearest_row,
 import numpy as np
 from numpy.typing import NDArray
 
-# How far ahead a body's way to the side counts as taken, by what it is [s], and at most [m].
+# For this time a body's motion to the side counts as taken, by its kind [s], and at most [m].
 WALKER_TIME, WALKER_SHIFT = 4.0, 6.0
 VEHICLE_TIME, VEHICLE_SHIFT = 0.7, 3.0
-# A body that points elsewhere than its lane by more than this crosses it [rad].
+# A body whose heading differs from its lane's by more than this crosses it [rad].
 CROSSING = 0.7
-# Bodies beside a lane by less than this count as in it: who drives there may be wider [m].
+# Bodies within this distance of a lane count as in it: vehicles may be wider than the lane [m].
 BESIDE = 0.4
-# From the middle of a lane to its edge, at most, and what a first guess is off by [m].
+# Greatest distance from the middle of a lane to its edge, plus the error of a first guess [m].
 FARTHEST = 5.0
-# Beyond what rounding errors make of a body beside a straight lane [m].
+# More than the rounding errors for a body beside a straight lane [m].
 SURE = 0.01
 # Lanes with more bodies are sorted by a general algorithm.
 FEW = 32
@@ -37,8 +37,9 @@ class Bodies(NamedTuple):
     :param length: (B) [m]
     :param width: (B) [m]
     :param owner: (B) agent, or -1 - n for the n-th of the others.
-    :param time: (B) how far ahead its way to the side is taken [s]
-    :param claim: (B) lane into which it is changing and of which it has its width already, or -1.
+    :param time: (B) for which its motion to the side counts as taken [s]
+    :param claim: (B) lane into which it is changing and in which it takes its width already, or
+        -1.
     """
 
     poses: FloatArray
@@ -53,7 +54,7 @@ class Bodies(NamedTuple):
 
 class Entries(NamedTuple):
     """
-    What is in the lanes (E), in the order of lane and of where it begins.
+    The entries (E): bodies in lanes, in the order of lane and of where they begin.
 
     :param begin: (L + 1) rows at which the entries of each lane begin.
     :param lane: (E)
@@ -62,12 +63,12 @@ class Entries(NamedTuple):
     :param low: (E) its right edge, as an offset to the left [m]
     :param high: (E) its left edge [m]
     :param corners: (E, 4, 2) arc lengths and offsets of its corners, in turn [m]
-    :param drift: (E) how far to the side it takes more, by its motion there [m]
+    :param drift: (E) additional room to the side, from its motion there [m]
     :param speed: (E) along the lane [m/s]
     :param aside: (E) across it, to the left [m/s]
     :param acceleration: (E) along the lane [m/s^2]
     :param crosses: (E) whether it points across the lane or against it.
-    :param claims: (E) whether it is changing into the lane, and has it already.
+    :param claims: (E) whether it is changing into the lane and takes it already.
     :param owner: (E) as in `Bodies`.
     :param body: (E) row of `Bodies`.
     """
@@ -89,7 +90,7 @@ class Entries(NamedTuple):
     body: IntArray
 
     def select(self, rows: IntArray) -> 'Entries':
-        """Pick some of them; where those of each lane begin is not told."""
+        """Return some of them, with an empty `begin`."""
         columns: list[Any] = [column[rows] for column in self[1:]]
         return Entries(np.empty(0, np.int64), *columns)
 
@@ -99,9 +100,9 @@ def place(lanes: LaneTable, cells: CellTable, bodies: Bodies) -> Entries:
     """
     Find the part of every lane that bodies take.
 
-    A body's corners in the lane's coordinates bound it; `rear_within` tells which part of it is
-    in the way of whom. Where it moves to the side, or walks, what it takes within its time ahead
-    belongs to it; who changes lanes has the new one already.
+    A body's corners in the lane's coordinates bound it; `rear_within` finds the part of it that is
+    in the way of an agent. If the body moves to the side, it also takes the room that it reaches
+    within its time. A body that changes lanes takes the new lane already.
     """
     cell = np.empty(len(bodies.owner), np.int64)
     found = _empty(len(lanes.first), _find_cells(cells, bodies, cell))
@@ -125,7 +126,7 @@ def _empty(lanes: int, room: int) -> Entries:
 
 @bare
 def _find_cells(cells: CellTable, bodies: Bodies, cell: IntArray) -> int:
-    """Write the cells of bodies (B); return how many lanes there are in them."""
+    """Write the cells of bodies (B); return the number of lanes in them."""
     room = 0
     for i in range(len(cell)):
         cell[i] = cell_of(cells, bodies.poses[i, 0], bodies.poses[i, 1])
@@ -156,7 +157,7 @@ def _find(lanes: LaneTable, cells: CellTable, bodies: Bodies, cell: IntArray,
             here = lanes.line[nearest_row(lanes, lane, cells.guesses[j])]
             aside = half_length * abs(north * here.cos - east * here.sin) + half_width * abs(
                 east * here.cos + north * here.sin)
-            # Where a lane is straight its frame is the same all over.
+            # The frame of a straight lane is the same everywhere.
             slack = cells.turning[lane] * (40.0 + 3.0 * reach)
             if abs(d) - aside - drift - slack > cells.widest[lane] + BESIDE + SURE and (
                     bodies.claim[i] != lane):
@@ -168,7 +169,7 @@ def _find(lanes: LaneTable, cells: CellTable, bodies: Bodies, cell: IntArray,
 @inlined
 def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, ahead_x: float,
          ahead_y: float, found: Entries, n: int) -> int:
-    """Write the entry of a body in a lane into row n, if it is in it; return how many."""
+    """Write the entry of a body into row n if it is in a lane; return the number of entries."""
     x, y, heading = bodies.poses[i, 0], bodies.poses[i, 1], bodies.poses[i, 2]
     half_length, half_width = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
     reach = half_length + half_width
@@ -246,7 +247,7 @@ def _write_ordered(found: Entries, order: IntArray, result: Entries) -> None:
 
 @compiled
 def _sort_part(order: IntArray, keys: FloatArray, start: int, end: int) -> None:
-    """Sort a part of an order by keys; equal ones stay as they are."""
+    """Sort a part of an order by keys; equal ones keep their order."""
     if end - start > FEW:
         part = order[start:end].copy()
         order[start:end] = part[np.argsort(keys[part], kind='mergesort')]

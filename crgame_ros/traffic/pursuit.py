@@ -1,31 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Steering one agent along its reference: pure pursuit and kinematic bicycle."""
+"""Steering of one agent along its reference: pure pursuit and kinematic bicycle."""
 
 import math
 
 from crgame_ros.traffic.compiled import compiled, inlined
 
-# Time by which the target point is ahead; Snider (2009) tunes it per course, 1 s is steady on
-# straights [s]; and the bounds of its distance [m].
+# Time to the target point; Snider (2009) tunes it per course, 1 s is steady on straights [s]. Then
+# the bounds of its distance [m].
 PURSUIT_TIME, SHORTEST, LONGEST = 1.0, 3.0, 25.0
 # Where the road bends, the chord to the target point leaves it by at most this [m].
 CUT = 0.12
-# In a curve the front swings out: the rear axle keeps inside by at most this [m].
+# In a curve the front swings out: the rear axle shifts to the inside by at most this [m].
 MAX_CURVE_SHIFT = 1.0
-# And it swings out by at most this before a bend that is too tight without [m].
+# Greatest swing to the outside of a bend that is too tight otherwise [m].
 MAX_SWING = 1.5
-# Vehicles are long from here on, those of over 6.25 m: from the rear axle to the front bumper [m].
+# Least distance from rear axle to front bumper of a long vehicle: one of over 6.25 m [m].
 LONG_FRONT = 5.0
 
 
 @inlined
 def curve_shift(curvature: float, front: float) -> float:
     """
-    Return how far to the left of a bend's middle a rear axle runs, negative to the right [m].
+    Return how far to the left of the centre line a rear axle runs, negative to the right [m].
 
-    With it f^2 / (4 R) inside, the rear's inner and the front's outer corner are equally far out:
-    a vehicle takes as much more than half its width on either side.
+    With the rear axle f^2 / (4 R) inside a bend, the rear's inner and the front's outer corner are
+    equally far out: the vehicle takes the same additional width on either side.
 
     :param curvature: 1 / R, positive to the left [1/m]
     :param front: f, from the rear axle to the front bumper [m]
@@ -36,7 +36,7 @@ def curve_shift(curvature: float, front: float) -> float:
 @inlined
 def swing_out(swing: float, swing_long: float, front: float) -> float:
     """
-    Return how far to the left a vehicle swings out for a bend that is too tight without [m].
+    Return how far to the left a vehicle swings out for a bend that is too tight otherwise [m].
 
     :param swing: of cars, at the point of the lane [1/m]
     :param swing_long: of long vehicles [1/m]
@@ -49,7 +49,7 @@ def swing_out(swing: float, swing_long: float, front: float) -> float:
 @compiled
 def pursuit_distance(speed: float, curvature: float) -> float:
     """
-    Return how far ahead on the reference the target point of `steer` lies.
+    Return how far ahead on the reference the target point of `steer_towards` lies.
 
     A chord of length l leaves an arc by l^2 |kappa| / 8.
 
@@ -65,7 +65,7 @@ def pursuit_distance(speed: float, curvature: float) -> float:
 def steer_towards(ahead: float, aside: float, wheelbase: float, steering: float,
                   max_steering: float, max_rate: float, dt_s: float) -> float:
     """
-    Steer towards a point on the reference: pure pursuit (Snider 2009, section 2.2).
+    Return the steering towards a point on the reference: pure pursuit (Snider 2009, section 2.2).
 
     The arc through the rear axle, tangent to the heading, and the point has the curvature
     2 y_t / (x_t^2 + y_t^2) with the point's coordinates in the vehicle's frame; the bicycle
@@ -93,7 +93,7 @@ def drive(speed: float, steering: float, acceleration: float, wheelbase: float,
 
     With constant steering angle and acceleration a rear axle drives an arc: the distance ds is
     quadratic in time, the turn is ds tan(delta) / L and the chord ds sin(turn / 2) / (turn / 2).
-    Who brakes to rest within the step stays there; nobody moves backwards.
+    A vehicle that brakes to rest within the step stays there; it never moves backwards.
 
     :param speed: at least 0 [m/s]
     :param steering: [rad]

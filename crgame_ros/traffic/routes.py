@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where agents can go, and which lane leads there."""
+"""Destinations of agents, and the lanes that lead there."""
 
 import math
 
@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-# A lane change counts as this detour [m], more where the lane is shorter than it wants to be.
+# A lane change counts as this detour [m], and as more in a lane shorter than `CHANGE_LENGTH` [m].
 CHANGE_COST = 20.0
 CHANGE_LENGTH = 40.0
 # Long vehicles plan no changes in lanes that are shorter [m].
 SHORT = 60.0
-# Staying in a lane that reaches the destination by a longer way is fine up to this [m].
+# An agent stays in a lane that leads to its destination by a detour of at most this [m].
 DETOUR = 100.0
 MAX_LOOP_DESTINATIONS = 16
-# No lane of a net that leaves nowhere is farther than this from a destination, if so many do [m].
+# A net without exits gets destinations until no lane is farther than this from one, or until there
+# are `MAX_LOOP_DESTINATIONS` [m].
 LEAST_LOOP = 150.0
 
 
@@ -29,14 +30,15 @@ class Routes:
     """
     The ways to every destination, as tables over destinations (D) and lanes (L).
 
-    A destination is where a road leaves the map, all its parallel lanes together; in a net that
-    leaves nowhere, roads far from each other are.
+    A destination is a road that leaves the map, with all its parallel lanes. In a net without
+    exits, roads far from each other are destinations.
 
     :param graph: the lanes.
-    :param costly: (L) what driving along a lane costs besides its length [m]
-    :param tight: (L) which lanes are too tight for long vehicles. The tables have a second row
-        for each destination then, D further on, with the ways of these.
-    :param keeps_left: whether traffic does; where both sides lead on it takes the inner one.
+    :param costly: (L) cost of driving along a lane besides its length [m]
+    :param tight: (L) which lanes are too tight for long vehicles. If given, the tables have a
+        second row for each destination, D rows further on, with the ways of long vehicles.
+    :param keeps_left: whether traffic does; between two lane changes of equal cost agents take
+        the one towards the middle of the road.
     """
 
     def __init__(self, graph: LaneGraph, costly: FloatArray | None = None,
@@ -49,7 +51,7 @@ class Routes:
         self.onward = _straightest(graph)
         ends = graph.successors[:, 0] < 0
         side = [[j for j in (graph.left[i], graph.right[i]) if j >= 0] for i in lanes]
-        # A lane that ends beside one that goes on: whoever is on it has to merge.
+        # A lane that ends beside one that goes on: agents on it have to merge.
         self.drops: NDArray[np.bool_] = ends & np.array(
             [not ends[_road(graph, int(i))].all() for i in lanes])
         self.is_exit: NDArray[np.bool_] = ends & ~self.drops
@@ -66,7 +68,8 @@ class Routes:
         self.groups += [group for group, _ in loops]
         costs += [cost for _, cost in loops]
         if tight is not None:
-            # In short lanes there is no time for a change: who misses it gets into tight ones.
+            # In short lanes there is no time for a change: a vehicle that misses it gets into
+            # tight ones.
             short = diags_array((graph.length > SHORT).astype(np.float64)).tocsr()
             both = (stay + short @ change).tocsr().T.tocsr()
             wide = diags_array((~tight).astype(np.float64)).tocsr()
@@ -83,10 +86,10 @@ class Routes:
     def _loop_destinations(self, reverse: csr_matrix, nowhere: NDArray[np.bool_],
                            ) -> list[tuple[IntArray, FloatArray]]:
         """
-        Choose roads as destinations of lanes that lead to none, as far apart as can be.
+        Choose roads, as far apart as possible, as destinations of lanes that lead to no exit.
 
         :param reverse: costs against the direction of travel.
-        :param nowhere: (L) these lanes.
+        :param nowhere: (L) the lanes that lead to no exit.
         :return: lanes of each destination, and the cost (L) of every lane to it.
         """
         found: list[tuple[IntArray, FloatArray]] = []
@@ -98,7 +101,7 @@ class Routes:
         return found
 
     def _choose(self) -> None:
-        """Tabulate the best successor, and where the lane has to be left for another."""
+        """Tabulate the best successor of each lane, and where agents have to change lanes."""
         graph, count = self._graph, len(self.cost)
         rows = np.arange(count)[:, None]
         succ = graph.successors
@@ -128,8 +131,8 @@ class Routes:
         """
         List the destinations that a lane leads to.
 
-        For long vehicles those ways that fit, and that they need not change lanes for at once:
-        in a queue nobody gets to.
+        For long vehicles these are destinations with a way that is wide enough and needs no lane
+        change at once, because in a queue there is no chance of one.
         """
         count = len(self.groups)
         if not long:
@@ -139,9 +142,9 @@ class Routes:
 
     def draw(self, lane: int, generator: np.random.Generator, long: bool = False) -> int:
         """
-        Draw one of the destinations that a lane leads to, each as likely.
+        Draw one of the destinations that a lane leads to, each with the same probability.
 
-        Long vehicles to whom no way is wide enough take the ways of others.
+        Long vehicles take the ways of other vehicles where no way is wide enough.
         """
         choice = self.reachable(lane, long)
         if long and not len(choice):
@@ -150,14 +153,14 @@ class Routes:
 
     def elsewhere(self, lane: int, destination: int, generator: np.random.Generator,
                   long: bool = False) -> int:
-        """Draw a destination to which another way leads on from a lane, else the present one."""
+        """Draw a destination with another next lane, or return the present one without any."""
         choice = self.reachable(lane, long)
         other = choice[(self.next[choice, lane] != self.next[destination, lane])
                        & (self.change[choice, lane] == 0)]
         return int(other[generator.integers(len(other))]) if len(other) else destination
 
     def towards(self, lane: int, target: int, long: bool = False) -> int | None:
-        """Find a destination behind a lane that the way from another leads through, if any."""
+        """Return a destination whose way from a lane leads through the target lane, or None."""
         choice = self.reachable(lane, long)
         for destination in choice[np.argsort(self.cost[choice, target], kind='stable')]:
             if not np.isfinite(self.cost[destination, [lane, target]]).all():
@@ -174,7 +177,7 @@ class Routes:
 
 
 def _edges(graph: LaneGraph, length: FloatArray) -> tuple[csr_matrix, csr_matrix]:
-    """Return the costs of going on and of changing lanes, (L, L) each."""
+    """Return the costs of driving on and of changing lanes, (L, L) each."""
     shape = (len(graph), len(graph))
     lane, column = np.nonzero(graph.successors >= 0)
     stay = csr_matrix((np.maximum(length[lane], 0.1),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How agents come onto the road: placed at random, arriving at its edges, or from a recording."""
+"""Spawning of agents: placed at random, arriving at the map's edges, or from a recording."""
 
 from collections.abc import Sequence
 import math
@@ -23,22 +23,22 @@ from crgame_ros.traffic.stop_lines import StopLines
 from crgame_ros.traffic.world_view import with_agents
 import numpy as np
 
-# Between agents at the start, besides s0 [m] and at their speeds [s].
+# Gap between agents at the start: a distance [m], and a time at their speeds [s].
 START_GAP = 3.0
 START_TIME = 1.2
 SIDE_GAP = 0.6
 LANE = 3.5
-# With which a newcomer could stop before what lies ahead [m/s^2].
+# Deceleration with which a newcomer could stop for anything ahead [m/s^2].
 EASY = 1.5
-# With which those who were recorded get behind who is ahead [m/s^2], and the gap they leave [m].
+# Deceleration of a recorded newcomer behind its leader [m/s^2], and the gap that it leaves [m].
 FIRM, STOP_GAP = 2.0, 2.0
-# Nor nearer than so long at their speeds [s].
+# Least time gap of a recorded newcomer [s].
 CLOSE_TIME = 0.25
 
 
 def safe_speed(pose: FloatArray, length: float, width: float, agents: Agents,
                others: Bodies) -> float:
-    """Return the speed from which a newcomer gets behind everybody ahead with firm braking."""
+    """Return the speed from which firm braking suffices behind all vehicles ahead."""
     here = np.flatnonzero(agents.active)
     poses = np.concatenate((agents.centers()[here], others.poses))
     lengths = np.concatenate((agents.length[here], others.length))
@@ -61,7 +61,7 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
     """
     Return whether a place is free, with a gap to the front and the rear.
 
-    :param close: whether touching nobody is enough.
+    :param close: whether a small gap is enough, as for a recorded newcomer.
     """
     here = np.flatnonzero(agents.active)
     poses = np.concatenate((agents.centers()[here], others.poses))
@@ -77,16 +77,16 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
     turn = poses[:, 2] - pose[2]
     long = 0.5 * (length + lengths * np.abs(np.cos(turn)) + widths * np.abs(np.sin(turn)))
     wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
-    # Who is changing lanes takes both.
+    # An agent that changes lanes takes both.
     wide += np.concatenate((np.where(agents.source[here] != NOBODY, LANE, 0.0),
                             np.zeros(len(others.length))))
     gap = 0.5 if close else START_GAP + START_TIME * np.maximum(speeds, speed)
     if not close:
-        # Whoever is faster and behind has to slow down.
+        # The vehicle behind has to slow down if it is faster.
         faster = np.where(ahead > 0.0, speed**2 - speeds**2, speeds**2 - speed**2)
         gap = gap + np.maximum(faster, 0.0) / (2.0 * EASY)
     else:
-        # Nor must anybody behind brake hard for whoever was recorded.
+        # No vehicle behind must have to brake hard for a recorded newcomer.
         closing = np.where(ahead < 0.0, np.maximum(speeds**2 - speed**2, 0.0), 0.0)
         gap = gap + closing / (2.0 * FIRM) + CLOSE_TIME * np.where(
             ahead < 0.0, speeds, np.minimum(speeds, speed))
@@ -98,27 +98,27 @@ CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
 # Recorded cars are larger now and then.
 LARGE_CAR = Shape.rectangle(5.0, 1.9)
 TRIES = 40
-# Longer vehicles take wide ways [m].
+# Longer vehicles need wide ways [m].
 LONG = 6.5
-# Nobody arrives while more than this share of all have stood for so long [s]: more vehicles would
-# block the junctions behind each other, and fewer would leave.
+# No agent arrives while more than this share of all has stood for this time [s]: more vehicles
+# would block the junctions for each other, and fewer would leave.
 JAM_SHARE, JAM_TIME = 0.25, 20.0
-# Rounds in which those who are placed together get used to each other's speeds.
+# Rounds in which agents that are placed together adapt to each other's speeds.
 CALMING = 3
-# Recorded vehicles take bends so much faster than agents do, by the square root of accelerations.
+# Recorded vehicles may take bends faster than agents by this factor of the speed.
 TOO_FAST = 1.2
-# What a newcomer may have to stop for is looked for as far as this [m].
+# Distance within which a newcomer checks for junctions, lights and lane ends [m].
 FARTHEST = 150.0
 
 
 def is_long(length: float) -> bool:
-    """Return whether a vehicle needs ways that are wide enough [m]."""
+    """Return whether a vehicle of a length [m] needs wide ways."""
     return length > LONG
 
 
 def slot_descriptions(count: int, truck_share: float,
                       generator: np.random.Generator) -> list[ObjectDescription]:
-    """Describe agents t0, t1, … of no recording: cars, and a share of trucks."""
+    """Return descriptions of agents t0, t1, … of no recording: cars, and a share of trucks."""
     trucks = generator.random(count) < truck_share
     return [ObjectDescription(f't{i}', 'truck' if truck else 'car', Role.TRAFFIC,
                               TRUCK if truck else CAR) for i, truck in enumerate(trucks)]
@@ -126,14 +126,14 @@ def slot_descriptions(count: int, truck_share: float,
 
 class Spawner:
     """
-    Puts agents on the road.
+    The source of agents on the road.
 
     :param graph: the lanes.
     :param cells: of the lanes.
     :param routes: where agents go.
-    :param conflicts: nobody is placed inside a junction.
-    :param speeds: that are allowed somewhere.
-    :param lines: with the lights as they are.
+    :param conflicts: of the lanes; no agent is placed inside a junction.
+    :param speeds: the speeds allowed on lanes.
+    :param lines: with the present states of the lights.
     :param adopted: recorded obstacles; they have the first slots.
     :param flow: arrivals at each lane that begins at the edge of the map [1/h]
     :param desired: speeds of newcomers.
@@ -182,7 +182,7 @@ class Spawner:
                     break
 
     def arrive(self, k: int, agents: Agents, others: Bodies) -> None:
-        """Let agents in at the edges of the map, as soon as there is room, but not into a jam."""
+        """Place due arrivals at the map's edges as soon as there is room, except in a jam."""
         self._due -= self._time_step_s
         waits = agents.waits[agents.active]
         if np.count_nonzero(waits * self._time_step_s > JAM_TIME) > JAM_SHARE * len(waits):
@@ -209,7 +209,7 @@ class Spawner:
                     break
 
     def calm(self, agents: Agents, others: Bodies) -> None:
-        """Let nobody begin faster than lets it get behind whoever is ahead with firm braking."""
+        """Lower the speeds of agents to those from which firm braking suffices behind leaders."""
         for _ in range(CALMING):
             slots = np.flatnonzero(agents.active)
             gap, speed = self._ahead(agents, slots, others)
@@ -219,7 +219,7 @@ class Spawner:
 
     def _ahead(self, agents: Agents, slots: IntArray,
                others: Bodies) -> tuple[FloatArray, FloatArray]:
-        """Return the gaps (A) to who is ahead of agents on their ways, and its speeds (A)."""
+        """Return the gaps (A) of agents to their leaders, and the leaders' speeds (A)."""
         lanes, middle = self._graph.table, np.zeros(len(slots))
         entries = place(lanes, self._cells.table, with_agents(others, agents.table))
         way = own_ways(lanes, self._routes.next, agents.table, slots)
@@ -232,9 +232,9 @@ class Spawner:
 
     def adopt(self, k: int, agents: Agents, others: Bodies) -> list[int]:
         """
-        Let recorded obstacles appear where they are recorded at k, if the place is free.
+        Place recorded obstacles where they are recorded at k, if the place is free.
 
-        :return: the slots of those who did.
+        :return: the slots of those that were placed.
         """
         appeared = []
         for slot in list(self._waiting):
@@ -252,9 +252,9 @@ class Spawner:
     def slow_down(self, agents: Agents, slots: IntArray, desired: FloatArray, halt: FloatArray,
                   newcomers: list[int]) -> None:
         """
-        Let newcomers be no faster than they can halt and take the bends ahead.
+        Limit the speeds of newcomers so that they can halt and take the bends ahead.
 
-        A recording goes on as it did; here others may have the right of way, and go elsewhere.
+        A newcomer may have to yield, or drive elsewhere, where its recording did not.
 
         :param desired: speeds (A) allowed where agents are [m/s]
         :param halt: distances (A) at which they have to halt [m]
@@ -264,7 +264,7 @@ class Spawner:
         agents.speed[slots[row]] = np.minimum(agents.speed[slots[row]], safe[row])
 
     def resume(self, k: int, agents: Agents, poses: FloatArray, velocities: FloatArray) -> None:
-        """Put all agents (A) where they are at k, and take the others off the road."""
+        """Place agents (A) at their poses at k, and remove the absent ones (NaN) from the road."""
         agents.remove(np.arange(agents.count), k)
         self._waiting = [i for i in self._waiting if self._adopted[i].first_k > k]
         for slot in np.flatnonzero(np.isfinite(poses).all(axis=1)).tolist():
@@ -301,7 +301,7 @@ class Spawner:
         towards = None if goal is None else self._routes.towards(lane, goal, long)
         if towards is None and goal is not None and (
                 agents.length[slot] > TRUCK.length or not len(self._routes.reachable(lane, long))):
-            # No way is known to be wide enough: the one that it took.
+            # No way is known to be wide enough, so it takes the one that was recorded.
             towards = self._routes.towards(lane, goal)
         agents.destination[slot] = (self._routes.draw(lane, self._random, long)
                                     if towards is None else towards)
@@ -327,7 +327,7 @@ class Spawner:
 
     def _speed(self, lane: int, s: float, agents: Agents, slot: int) -> float:
         """
-        Return the speed at which a newcomer drives.
+        Return the initial speed of a newcomer.
 
         It could still stop before a junction, the end of the lane or a light that is not green,
         and slow down for the bends and limits on its way.
@@ -378,6 +378,6 @@ class Spawner:
             lane, self._random, is_long(float(agents.length[slot])))
 
     def _fits_into(self, agents: Agents, slot: int, lane: int) -> bool:
-        """Return whether a vehicle of an agent's size gets on from a lane."""
+        """Return whether the ways from a lane are wide enough for an agent."""
         long = is_long(float(agents.length[slot]))
         return not long or len(self._routes.reachable(lane, long)) > 0

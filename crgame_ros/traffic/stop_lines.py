@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where traffic lights and stop signs want agents to halt."""
+"""Stop lines: where agents halt for traffic lights and stop signs."""
 
 from collections.abc import Mapping
 import math
@@ -27,13 +27,13 @@ YELLOW, RED = 1, 2
 LEVELS = {'yellow': YELLOW, 'red': RED, 'redYellow': RED}
 RED_STATES = [state for state, level in LEVELS.items() if level == RED]
 ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
-# Cycles of several lights are compared over so many time steps.
+# Cycles of several lights are compared over at most this number of time steps.
 LONGEST_CYCLE = 20_000
 # Hardest braking for a light that is red, and for one that turns yellow [m/s^2].
 RED_BRAKING = 4.0
 YELLOW_BRAKING = 3.4
-# Who has decided to halt doesn't drive on because that has become harder than wanted: at a yellow,
-# at a red light [m/s^2].
+# The same for an agent that has decided to halt, so that it keeps to its decision: at a yellow, at
+# a red light [m/s^2].
 STILL_BRAKING, STILL_FOR_RED = 4.0, 7.0
 # Time until braking has set in [s].
 REACTION = 0.1
@@ -52,20 +52,21 @@ class StopLines:
     """
     The stop lines and traffic lights of all lanes.
 
-    A light without arrows is for everybody, one with arrows for who goes where they point. What a
-    way does is decided by the first lane on it, from the one with the light on, whose `movement`
-    is. Where no light is for a movement, all are; where those for it would never all be free, the
-    arrows alone.
+    A light without arrows applies to all vehicles, one with arrows to vehicles that go where they
+    point. The movement of a way is that of its first lane, from the one with the light on, whose
+    `movement` is decided. If no light applies to a movement, all lights do. If those that apply
+    are never all free at once, only those with arrows count.
 
     :param graph: the lanes.
     :param roads: with the traffic lights and signs.
-    :param movements: of the lanes; made anew if not given.
+    :param movements: of the lanes; computed if not given.
 
     Attributes of each lane (L): `line` (arc length of its stop line [m], infinite without one),
     `stop_sign`, `at` (arc length of its lights' line [m]), `number` (row of its lights in
     `movement`, -1 without lights) and `shown` (L, 4): 2 for red, 1 for yellow, 0 for any other, by
-    movement; column 0 is for ways that are not decided as far as one looks, and forbids what any
-    movement there is forbidden. `movement` (R, L): what decides ways on from the lane of row R.
+    movement; column 0 is for ways whose movement is undecided as far as an agent looks, and shows
+    the strictest light of all movements there. `movement` (R, L): the movements of ways from the
+    lane of row R, see `Movements.after`.
     """
 
     def __init__(self, graph: LaneGraph, roads: LaneletNetwork,
@@ -93,7 +94,7 @@ class StopLines:
                 self.number[lane] = len(rows)
                 rows.append(movements.after(lane))
                 if lanelet.stop_line is None and movements.is_first(lane):
-                    # Nobody halts at the far side of the junction.
+                    # No agent halts at the far side of the junction.
                     self.at[lane] = 0.0
         self.movement: IntArray = np.array(rows, dtype=np.int64).reshape(-1, count)
         self._states: Mapping[int, str] | None = None
@@ -107,7 +108,7 @@ class StopLines:
         return float(np.clip(s[0], 0.0, length))
 
     def show(self, signals: Mapping[int, str]) -> None:
-        """Take over the states of the traffic lights."""
+        """Update the states of the traffic lights."""
         if signals == self._states:
             return
         self._states = dict(signals)
@@ -125,9 +126,9 @@ class StopLines:
         """
         Return the distance (A) of each agent's front from the first line with a light to heed [m].
 
-        Red holds unless braking hard would not suffice, yellow if gentle braking does.
+        An agent halts at red if hard braking suffices, at yellow if gentler braking does.
 
-        :param stops: (A) who has decided to halt before, and goes on to.
+        :param stops: (A) whether an agent has already decided to halt.
         """
         if not self._any_shown:
             return np.full(len(speed), np.inf)
@@ -160,7 +161,7 @@ def _halts(lights: LightTable, way: Ways, speed: FloatArray, length: FloatArray,
 
 @compiled
 def movement_of(lights: LightTable, way: Ways, i: int, step: int) -> int:
-    """Return the movement of a way at the lights of its lane: what is decided first counts."""
+    """Return the movement of a way at the lights of its lane: the first decided lane counts."""
     row = lights.number[way.lane[i, step]]
     for onward in range(step, way.depth[i]):
         movement = lights.movement[row, way.lane[i, onward]]
@@ -179,12 +180,12 @@ def _governing(lights: list[TrafficLight], arrow: str) -> tuple[int, ...]:
 
 
 def _is_never_free(lights: list[TrafficLight]) -> bool:
-    """Return whether at any time one of some lights is red."""
+    """Return whether at least one of the lights is red at any time."""
     red = [_red_steps(light) for light in lights]
     step = np.arange(min(math.lcm(*(len(x) for x in red)), LONGEST_CYCLE))
     return bool(np.any([x[step % len(x)] for x in red], axis=0).all())
 
 
 def _red_steps(light: TrafficLight) -> NDArray[np.bool_]:
-    """Return for the time steps of a light's cycle whether it is red."""
+    """Return whether a light is red at each time step of its cycle."""
     return np.isin(LightCycle(light).states_over(), RED_STATES)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One reference per lane around what stands in it, shared by all agents there (FS M1)."""
+"""One reference per lane around obstacles that stand in it, shared by all agents (FS M1)."""
 
 from crgame_ros.traffic.elastic_band import ElasticBand
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
@@ -13,15 +13,15 @@ from scipy.signal import bilinear, lfilter
 
 # A swerve begins and ends within this distance of its obstacle [m].
 REACH = 80.0
-# As wide as a truck may be in most countries [m].
+# Greatest legal width of a truck in most countries [m].
 WIDEST = 2.55
-# Slower than this agents needn't be in any curve [m/s].
+# No curve demands a lower speed than this [m/s].
 SLOWEST = 2.0
-# Cutting a swerve may take so much of the clearance [m].
+# Cutting a swerve may take this much of the clearance [m].
 CUT = 0.1
-# What is in front of the rear axles of cars and trucks, whose fronts swing out [m].
+# Points in front of the rear axle that are checked: fronts of cars and trucks swing out [m].
 FRONTS = (0.0, 3.5, 6.0)
-# Speeds at which cutting is looked at [m/s]; below, agents steer for the same distance ahead.
+# Speeds for which cutting is checked [m/s]; below, agents steer for the same distance ahead.
 SPEEDS = (4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0)
 
 
@@ -29,13 +29,13 @@ class Swerving:
     """
     The references of all lanes: offsets from their centre lines.
 
-    One band for all widths: it is made for the widest vehicles wherever these have room, which
-    gives cars more clearance than they ask for, and for cars elsewhere.
+    There is one band for all widths. It is planned for the widest vehicles wherever these have
+    room, which leaves cars more clearance than they need, and for cars elsewhere.
 
     :param graph: the lanes.
-    :param routes: their straightest continuations.
+    :param routes: with the straightest continuations of lanes.
     :param lateral_acceleration: comfortable in curves [m/s^2]
-    :param widest: vehicle that drives there [m]
+    :param widest: width of the widest vehicle [m]
     :param keeps_left: whether traffic does.
 
     Attributes at each row of the lanes' tables: `reference`, offset [m]; `curvature`, of the band,
@@ -57,9 +57,9 @@ class Swerving:
 
     def update(self, standing: Entries) -> None:
         """
-        Plan the references around standing things; what stays needs no new plan.
+        Plan the references around standing obstacles, if these have changed.
 
-        :param standing: where they are in lanes.
+        :param standing: the obstacles in lanes.
         """
         seen = np.concatenate((standing.lane, standing.rear, standing.front, standing.low,
                                standing.high)).round(2).tobytes()
@@ -76,7 +76,7 @@ class Swerving:
                 planned |= self._plan(lane, standing, planned)
 
     def _plan(self, lane: int, standing: Entries, planned: set[int]) -> set[int]:
-        """Plan one reference along a lane and what lies before and behind it."""
+        """Plan one reference along a lane and the lanes before and behind it; return them all."""
         graph, chain = self._graph, self._chain(lane)
         starts = np.concatenate(([0.0], np.cumsum(graph.length[chain])))
         step = self._band.step
@@ -104,7 +104,7 @@ class Swerving:
         return set(chain)
 
     def _chain(self, lane: int) -> list[int]:
-        """List the lane with what leads to it and what follows, each as far as a swerve."""
+        """Return a lane with those before and behind it, each as far as a swerve reaches."""
         graph, chain = self._graph, [lane]
         length = 0.0
         while length < REACH:
@@ -125,7 +125,7 @@ class Swerving:
 
 
 def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles:
-    """Return what stands in a chain of lanes, by the distance from its beginning."""
+    """Return the obstacles in a chain of lanes, by the distance from its beginning."""
     parts = [np.flatnonzero(standing.lane == i) for i in chain]
     number: IntArray = np.repeat(np.arange(len(chain)), [len(p) for p in parts])
     row = np.concatenate(parts)
@@ -139,11 +139,12 @@ def _along(chain: list[int], starts: FloatArray, standing: Entries) -> Obstacles
 
 def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArray:
     """
-    Return the speeds at which agents that steer by `tracking.steer` keep a band's clearance.
+    Return the speeds at which agents that steer by pure pursuit keep a band's clearance.
 
-    They steer for a point that is farther ahead the faster they drive, and so cut what is shorter
-    than that. On small angles a rear axle that steers for the point at the distance l moves as
-    l^2 y'' / 2 + l y' + y = d(s + l), and what is f in front of it is at y + f y'.
+    The faster they drive, the farther ahead is the point for which they steer, so that they cut
+    swerves shorter than that. For small angles a rear axle that steers for the point at the
+    distance l moves as l^2 y'' / 2 + l y' + y = d(s + l), and a point f in front of it is at
+    y + f y'.
 
     :param d: (S,) offsets at s = 0, step, ... [m]
     :return: (S,) infinite away from obstacles [m/s]

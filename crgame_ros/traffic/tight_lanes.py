@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which lanes are too tight for whom, and where swinging out helps: found by driving along them.
+Lanes that are too tight for cars or long vehicles, found by trial drives along them.
 
-Centre lines of published maps bend as sharply as 3 m, along the inner edge of wide junctions. Who
-drives there takes the room that there is.
+Centre lines of published maps bend with radii down to 3 m, along the inner edge of wide junctions.
+Real drivers use the room that there is, so agents swing out where that helps.
 """
 
 from collections.abc import Sequence
@@ -23,41 +23,43 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# Beyond the road by so much is off it: in traffic it becomes a decimetre more [m].
+# A point farther beyond the road than this is off it; in traffic it is a decimetre farther [m].
 SPARE = 0.05
-# How far off it is told by steps [m].
+# Steps in which the distance off the road is measured [m].
 OFF = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 2.0)
-# Lanes that are wider than the vehicle by this, and straighter, are not tried [m, 1/m].
+# Lanes that are wider than the vehicle by this, and straighter than this, need no trial [m, 1/m].
 EASY_WIDTH, EASY_BEND = 0.6, 0.02
-# How far before a lane a trial begins, how far behind it ends, and how often one looks [m, s].
+# Distance before a lane at which a trial begins, and behind it at which it ends [m]; interval of
+# the checks [s] and steps of the motion in it.
 RUN_UP, RUN_OUT, STEP_S, SUBSTEPS = 20.0, 10.0, 0.1, 10
-# Of a longer stretch, which lanes have only by mistake, the begin is tried [m].
+# Only this length is tried of a longer stretch, which lanes have only by mistake [m].
 LONGEST = 1000.0
-# Trials are driven at these speeds at most, or slower where the road bends, and at the slowest of
-# them at least [m/s]: who is slow follows a bend's shift to the inside in full, who is fast late.
+# Trials are driven at these speeds at most, slower where the road bends, but at least at the
+# slowest of them [m/s]: a slow vehicle follows a bend's shift to the inside in full, a fast one
+# late.
 SPEEDS = (2.5, 8.0)
-# Ways driven at once: each takes a row as long as the map has lanes.
+# Ways driven at once: each takes a table row as long as the number of lanes.
 AT_ONCE = 256
-# So near to the map's edge one does not look [m].
+# Points this near to the map's edge are not checked [m].
 EDGE = 0.5
-# How far out one swings [m], the least first; from how far before the place that is too tight to
-# how far behind it, and within what way one gets there [m].
+# Swings that are tried, the least first [m]; then the distance before and behind the tight place
+# over which the vehicle swings out, and over which it gets there [m].
 SWINGS, LONG_SWINGS = (0.2, 0.3, -0.3), (0.3, 0.6, 0.9, 1.2)
 AROUND, WITHIN = 4.0, 6.0
-# Long vehicles get this far over the edges of their lanes [m].
+# Long vehicles may reach this far over the edges of their lanes [m].
 ASIDE = 0.6
 
 
 def find_tight_lanes(graph: LaneGraph, car: Shape, large_car: Shape,
                      truck: Shape) -> NDArray[np.bool_]:
     """
-    Return the lanes (2, L) on which cars and long vehicles (2) leave the road, as agents drive.
+    Return the lanes (2, L) on which cars and long vehicles (2) leave the road, driven as agents.
 
     Each lane with a bend, a kink or little width is driven from every lane before it to every
-    lane behind it. Where one leaves the road it is tried whether swinging out helps, and
-    `Point.swing` and `swing_long` of the graph are set, for large cars and trucks. Lanes where
-    trucks have to, or sweep over lanes beside, count as too tight for them all the same: they get
-    in the way of those who wait there.
+    lane behind it. Where large cars or trucks leave the road, swings are tried, and those that
+    help are written to `Point.swing` and `swing_long` of the graph. Lanes where trucks have to
+    swing out, or sweep over lanes beside, still count as too tight for them: trucks would get in
+    the way of vehicles that wait there.
     """
     area = _Area(graph.network.road_area())
     cars, large_cars, trucks = (_Trials(graph, area, x) for x in (car, large_car, truck))
@@ -76,7 +78,7 @@ class _Area:
             shapely.prepare(area)
 
     def off(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return how far points (N) are off it at most, as steps of `OFF` [m]."""
+        """Return how far points (N) are off the road, rounded up to a step of `OFF` [m]."""
         result = np.zeros(len(x))
         left = np.arange(len(x))
         for area, away in zip(self._areas, OFF, strict=True):
@@ -87,11 +89,11 @@ class _Area:
 
 class _Tight(NamedTuple):
     """
-    Where a vehicle leaves the road on lanes (L).
+    The places where a vehicle leaves the road on lanes (L).
 
-    :param off: how far at most [m]
-    :param begin, end: arc lengths of its centre between which it does [m]
-    :param sweeps: whether it gets too far over the lanes of its way.
+    :param off: greatest distance off the road [m]
+    :param begin, end: arc lengths of its centre between which it is off the road [m]
+    :param sweeps: whether it reaches too far beyond the lanes of its way.
     """
 
     off: FloatArray
@@ -102,14 +104,14 @@ class _Tight(NamedTuple):
 
 class _Trials:
     """
-    Drives of a vehicle along the lanes that bend or are narrow.
+    Trial drives of a vehicle along the lanes that bend or are narrow.
 
-    Attribute `ways`: (N, 3) from every lane before one of these to every lane behind it.
+    Attribute `ways`: (N, 3) from every lane before such a lane to every lane behind it.
     """
 
     def __init__(self, graph: LaneGraph, area: _Area, shape: Shape) -> None:
         self._graph, self._area, self._shape = graph, area, shape
-        # From where to where each lane is tried [m].
+        # Arc lengths between which each lane is tried [m].
         self._extent = _suspicious(graph, shape)
         self._envelope = envelope_of(graph.table, graph.curve_speed)
         self._reference = np.zeros(len(graph.x))
@@ -117,10 +119,10 @@ class _Trials:
 
     def drive(self, ways: IntArray, aside: float | None = None) -> _Tight:
         """
-        Drive ways (N, 3), and note for the lanes in their middles how far off the road one gets.
+        Drive ways (N, 3), and return how far off the road the vehicle gets on their middle lanes.
 
-        :param aside: farther from its way's lanes a vehicle sweeps over others [m]; not looked at
-            if not given.
+        :param aside: distance from its way's lanes beyond which the vehicle sweeps over others
+            [m]; not checked if not given.
         """
         lanes = len(self._graph)
         result = _Tight(np.zeros(lanes), np.full(lanes, np.inf), np.full(lanes, -np.inf),
@@ -142,16 +144,16 @@ class _Trials:
         return result
 
     def _around(self, way: IntArray, aside: float) -> shapely.Geometry:
-        """Return the lanes of a way (3) and what is near them."""
+        """Return the area of the lanes of a way (3), enlarged by a distance [m]."""
         ids = self._graph.ids
         return shapely.buffer(self._graph.network.area_of(
             ids[i] for i in way.tolist() if i >= 0), aside)
 
     def swing_out(self, of: str, swings: Sequence[float], tight: _Tight) -> None:
         """
-        Set the swing of tight lanes to the least with which the vehicle stays on the road most.
+        Set the swing of tight lanes to the first with which the vehicle is least off the road.
 
-        :param of: whom, a column of the lanes' points.
+        :param of: column of the lanes' points to set, for the kind of vehicle.
         :param swings: to try, the least first [m]
         """
         lanes = np.flatnonzero(tight.off > 0.0)
@@ -172,14 +174,14 @@ class _Trials:
                 rows = graph.rows_of(lane)
                 best[rows], least[lane] = tried[rows], off[lane]
         set_to += best
-        # Swings of lanes one behind the other may not go together.
+        # Swings of consecutive lanes may not fit together.
         worse = self.drive(ways).off > tight.off
         for lane in np.unique(ways[worse[ways[:, 1]]]).tolist():
             if lane >= 0:
                 set_to[graph.rows_of(lane)] = 0.0
 
     def _bump(self, lane: int, tight: _Tight) -> FloatArray:
-        """Return the swing at the points of a lane with which the vehicle is 1 m farther out."""
+        """Return the swing at the points of a lane that moves the vehicle 1 m to the outside."""
         graph, shape = self._graph, self._shape
         s = np.arange(int(graph.count[lane])) * graph.step[lane]
         begin, end = tight.begin[lane] - AROUND, tight.end[lane] + AROUND
@@ -201,7 +203,7 @@ class _Trials:
         graph, shape = self._graph, self._shape
         bad_from, bad_to = self._extent[ways[:, 1]].T
         agents, following = self._at_starts(ways)
-        # Nobody needs a road beyond the map's edges.
+        # No road is needed beyond the map's edges.
         margin = 0.5 * shape.length + EDGE
         begin = np.where(ways[:, 0] < 0, margin, -np.inf)
         last = np.where(ways[:, 2] < 0, ways[:, 1], ways[:, 2])
@@ -233,10 +235,10 @@ class _Trials:
         return np.repeat(way[order], 4), np.repeat(at[order], 4), corners[:, 0], corners[:, 1]
 
     def _at_starts(self, ways: IntArray) -> tuple[Agents, IntArray]:
-        """Place an agent before what is to be tried on each way (N, 3); and give their routes."""
+        """Return an agent before the tried stretch of each way (N, 3), and their routes."""
         graph, shape = self._graph, self._shape
         agents = Agents([ObjectDescription('trial', 'truck', Role.TRAFFIC, shape)] * len(ways))
-        # Behind its last lane a way goes on somewhere: one steers for what is ahead.
+        # A way goes on behind its last lane, because agents steer for a point ahead.
         following = np.tile(graph.successors[:, 0], (len(ways), 1))
         for i, (before, lane, behind) in enumerate(ways.tolist()):
             chain, back = [lane], 0.0
@@ -256,7 +258,7 @@ class _Trials:
 
 
 def _suspicious(graph: LaneGraph, shape: Shape) -> FloatArray:
-    """Return from where to where lanes (L, 2) bend or are narrow [m]; inf, -inf if nowhere."""
+    """Return the arc lengths (L, 2) between which lanes bend or are narrow; inf, -inf if none."""
     wide = 0.5 * shape.width + 0.5 * EASY_WIDTH
     bad = (graph.half_width < wide) | (np.abs(graph.curvature) > EASY_BEND)
     s = (np.arange(len(bad)) - np.repeat(graph.first, graph.count)) * np.repeat(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reactive traffic: agents that see each other and everybody else (FS section III)."""
+"""Reactive traffic: agents that respond to each other and to all others (FS section III)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -59,13 +59,14 @@ from crgame_ros.traffic.world_view import Others, standing_entries, with_agents,
 import numpy as np
 from numpy.typing import NDArray
 
-# Slots for arrivals, where the game says nothing: one for so much lane, and at most so many [m].
+# Slots for arrivals if the game gives no capacity: one for this length of lane [m], up to a
+# greatest number.
 LANE_PER_SLOT = 15.0
 MAX_SLOTS = 300
-# What merging at the very end of a lane, or a bend too tight, counts as [m].
+# Cost of a merge at the very end of a lane, or of a bend that is too tight [m].
 TAPER_COST = 250.0
 CLOSE = 1.3
-# Whoever stands behind somebody who stands, with less than this between them, queues [m].
+# An agent with a smaller gap than this to its leader waits for it [m].
 QUEUE = 12.0
 NO_REFERENCE = np.empty(0)
 
@@ -74,18 +75,18 @@ class Traffic:
     """
     All agents of a run: they decide once per scenario time step and move in between.
 
-    Everything random comes from the seed; the same calls give the same states to the last bit.
+    All randomness comes from the seed: the same calls give the same states to the last bit.
 
-    :param spec: what the game file says.
+    :param spec: traffic section of the game file.
     :param network: the roads.
-    :param scenario: the CommonRoad scenario; its traffic lights and signs count.
-    :param others: everything that is no agent, in the order of every `WorldView`.
+    :param scenario: the CommonRoad scenario, with traffic lights and signs.
+    :param others: all objects that are no agents, in the order of every `WorldView`.
     :param adopted: recorded obstacles that become agents; see `adoptable`.
     :param time_step_s: Delta t_c [s]
     :param substeps: steps of the motion in a scenario time step.
-    :param seed: used where the game file gives traffic none of its own.
+    :param seed: used if the game file gives no seed for traffic.
     :param k0: scenario time step at which the run begins.
-    :param world: where the others are at k0, so that nobody is placed upon them.
+    :param world: the others at k0, so that no agent is placed on them.
     """
 
     def __init__(self, spec: TrafficSpec, network: RoadNetwork, scenario: Scenario,
@@ -114,7 +115,7 @@ class Traffic:
         self._waiting, self._insisting, self._turning_off, self._last_resort = (
             round(seconds / time_step_s) for seconds in (WAITS, INSISTS, TURNS_OFF, LAST_RESORT))
         self._fading = fading(time_step_s)
-        # Agents taken off the road because they stood in a circle that nobody could open.
+        # Number of agents removed because they stood in a circle that no agent could open.
         self.taken_off = 0
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
         self._desired = DesiredSpeeds(spec.speed_factor, spec.speed_spread, self._random)
@@ -147,25 +148,25 @@ class Traffic:
 
     @property
     def states(self) -> ObjectStates:
-        """Where everybody is at the present k; NaN where absent."""
+        """Return the states of all agents at the present k; NaN where absent."""
         return ObjectStates(*self._agents.states())
 
     def resume(self, k: int, states: ObjectStates) -> None:
         """
-        Go on from what others have seen of the agents, after a restart.
+        Restore the agents after a restart from the states that others have received.
 
-        What nobody saw is new: destinations, characters, who was let into which junction.
+        Internal state is new: destinations, characters and grants at junctions.
 
         :param states: of all `descriptions` at k.
         """
         self._spawner.resume(k, self._agents, states.poses, states.velocities)
 
     def read_speed_limits(self, network: RoadNetwork) -> None:
-        """Take over the speed limits of roads that differ from those so far in these alone."""
+        """Read the speed limits of roads that are the same as before otherwise."""
         self._graph.read_speed_limits(network)
 
     def change(self, change: TrafficChange) -> None:
-        """Let agents drive otherwise from the next decision on, as an event says."""
+        """Change how agents drive from the next decision on, as an event demands."""
         slots = np.flatnonzero([change.agent in (ALL_AGENTS, x.id) for x in self.descriptions])
         self._drivers.change(change, slots)
         self._desired.change(change, self._agents, slots)
@@ -174,7 +175,7 @@ class Traffic:
         """
         Decide on the world at k and move on to k + 1.
 
-        :param others: everything that is no agent, at k.
+        :param others: all objects that are no agents, at k.
         """
         agents = self._agents
         bodies = self._others.bodies(others)
@@ -232,7 +233,7 @@ class Traffic:
         return acceleration
 
     def _adopt(self, k: int, bodies: Bodies) -> None:
-        """Let recorded obstacles appear, no faster than they can halt where they must."""
+        """Place recorded obstacles, no faster than they can halt where they must."""
         agents = self._agents
         newcomers = self._spawner.adopt(k, agents, bodies)
         if not newcomers:
@@ -246,7 +247,7 @@ class Traffic:
         self._spawner.slow_down(agents, slots, desired, halts, newcomers)
 
     def _find_leaders(self, slots: IntArray, entries: Entries) -> tuple[Ways, Corridors, Pairs]:
-        """Return the agents' (A) ways, the room that they take on them, and who is in it."""
+        """Return the agents' (A) ways, the room that they take, and the entries in it."""
         agents, lanes, reference = self._agents, self._graph.table, self._swerving.reference
         way = own_ways(lanes, self._routes.next, agents.table, slots)
         corridor = own_corridors(lanes, agents.table, slots, reference)
@@ -254,7 +255,7 @@ class Traffic:
 
     def _mind_left_lanes(self, slots: IntArray, desired: FloatArray, entries: Entries,
                          standing: NDArray[np.bool_], acceleration: FloatArray) -> None:
-        """Let those who change lanes mind who is ahead in the lane that they leave."""
+        """Make agents that change lanes also follow the leader in the lane that they leave."""
         agents, lanes = self._agents, self._graph.table
         source = agents.source[slots]
         row = np.flatnonzero((source != NOBODY) & (source != agents.lane[slots]))
@@ -267,7 +268,7 @@ class Traffic:
         corridor = corridors(agents.table, who, d, d)
         pairs = ahead(lanes, entries, ways(lanes, self._routes.next, agents.table, who, lane, s),
                       corridor, NO_REFERENCE)
-        # Whoever steers out from behind an obstacle gets nearer to it than s0.
+        # An agent that steers out from behind an obstacle gets nearer to it than s0.
         pairs.gap[standing[pairs.entry]] += CLOSE
         acceleration[row] = np.minimum(acceleration[row], self._longitudinal.behind(
             agents, desired[row], pairs, entries, corridor))
@@ -293,7 +294,7 @@ class Traffic:
             slots, desired, rear_stop, light, sign, queued), elapsed_s)
         behind = (agents.blocker[slots] == FREE) & (gap < QUEUE)
         agents.blocker[slots[behind]] = agents.leader[slots[behind]]
-        # Who stands at a red light waits for nobody; who stands before that does.
+        # An agent that halts at a red light waits for no other, but one that halts before it may.
         at_light = np.isfinite(light) & (light < np.minimum(gap, halt + AT_LINE))
         agents.blocker[slots[at_light]] = FREE
         if (agents.waits[slots] > self._waiting).any():
@@ -302,7 +303,7 @@ class Traffic:
         return np.minimum(before_light, halt)
 
     def _turn_off(self, slots: IntArray) -> None:
-        """Let those of agents turn off elsewhere who have stood for long, not beside a fork."""
+        """Draw another destination for agents that have stood long, but not in a fork."""
         agents, routes = self._agents, self._routes
         waits = agents.waits[slots]
         before = agents.s[slots] + 0.5 * agents.length[slots] < self._graph.length[
@@ -313,7 +314,7 @@ class Traffic:
                 is_long(float(agents.length[slot])))
 
     def _leave(self, k: int, slots: IntArray) -> None:
-        """Take away who has left the map, and give new destinations to who needs one."""
+        """Remove agents that have left the map, and draw new destinations where needed."""
         agents, routes = self._agents, self._routes
         gone, lost = leaving(self._graph.table, routes.next, routes.cost, routes.is_exit,
                              agents.table, slots)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who waits for whom: circles of waiting are found, and one of each goes first."""
+"""Circles of agents that wait for each other: they are found, and one agent goes first."""
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
@@ -8,14 +8,14 @@ from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.vehicle.state import QUEUEING
 import numpy as np
 
-# Who wants to accelerate by more than this does not wait [m/s^2].
+# An agent that wants to accelerate by more than this does not wait [m/s^2].
 STARTS = 0.5
-# Standing for so many seconds is waiting; who insists does so for so long [s].
+# Standing time that counts as waiting, and time for which an agent insists on going first [s].
 WAITS, INSISTS = 2.0, 6.0
-# Who has stood this long before a way that is full, or in a circle, turns off elsewhere, if there
-# is a way [s].
+# An agent that has stood this long before a full way, or in a circle, takes another way if there
+# is one [s].
 TURNS_OFF = 15.0
-# Who has stood this long in a circle that nobody can open is taken off the road [s].
+# An agent that has stood this long in a circle that no agent can open is removed [s].
 LAST_RESORT = 45.0
 
 
@@ -31,14 +31,14 @@ def note_standing(agents: AgentTable, slots: IntArray, acceleration: FloatArray)
 def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int,
                   insists: int) -> IntArray:
     """
-    Let one agent of each circle of waiting go first.
+    Make one agent of each circle of waiting agents go first.
 
-    Each standing agent waits for one other at most (`AgentTable.blocker`); following these leads
-    out, or around. In a circle it is the one that has insisted longest ago.
+    Each standing agent waits for one other at most (`AgentTable.blocker`). The chain of blockers
+    ends, or leads around in a circle. There the agent goes first that has insisted longest ago.
 
     :param waits: ticks of standing that count as waiting.
     :param insists: ticks for which it goes first.
-    :return: who is in circles.
+    :return: the agents in circles.
     """
     seen = np.full(len(agents.x), -1, np.int64)
     members = np.empty(len(slots), np.int64)
@@ -62,9 +62,10 @@ def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int,
 @compiled
 def _in_circle(agents: AgentTable, slot: int, seen: IntArray, ticks: int) -> int:
     """
-    Follow who waits for whom from an agent on; give one of a circle that it leads to, or -1.
+    Return one agent of the circle to which the blockers of an agent lead, or -1.
 
-    :param seen: (A) from which agent each was come to, -1 if from none; a circle is given once.
+    :param seen: (A) the agent from which each was reached, -1 if from none; each circle is
+        returned only once.
     :param ticks: of standing that count as waiting.
     """
     current = slot
@@ -78,7 +79,7 @@ def _in_circle(agents: AgentTable, slot: int, seen: IntArray, ticks: int) -> int
 
 @compiled
 def _least_insistent(k: int, agents: AgentTable, start: int) -> int:
-    """Choose who in a circle is to insist: none while one does, nobody who waits for a leader."""
+    """Return the agent of a circle to go first, none behind its leader; -1 while one insists."""
     chosen, current = -1, start
     while True:
         if agents.insists_until[current] > k:
@@ -93,7 +94,7 @@ def _least_insistent(k: int, agents: AgentTable, start: int) -> int:
 
 @compiled
 def hopeless(agents: AgentTable, slots: IntArray, ticks: int) -> IntArray:
-    """List the agents in circles that have stood for so many ticks, one of each circle."""
+    """List one agent of each circle whose agents have stood for a number of ticks."""
     found = np.empty(len(slots), np.int64)
     count = 0
     seen = np.full(len(agents.x), -1, np.int64)

@@ -35,7 +35,7 @@ LIGHT = 9001
 
 
 def ensure_compiled(say: Callable[[str], None]) -> None:
-    """Compile what is not compiled yet; this takes about a minute, once, whoever else asks."""
+    """Compile what is not compiled yet: about a minute, once for all processes."""
     with _turn(say):
         if not marker().exists():
             _compile(say)
@@ -49,7 +49,7 @@ def _turn(say: Callable[[str], None]) -> Iterator[None]:
         lock.parent.mkdir(parents=True, exist_ok=True)
         handle = lock.open('a')
     except OSError:
-        # What cannot be kept is of no use to others.
+        # Without a cache other processes cannot use the compiled code anyway.
         yield
         return
     with handle:
@@ -66,7 +66,7 @@ def _turn(say: Callable[[str], None]) -> Iterator[None]:
 
 
 def _hurry(lock: Path) -> None:
-    """Give the process that compiles an ordinary priority, where it has only idle time."""
+    """Raise the priority of the process that compiles from idle to ordinary."""
     with suppress(ValueError, OSError):
         os.sched_setscheduler(int(lock.read_text()), os.SCHED_OTHER, os.sched_param(0))
 
@@ -87,9 +87,10 @@ def _compile(say: Callable[[str], None]) -> None:
 @cache
 def drive_everything() -> None:
     """
-    Drive where all happens: a light, a crossing, a wreck, a parked car, people, a recording.
+    Run traffic with all features: a light, a crossing, a wreck, a parked car, people, a recording.
 
-    Compiled code is loaded when it is first run: a second that no tick has. Once in a process.
+    Compiled code is loaded when it first runs, which takes a second, too long for a tick. This
+    runs once in a process.
     """
     scenario = crossroads()
     others = [ObjectDescription('wreck', 'parkedVehicle', Role.STATIC, Shape.rectangle(4.5, 1.8)),
@@ -116,7 +117,7 @@ def drive_everything() -> None:
 
 
 def drive_where_a_lane_ends() -> None:
-    """Drive where everybody has to change lanes, and some are let in."""
+    """Run traffic where all agents have to change lanes, and some are let in."""
     x, scenario = np.linspace(-200.0, 0.0, 41), Scenario(0.1)
     level = np.zeros_like(x)
     scenario.add_objects([
@@ -133,7 +134,7 @@ def drive_where_a_lane_ends() -> None:
 
 
 def crossroads() -> Scenario:
-    """Make two parallel lanes to the east, the right one with a light, and one to the north."""
+    """Return two parallel lanes to the east, the right one with a light, and one to the north."""
     result = Scenario(0.1)
     x = np.linspace(-200.0, 200.0, 81)
     level = np.zeros_like(x)

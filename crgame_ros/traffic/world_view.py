@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What agents see: everybody and everything that is no agent."""
+"""The world that agents see: all objects that are no agents."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,11 +19,11 @@ VEHICLES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'priorityV
                       'train', 'unknown'})
 PARKED = frozenset({'parkedVehicle', 'constructionZone', 'roadBoundary', 'building', 'pillar',
                     'median_strip'})
-# Longer bodies are looked at in pieces: a lane may bend along them [m].
+# Longer bodies are split into pieces, because a lane may bend along them [m].
 PIECE = 6.0
-# Others that have stood this long are swerved around [s].
+# Agents swerve around others that have stood this long [s].
 STANDING_TIME = 10.0
-# Recorded speeds jump; nobody brakes or accelerates by more than this [m/s^2].
+# Recorded speeds jump; accelerations are clipped to this [m/s^2].
 BELIEVED = 8.0
 
 
@@ -53,10 +53,10 @@ class Others:
     """
     The others (O) as bodies on the road.
 
-    :param descriptions: what they look like, in the order of every `WorldView`.
+    :param descriptions: type and shape of each, in the order of every `WorldView`.
     :param time_step_s: Delta t_c [s]
 
-    Attributes `drives` (O): which are vehicles that go where lanes lead; `widths` (O) [m].
+    Attributes `drives` (O): whether it is a vehicle that follows lanes; `widths` (O) [m].
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
@@ -88,7 +88,7 @@ class Others:
         return len(self._descriptions)
 
     def bodies(self, world: WorldView) -> Bodies:
-        """Return the pieces of all who are there."""
+        """Return the pieces of all others that are present."""
         if not len(self):
             return NOTHING
         present = np.isfinite(world.poses[self._of]).all(axis=1) & np.isfinite(
@@ -101,7 +101,7 @@ class Others:
                       np.full(len(of), NOBODY))
 
     def _accelerations(self, world: WorldView) -> FloatArray:
-        """Return how the others (O) speed up along their headings, from one tick to the next."""
+        """Return the accelerations (O) of the others along their headings, between two ticks."""
         yaw = world.poses[:, 2]
         speed = world.velocities[:, 0] * np.cos(yaw) + world.velocities[:, 1] * np.sin(yaw)
         if world.k == self._seen_k + 1:
@@ -114,7 +114,7 @@ class Others:
         return self._acceleration
 
     def standing(self, world: WorldView) -> NDArray[np.bool_]:
-        """Return which others (O) are there and stand for good, as far as one can tell."""
+        """Return which others (O) are present and likely to stand for good."""
         speed = np.hypot(world.velocities[:, 0], world.velocities[:, 1])
         still = speed < STANDING
         self._still = np.where(still, self._still + 1, 0)
@@ -123,7 +123,7 @@ class Others:
 
 @compiled
 def with_agents(others: Bodies, agents: AgentTable) -> Bodies:
-    """Join the agents on the road to the others; those changing lanes claim the new one."""
+    """Return the others and the agents on the road; agents changing lanes claim the new one."""
     slots = np.flatnonzero(agents.active)
     first = len(others.owner)
     count = first + len(slots)

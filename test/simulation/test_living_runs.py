@@ -142,7 +142,7 @@ def test_an_event_waits_for_its_agent() -> None:
 
 @pytest.mark.parametrize(('traffic', 'change', 'message'), [
     ({'agents': 2}, {'agent': 't7', 'politeness': 0},
-     'event a: there is no agent "t7"; there is t0, t1; all is everybody'),
+     'event a: there is no agent "t7"; there is t0, t1; use all for all of them'),
     ({'agents': 2}, {'agent': 'hv0', 'politeness': 0}, 'there is no agent "hv0"'),
     (None, {'agent': 'all', 'politeness': 0}, 'the game has no traffic; add "traffic"'),
     ({'agents': 2}, {'agent': 't0', 'options': {'headway': 1}},

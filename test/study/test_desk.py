@@ -165,7 +165,7 @@ async def test_the_end_comes_after_the_drive_and_stays(tmp_path: Path) -> None:
         assert (await shown(socket, shows('over')))['how'] == 'ended'
         assert [entry['entry'] for entry in running.desk.session.journal.entries[-3:]] == [
             'started', 'aborted', 'ended']
-        assert 'over already' in (await do(director, {'type': 'end', 'reason': 'x'}))['text']
+        assert 'already ended' in (await do(director, {'type': 'end', 'reason': 'x'}))['text']
         for each in (socket, director):
             await each.close()
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How each driven vehicle of a run was driven: all measures of a driver, from any run's record.
+Measures how each driven vehicle of a run was driven, from any run's record.
 
-`MEASURES` defines each; `docs/behaviour.md` says more.
+`MEASURES` defines each measure; `docs/behaviour.md` explains them.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -51,7 +51,7 @@ def limits_of(roads: RoadNetwork, visits: Sequence[LaneVisit], count: int,
 
     :param visits: stays in lanelets.
     :param count: number of steps K.
-    :param events: step from which on a limit is set, in order.
+    :param events: limits set by events, each with its first step, in order.
     """
     limits = np.full(count, np.nan)
     for visit in visits:
@@ -77,7 +77,7 @@ def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
 
 def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
     """
-    Return the time above the limit [s]; each step stands for its time.
+    Return the time above the limit [s]; each step counts as one step of time.
 
     :return: NaN where there was no limit at all
     """
@@ -87,7 +87,7 @@ def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
     return step_s * int(np.count_nonzero(np.abs(speed[limited]) > limits[limited]))
 
 
-# Orders of a seat that give it back.
+# Sources of seat orders that return the vehicle to its planner or the game.
 _BACK = ('game', 'planner')
 _CIRCLE_CORNERS = 32
 
@@ -100,10 +100,10 @@ def measure_behaviour(record: RunRecord, limits: ResponseLimits = USUAL_LIMITS,
     Measure how each driven vehicle of a run was driven, in the log's order.
 
     :param record: of a recording (`read_run_record`) or of an offline run (`run_record_of`).
-    :param limits: what counts as a response to an event.
-    :param requests: names of the events that ask to take over; orders of the seat and the game's
-        take-over requests do anyway.
-    :param progress: is told how much has been measured, from 0 to 1.
+    :param limits: limits that define a response to an event.
+    :param requests: names of further events that count as requests to take over; orders of the
+        seat and the game's take-over requests always do.
+    :param progress: called with the share measured so far, 0 to 1.
     :raises InputError: if the scenario in it cannot be used.
     """
     log = record.log
@@ -117,7 +117,7 @@ def measure_behaviour(record: RunRecord, limits: ResponseLimits = USUAL_LIMITS,
 
 
 class _Everybody:
-    """All that moves in a run, driven vehicles first, by their centres."""
+    """All vehicles and objects of a run, driven vehicles first, by their centres."""
 
     def __init__(self, record: RunRecord, roads: RoadNetwork) -> None:
         log = record.log
@@ -130,12 +130,12 @@ class _Everybody:
         self._ahead = np.array([item.rear_to_center for item in log.vehicles])
 
     def transform(self, number: int) -> RigidTransform:
-        """Return what leads to where the road of a driven vehicle is."""
+        """Return the transform into the coordinates of a driven vehicle's road."""
         av = self.record.log.game.av(self.ids[number])
         return RigidTransform() if av is None else av.transform
 
     def at(self, row: int, transform: RigidTransform) -> tuple[list[FloatArray], FloatArray]:
-        """Return everybody's centre with corners (C + 1, 2), and velocities (N, 2) at a step."""
+        """Return centres with corners (C + 1, 2) each, and velocities (N, 2), at a step."""
         log = self.record.log
         states = log.vehicle_states[row]
         centers = shifted(states[:, :3], self._ahead)
@@ -212,7 +212,7 @@ def _named(name: str, spread: Spread) -> dict[str, float]:
 
 def _calm(everybody: _Everybody, states: FloatArray, keeping: LaneKeeping,
           controls: DriverControls) -> NDArray[np.bool_]:
-    """Return at each command whether the second may be stable, by the steps around it."""
+    """Return at each command whether the steps around it allow a stable second."""
     calm = (keeping.beyond <= 0.0) & (
         np.abs(states[:, StateColumn.ACCELERATION]) <= STABLE_ACCELERATION)
     after = np.searchsorted(everybody.times_s, controls.times_s - 1e-9).clip(0, len(calm) - 1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a driver did to pedals and steering wheel over a run, in even pieces without gaps."""
+"""A driver's use of pedals and steering wheel over a run, in even pieces without gaps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# What a recorder missed up to this is bridged, linearly; a longer gap cuts what was done [s].
+# Recording gaps up to this length are interpolated linearly; a longer gap begins a new piece [s].
 LONGEST_GAP_S = 0.1
 
 
 @dataclass(frozen=True)
 class DriverControls:
     """
-    What one driver did, at rising times; rows at which nobody drove are left out.
+    The controls of one driver, at rising times; rows at which no human drove are left out.
 
     :param times_s: (R) of the commands since the run's start [s]
     :param throttle: (R) 0 to 1
@@ -37,10 +37,10 @@ class DriverControls:
     def from_commands(cls, times_s: FloatArray, commands: FloatArray, max_wheel_angle: float,
                       dt_s: float) -> 'DriverControls':
         """
-        Take them from commands.
+        Build the controls from commands.
 
-        :param commands: (R, 4) throttle, brake, steering in [-1, 1] and reverse; NaN where nobody
-            drove.
+        :param commands: (R, 4) throttle, brake, steering in [-1, 1] and reverse; NaN where no
+            human drove.
         :param max_wheel_angle: of the steering wheel at a steering of 1: theta_sw = s theta_sw,max
             (CRG III-C2b) [rad]
         """
@@ -58,13 +58,13 @@ class DriverControls:
 
     @property
     def driven_s(self) -> float:
-        """For how long somebody drove: each command stands for its step [s]."""
+        """The time driven by a human: each command counts as one step [s]."""
         return sum((self.times_s[piece][-1] - self.times_s[piece][0] + self.dt_s
                     for piece in self.pieces()), 0.0)
 
     def even_pieces(self, values: FloatArray) -> list[FloatArray]:
         """
-        Resample values evenly, linearly: each piece at the nominal step.
+        Resample values linearly, each piece at the nominal step.
 
         :param values: (R) at `times_s`.
         """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Gaps that a driver accepted: to the leader and the follower in the lane that it enters."""
+"""Gaps that a driver accepted: to the leader and the follower in the lane entered."""
 
 from collections.abc import Sequence
 import math
@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Who is in a lane with less of its width than this is not in the way [m].
+# A vehicle that reaches into a lane by less than this is not in it [m].
 IN_LANE = 0.25
-# Who is farther away is not near [m].
+# Vehicles farther away do not count [m].
 NEAR = 150.0
 
 
 class Neighbour(NamedTuple):
     """
-    Who is ahead, or behind, in the lane entered.
+    The leader or the follower in the lane entered.
 
-    :param number: its number among the others.
-    :param gap: bumper to bumper along the lane, below 0 beside each other [m]
-    :param time_gap_s: gap divided by the speed of whoever is behind; inf where that one does not
-        move forwards [s]
+    :param number: its index among the others.
+    :param gap: bumper to bumper along the lane, negative where both overlap along it [m]
+    :param time_gap_s: gap divided by the speed of the vehicle behind; inf where that vehicle does
+        not move forwards [s]
     """
 
     number: int
@@ -34,7 +34,7 @@ class Neighbour(NamedTuple):
 
 
 class AcceptedGap(NamedTuple):
-    """Leader and follower in a lane; None where nobody is near."""
+    """Leader and follower in a lane; None where no vehicle is near."""
 
     leader: Neighbour | None
     follower: Neighbour | None
@@ -45,10 +45,10 @@ def gap_in_lane(strip: LaneStrip, own: FloatArray, own_velocity: FloatArray,
     """
     Find the gap in a lane that a vehicle enters.
 
-    :param strip: the lane that it enters.
-    :param own: (C + 1, 2) its centre, then its corners [m]
+    :param strip: the lane entered.
+    :param own: (C + 1, 2) the vehicle's centre, then its corners [m]
     :param own_velocity: (2) [m/s]
-    :param others: of each other (D + 1, 2) centre and corners; NaN where absent [m]
+    :param others: for each other vehicle (D + 1, 2) centre and corners; NaN where absent [m]
     :param velocities: (N, 2) of the others [m/s]
     """
     own_s = strip.center.project(own)[0]

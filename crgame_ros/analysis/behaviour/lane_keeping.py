@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well a driver kept the lane: lateral offsets, lane changes, and SDLP without these."""
+"""Lane keeping of a driver: lateral offsets, lane changes, and SDLP without lane changes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Of later crossings nothing is told [s]: by then nobody has kept speed and yaw rate.
+# Later crossings are ignored [s]: no driver holds speed and yaw rate for so long.
 HORIZON_S = 20.0
-# Slower turns are straight [rad/s].
+# Motion with a smaller yaw rate counts as straight [rad/s].
 _STRAIGHT = 1e-9
 
 
 class LaneCrossing(NamedTuple):
     """
-    Times to lane crossing (K) each, 0 with a wheel beyond a boundary, inf without a crossing [s].
+    Times to lane crossing, (K) each; 0 with a wheel beyond a boundary, inf without a crossing [s].
 
     :param tlc_s: with speed and yaw rate held.
     :param linear_s: by distance and speed towards the boundary.
@@ -97,8 +97,12 @@ def _straight(to_start: FloatArray, chord: FloatArray, velocity: FloatArray) -> 
 
 
 def _around(to_start: FloatArray, chord: FloatArray, arm: FloatArray, yaw_rate: float) -> float:
-    """Cross segments on circles; `arm` (W, 2) leads from the centre of rotation to a wheel."""
-    # |arm + to_start + t chord| = |arm|, without the difference of two large squares.
+    """
+    Return the time to crossing where wheels move on circles.
+
+    :param arm: (W, 2) from the centre of rotation to each wheel [m]
+    """
+    # |arm + to_start + t chord| = |arm|, solved without subtracting two large squares.
     arm = np.broadcast_to(arm[:, None], to_start.shape)
     square, half = _dot(chord, chord), _dot(to_start + arm, chord)
     rest = _dot(to_start, to_start + 2.0 * arm)
@@ -116,7 +120,7 @@ def _around(to_start: FloatArray, chord: FloatArray, arm: FloatArray, yaw_rate: 
 
 
 def _linear(line: Curve, side: float, wheels: FloatArray, velocities: FloatArray) -> FloatArray:
-    """Return the least time of its wheels to the left (1) or right (-1) boundary (K)."""
+    """Return the least time (K) of the wheels to the left (1) or right (-1) boundary [s]."""
     s, d = (each.reshape(wheels.shape[:2]) for each in line.project(wheels.reshape(-1, 2)))
     heading = line.heading_at(s)
     towards = side * (velocities[..., 1] * np.cos(heading) - velocities[..., 0] * np.sin(heading))
@@ -145,10 +149,10 @@ def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray((first * second).sum(axis=-1))
 
 
-# A lane change begins and ends where the vehicle moves sideways no faster than this [m/s], but
-# at most so long before and after its centre is across [s].
+# A lane change begins and ends where the lateral speed is no greater than this [m/s], but at
+# most so long before and after the centre crosses the boundary [s].
 SIDEWAYS, LONGEST_HALF_S = 0.1, 10.0
-# Who stands keeps no lane [m/s].
+# Lane keeping is not measured below this speed [m/s].
 STANDING = 0.1
 
 
@@ -157,12 +161,12 @@ class ChangeOfLane:
     """
     A change to a neighbouring lane; steps count from the first of the run's log.
 
-    :param start: first step that is cut out, `end` the last.
+    :param start: first step excluded from lane keeping; `end` is the last.
     :param wheel: first step at which a wheel is beyond the boundary between both lanes; None where
-        one was there already when the lane was entered.
-    :param center: first step at which the vehicle's centre is.
+        a wheel was beyond it throughout the previous stay.
+    :param center: first step at which the vehicle's centre is beyond it.
     :param side: 1 to the left, -1 to the right, as the driver sees it.
-    :param visit: number of the stay in the lane entered.
+    :param visit: index of the stay in the lane entered.
     """
 
     start: int
@@ -209,8 +213,8 @@ def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters
     """
     Follow a vehicle along its lanes.
 
-    :param jumps: rows at which it stands elsewhere, put there: it comes anew to that lane.
-    :param states: (K, 8) rear-axle states where the roads are, columns as in `StateColumn`.
+    :param jumps: rows at which the vehicle was put elsewhere: there a new stay begins.
+    :param states: (K, 8) rear-axle states in the road's coordinates, columns as in `StateColumn`.
     :param step_s: between them [s]
     """
     rear = states[:, :3]
@@ -234,7 +238,7 @@ def keep_lane(roads: RoadNetwork, states: FloatArray, vehicle: VehicleParameters
 
 
 def _visits(lanes: LaneVisits, centers: FloatArray, jumps: Sequence[int]) -> Iterator[LaneVisit]:
-    """Yield the stays in lanes, those between two jumps by themselves."""
+    """Yield the stays in lanes; a jump ends a stay."""
     for first, end in pairwise((0, *sorted({*jumps} - {0, len(centers)}), len(centers))):
         for visit in lanes.follow(centers[first:end]):
             yield visit._replace(first=first + visit.first, end=first + visit.end)
@@ -242,19 +246,19 @@ def _visits(lanes: LaneVisits, centers: FloatArray, jumps: Sequence[int]) -> Ite
 
 def sdlp(offset: FloatArray, kept: NDArray[np.bool_], speed: FloatArray) -> float:
     """
-    Return the standard deviation of lateral position, with N - 1 [m].
+    Return the standard deviation of lateral position, with denominator N - 1 [m].
 
     :param offset: (K) from the lane's centre line [m]
     :param kept: (K) whether no lane is being changed.
     :param speed: (K) [m/s]; samples at which the vehicle stands do not count
-    :return: NaN of fewer than two samples
+    :return: NaN for fewer than two samples
     """
     samples = driven_offsets(offset, kept, speed)
     return float(samples.std(ddof=1)) if len(samples) > 1 else math.nan
 
 
 def driven_offsets(offset: FloatArray, kept: NDArray[np.bool_], speed: FloatArray) -> FloatArray:
-    """Return the offsets that lane keeping is measured by; parameters are those of `sdlp`."""
+    """Return the offsets from which lane keeping is computed; parameters as for `sdlp`."""
     return np.asarray(offset[kept & np.isfinite(offset) & (np.abs(speed) >= STANDING)])
 
 
@@ -294,6 +298,6 @@ def _done(visits: Sequence[LaneVisit], number: int) -> int:
 
 
 def _last_moving(towards: FloatArray, rows: NDArray[np.int64]) -> int:
-    """Return the last of the rows, from the first on, that moves sideways all the time."""
+    """Return the last of the leading rows in which the vehicle moves sideways."""
     slow = np.flatnonzero(towards <= SIDEWAYS)
     return int(rows[slow[0] if len(slow) else -1])

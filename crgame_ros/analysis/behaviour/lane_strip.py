@@ -34,10 +34,10 @@ class LaneStrip(NamedTuple):
     @classmethod
     def through(cls, roads: RoadNetwork, lanelets: Sequence[int], against: bool) -> Self:
         """
-        Make it of successive lanelets.
+        Build the strip from successive lanelets.
 
-        :param lanelets: ids, in their own direction.
-        :param against: whether it is driven against that direction.
+        :param lanelets: ids, in the order of the lanelets' direction.
+        :param against: whether the vehicle drives against that direction.
         """
         found = [roads.lanelet_network.find_lanelet_by_id(each) for each in lanelets]
         center, left, right = (
@@ -60,10 +60,10 @@ class LaneStrip(NamedTuple):
 
 def strip_of(roads: RoadNetwork, visits: Sequence[LaneVisit], number: int) -> LaneStrip:
     """
-    Return the lane of a stay: with the lanelets that the vehicle took, then the straightest ones.
+    Return the lane of a stay: the lanelets that the vehicle took, then the straightest ones.
 
-    :param visits: of the vehicle, in order.
-    :param number: of the stay.
+    :param visits: stays of the vehicle, in order.
+    :param number: index of the stay.
     """
     visit = visits[number]
     taken = [visit.lanelet]
@@ -84,7 +84,7 @@ def strip_of(roads: RoadNetwork, visits: Sequence[LaneVisit], number: int) -> La
 
 def _prolonged(roads: RoadNetwork, lanelets: list[int], length: float,
                backwards: bool) -> list[int]:
-    """Add the straightest lanelets before or behind, for so many metres."""
+    """Extend lanelets by the straightest ones ahead or behind, up to a length [m]."""
     found = list(lanelets)
     while length > 0.0 and len(found) < _MOST:
         added = roads.straightest_predecessor(found[0]) if backwards \

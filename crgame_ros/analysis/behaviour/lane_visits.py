@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which lanelets a driven vehicle was in, one after the other, and where it changed lanes."""
+"""The lanelets that a driven vehicle was in, in order, and where it changed lanes."""
 
 from collections.abc import Iterable, Iterator
 from enum import Enum
@@ -15,9 +15,9 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Positions looked at together, and lanelets that may lie between two steps.
+# Number of positions tested together, and of lanelets that may lie between two steps.
 _CHUNK, _BETWEEN = 64, 5
-# Who drives at a greater angle to a lane is not on it [rad].
+# A vehicle at a greater angle to a lane is not on it [rad].
 _ALONG = math.radians(60.0)
 
 
@@ -37,7 +37,7 @@ class LaneVisit(NamedTuple):
     :param first: scenario step, counted from that of the first pose.
     :param end: the step after the last.
     :param entry: along the lane, by a change from a neighbour, or anew: at the start, from beside
-        the road, or where the map says nothing of how the lanes belong together.
+        the road, or where the map does not connect the lanelets.
     :param against: whether it drove against the lanelet's direction.
     """
 
@@ -52,8 +52,9 @@ class LaneVisits:
     """
     Follows reference points over a road network.
 
-    A vehicle is in a lanelet until it leaves its area. Then it is in one that follows, or in a
-    neighbour's: a lane change; of several that overlap it is the one in which it stays longest.
+    A vehicle is in a lanelet until it leaves its area. Then it is in a successor, or in a
+    neighbour, which is a lane change. Among overlapping lanelets the one counts in which the
+    vehicle stays longest.
 
     :param roads: the road network.
     """
@@ -88,14 +89,14 @@ class LaneVisits:
 
     def _next(self, last: LaneVisit, row: int,
               poses: FloatArray) -> tuple[LaneEntry, int, int | None]:
-        """Return how a vehicle goes on from a lanelet it has left, until when and in which."""
+        """Return how a vehicle goes on from a lanelet it left, until which step, and in which."""
         along = self._along(last.lanelet)
         beside = [each for lanelet in (last.lanelet, *along) for each in self._beside(lanelet)]
-        # Maps tell of neighbours for a part of the way only.
+        # Maps may name neighbours on a part of the way only.
         beside += [each for one in dict.fromkeys(beside) for each in self._along(one)]
         beside = [each for each in beside if each not in along]
         for entry, candidates in ((LaneEntry.ALONG, along), (LaneEntry.CHANGE, beside)):
-            # Of those it stays in as long it is the one that fits its heading.
+            # Among lanelets with equally long stays, the one that fits the heading counts.
             ends = [(end, -self._turn(each, poses[row]), -each)
                     for each in dict.fromkeys(candidates)
                     if (end := self._end(each, row, poses)) > row
@@ -110,10 +111,10 @@ class LaneVisits:
         return found if found is not None and self._fits(found, pose) else None
 
     def _fits(self, lanelet: int, pose: FloatArray) -> bool:
-        """Return whether a lanelet is for cars, and a heading along it or against it."""
+        """Return whether a lanelet is for cars and the heading is along it or against it."""
         turn = self._turn(lanelet, pose)
         found = self._roads.lanelet_network.find_lanelet_by_id(lanelet)
-        # A boundary that is a point bounds nothing.
+        # A boundary of a single point bounds no area.
         return (self._roads.is_for_cars(lanelet) and min(turn, math.pi - turn) <= _ALONG
                 and all(np.ptp(side, axis=0).max() > 1e-3
                         for side in (found.left_vertices, found.right_vertices)))
@@ -125,7 +126,7 @@ class LaneVisits:
         return abs(wrap_pi(float(pose[2]) - float(line.heading_at(np.array(s)))))
 
     def _end(self, lanelet: int, row: int, poses: FloatArray) -> int:
-        """Return the first step from one on at which a lanelet no longer holds the vehicle."""
+        """Return the first step from `row` on at which the vehicle is outside a lanelet."""
         area = self._areas.get(lanelet)
         if area is None:
             area = self._areas[lanelet] = self._roads.area_of([lanelet])

@@ -37,10 +37,10 @@ class BehaviourMeasure(NamedTuple):
     A measure of driving.
 
     :param unit: as tables write it.
-    :param definition: in a sentence.
-    :param variant: which of the variants in the literature it is, with its thresholds.
+    :param definition: one sentence.
+    :param variant: the variant among those in the literature, with its thresholds.
     :param reference: the point or the signal that it is measured at.
-    :param per: of what there is one value: vehicle, event, lane change, take-over or step.
+    :param per: what one value is for: vehicle, event, lane change, take-over or step.
     :param undefined: the value where there is nothing to measure.
     """
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a pedal was used: how far it was pressed, for how long, and how often."""
+"""Pedal use: how far, for how long and how often a pedal was pressed."""
 
 from collections.abc import Sequence
 import math
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 class Spread(NamedTuple):
     """
-    How values spread; NaN where there is none.
+    Statistics of values; NaN where there are none.
 
-    :param mean: arithmetic.
-    :param sd: standard deviation with N - 1; NaN of fewer than two.
-    :param least: the smallest.
-    :param most: the greatest.
+    :param mean: arithmetic mean.
+    :param sd: standard deviation with N - 1; NaN for fewer than two values.
+    :param least: smallest value.
+    :param most: greatest value.
     """
 
     mean: float
@@ -27,7 +27,7 @@ class Spread(NamedTuple):
 
 
 def spread_of(values: NDArray[np.float64]) -> Spread:
-    """Return the spread of those values that are finite."""
+    """Return the spread of the finite values."""
     known = values[np.isfinite(values)]
     if not len(known):
         return Spread(math.nan, math.nan, math.nan, math.nan)
@@ -37,16 +37,16 @@ def spread_of(values: NDArray[np.float64]) -> Spread:
 
 FloatArray = NDArray[np.float64]
 
-# A pedal is applied from this travel on, until it is back at the other: hysteresis [share].
+# Hysteresis: a pedal is applied from the first travel on, until it is back at the second [share].
 PRESSED, RELEASED_AGAIN = 0.05, 0.02
 
 
 class PedalUse(NamedTuple):
     """
-    How a pedal was used.
+    The use of a pedal.
 
-    :param travel: of the pedal, 0 to 1.
-    :param share: of the time in which it was applied.
+    :param travel: pedal travel, 0 to 1.
+    :param share: share of the time in which it was applied.
     :param per_minute: applications [1/min]
     """
 
@@ -58,10 +58,11 @@ class PedalUse(NamedTuple):
 def applied(travel: FloatArray, pressed: float = PRESSED,
             released: float = RELEASED_AGAIN) -> NDArray[np.bool_]:
     """
-    Return when a pedal is applied, with hysteresis; at first it is not.
+    Return at each sample whether a pedal is applied, with hysteresis; it begins as released.
 
     :param travel: (N) 0 to 1, without a gap.
-    :param pressed: from which on it is applied; `released`: down to which it stays so.
+    :param pressed: travel at which it becomes applied.
+    :param released: travel down to which it stays applied.
     """
     tells = (travel >= pressed) | (travel <= released)
     latest = np.maximum.accumulate(np.where(tells, np.arange(len(travel)), -1))
@@ -72,8 +73,8 @@ def use_of_pedal(pieces: Sequence[FloatArray], dt_s: float) -> PedalUse:
     """
     Return how a pedal was used.
 
-    :param pieces: its travel, each dt apart and without a gap; one that begins with the pedal
-        pressed has an application there.
+    :param pieces: pedal travel at intervals of dt, each piece without a gap; a piece that begins
+        with the pedal pressed counts as one application there.
     """
     if not pieces:
         return PedalUse(spread_of(np.empty(0)), math.nan, math.nan)

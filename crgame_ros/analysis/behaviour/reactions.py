@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How soon a driver responds to an event: with the throttle, the brake and the steering wheel."""
+"""Reaction times of a driver to an event: with throttle, brake and steering wheel."""
 
 import math
 from typing import NamedTuple
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 class ResponseLimits(NamedTuple):
     """
-    What counts as a response.
+    Limits that define a response.
 
-    :param window_s: after the event in which one is looked for [s]
-    :param throttle_release: by which the throttle is below where it was at the event [share]
-    :param brake_press: from which travel on the brake is pressed [share]
-    :param wheel_rate_deg: at which the steering wheel is turned, either way [degrees/s]
+    :param window_s: time after the event in which a response counts [s]
+    :param throttle_release: decrease of the throttle from its value at the event [share]
+    :param brake_press: brake travel from which on the brake counts as pressed [share]
+    :param wheel_rate_deg: rate of the steering wheel in either direction [degrees/s]
     """
 
     window_s: float = 5.0
@@ -31,11 +31,11 @@ USUAL_LIMITS = ResponseLimits()
 
 class Reaction(NamedTuple):
     """
-    The time from an event to the first response of each kind, NaN without one [s].
+    The times from an event to the first response of each kind, NaN without one [s].
 
-    :param throttle_s: until the throttle was released.
-    :param brake_s: until the brake was pressed.
-    :param steering_s: until the steering wheel was turned.
+    :param throttle_s: time until the throttle was released.
+    :param brake_s: time until the brake was pressed.
+    :param steering_s: time until the steering wheel was turned.
     """
 
     throttle_s: float
@@ -48,14 +48,14 @@ def reaction_to(event_s: float, controls: DriverControls,
     """
     Find the first responses to an event.
 
-    A response begins after the event: who is braking or steering already responds when he does it
-    anew, and a throttle that is pressed by less than the stated amount cannot be released by it.
-    All NaN where nobody drove at the event.
+    A response begins after the event. A driver who is braking or steering already responds only
+    by doing so again. A throttle that is pressed by less than `throttle_release` cannot be
+    released by that amount. All times are NaN where no human drove at the event.
 
-    :param event_s: when it took effect, since the run's start [s]
+    :param event_s: time at which the event took effect, since the run's start [s]
     """
     times_s = controls.times_s
-    # The first command comes of the first step: an event at the start lies before it.
+    # The first command belongs to the first step: an event at the start lies before it.
     at = max(int(np.searchsorted(times_s, event_s + 1e-9)) - 1, 0)
     if not len(times_s) or abs(times_s[at] - event_s) > 1.5 * controls.dt_s:
         return Reaction(math.nan, math.nan, math.nan)
@@ -72,6 +72,6 @@ def reaction_to(event_s: float, controls: DriverControls,
 
 
 def _first_onset(responds: NDArray[np.bool_], times_s: NDArray[np.float64]) -> float:
-    """Return the time of the first that responds after one that does not; NaN without one."""
+    """Return the first time at which the response begins; NaN without one."""
     onsets = np.flatnonzero(responds[1:] & ~responds[:-1])
     return float(times_s[onsets[0] + 1]) if len(onsets) else math.nan

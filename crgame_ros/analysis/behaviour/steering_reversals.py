@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Steering reversals (Markkula and Engstroem 2006): how often the steering wheel is turned back.
+The steering reversal rate (Markkula and Engstroem 2006).
 
 G. Markkula, J. Engstroem: A steering wheel reversal rate metric for assessing effects of visual
 and cognitive secondary task load. ITS World Congress, London, 2006.
@@ -18,16 +18,16 @@ from scipy.signal import butter, filtfilt
 FloatArray = NDArray[np.float64]
 
 ORDER = 2
-# A shorter piece says nothing about reversals of 0.6 Hz [s].
+# A shorter piece cannot show reversals of 0.6 Hz [s].
 SHORTEST_S = 2.0
 
 
 class ReversalSetting(NamedTuple):
     """
-    Which reversals count.
+    Settings of the reversal rate.
 
-    :param cutoff_hz: of the low pass [Hz]
-    :param gap_deg: by more than which the wheel has to be turned [degrees]
+    :param cutoff_hz: cut-off frequency of the low pass [Hz]
+    :param gap_deg: the wheel must turn by more than this angle [degrees]
     """
 
     cutoff_hz: float
@@ -40,7 +40,7 @@ COGNITIVE = ReversalSetting(2.0, 0.1)
 
 def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArray:
     """
-    Filter angles forth and back by a Butterworth low pass of order 2.
+    Filter angles forwards and backwards by a Butterworth low pass of order 2.
 
     :param angles_deg: (N) dt apart, N > 9 [degrees]
     """
@@ -49,7 +49,7 @@ def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArra
 
 
 def stationary_points(angles_deg: FloatArray) -> FloatArray:
-    """Return the angles at which the difference changes sign, or the one before is zero."""
+    """Return the angles at which the difference changes sign, or the previous one is zero."""
     steps = np.diff(angles_deg)
     before, after = steps[:-1], steps[1:]
     return angles_deg[1:-1][(np.sign(before) * np.sign(after) < 0.0) | (before == 0.0)]
@@ -76,7 +76,7 @@ def reversal_rate(pieces: Sequence[FloatArray], dt_s: float, setting: ReversalSe
 
     :param pieces: angles of the steering wheel, each dt apart and without a gap; those shorter
         than `SHORTEST_S` are left out [degrees]
-    :return: NaN if nothing is left, or the low pass is beyond half the sampling rate [1/min]
+    :return: NaN if no piece is left, or the cut-off is beyond half the sampling rate [1/min]
     """
     # A filter of order 2 is padded by 9 samples at either end.
     long = [piece for piece in pieces if len(piece) * dt_s >= SHORTEST_S and len(piece) > 9]

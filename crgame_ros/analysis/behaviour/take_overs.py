@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Hands are on with the first such input (Gold et al. 2013): travel of a pedal [share], and
-# steering wheel away from where it was when the seat was taken [degrees].
+# The first such input counts as hands on (Gold et al. 2013): pedal travel [share], or the
+# steering wheel's deviation from its angle when the human took over [degrees].
 PEDAL_INPUT, WHEEL_INPUT_DEG = 0.1, 2.0
-# A request that was made earlier is of something else [s].
+# A request that is older than this did not lead to the take-over [s].
 LONGEST_WAIT_S = 60.0
-# A second is stable in which the steering wheel stays within so much [degrees].
+# A second is stable if the steering wheel stays within this range [degrees].
 STABLE_S, STABLE_WHEEL_DEG = 1.0, 10.0
 
 
 class TakeOverRequest(NamedTuple):
     """
-    That somebody shall drive an AV.
+    A request that a human take over an AV.
 
     :param time_s: since the run's start [s]
-    :param by: `order` of the seat, or the name of an event.
+    :param by: `order` for an order of the seat, or the name of an event or task.
     """
 
     time_s: float
@@ -35,13 +35,13 @@ class TakeOverRequest(NamedTuple):
 
 class TakeOver(NamedTuple):
     """
-    How somebody took over an AV; times since the run's start, NaN where it did not happen [s].
+    A take-over of an AV; times since the run's start, NaN where it did not happen [s].
 
-    :param request: that led to it; None where none is known.
+    :param request: request that led to it; None where none is known.
     :param seat_s: first command that the vehicle obeyed.
     :param end_s: last such command.
     :param hands_on_s: first input.
-    :param stable_s: beginning of the first stable second from then on.
+    :param stable_s: start of the first stable second after that input.
     """
 
     request: TakeOverRequest | None
@@ -66,9 +66,9 @@ def find_take_overs(controls: DriverControls, calm: NDArray[np.bool_],
     """
     Find the take-overs of an AV.
 
-    A request belongs to the first take-over after it; of several the first counts.
+    A request belongs to the first take-over after it; of several requests the first counts.
 
-    :param controls: of the AV; whoever drove it for a piece had taken it over.
+    :param controls: human controls of the AV; each piece of them is a take-over.
     :param calm: (R) whether vehicle and lane allow a stable second at each command: no wheel
         beyond a boundary of its lane, and no hard acceleration.
     :param requests: in order of time.
@@ -90,10 +90,10 @@ def find_take_overs(controls: DriverControls, calm: NDArray[np.bool_],
 
 def hands_on_after(controls: DriverControls, request_s: float) -> float:
     """
-    Return the time from a request to hands on of the first take-over after it.
+    Return the time from a request to hands on in the first take-over after it.
 
-    :param controls: of the AV.
-    :return: NaN where nobody took it over in `LONGEST_WAIT_S`, or nobody's hands came on [s]
+    :param controls: human controls of the AV.
+    :return: NaN without a take-over within `LONGEST_WAIT_S`, or without an input in it [s]
     """
     for piece in controls.pieces():
         begin_s = controls.times_s[piece][0]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tasks of a run as rows: what came, what was answered, what lasted how long."""
+"""The tasks of a run as rows: stimuli, answers, requests and durations."""
 
 from collections.abc import Sequence
 import math
@@ -14,7 +14,7 @@ from crgame_ros.game.task_documents import NOT_MEASURED, PageTimes, TaskEntry
 from crgame_ros.game.task_spec import DetectionResponse, TaskKind
 from crgame_ros.recording.run_record import RunRecord
 
-# What makes a row: it begins something that another entry of the same number ends.
+# Entries that begin a row; another entry of the same number ends it.
 _BEGINS = ('begin', 'stimulus', 'request', 'unrequested')
 
 
@@ -22,20 +22,20 @@ class TaskEvent(NamedTuple):
     """
     One event of a task. Times are of the run's clock, NaN where there is none.
 
-    :param kind: of task: detection_response, take_over or secondary_task.
-    :param name: of the task.
+    :param kind: kind of task: detection_response, take_over or secondary_task.
+    :param name: name of the task.
     :param onset_s: since the run's start [s]
-    :param duration_s: how long the light was on, until a request was obeyed or gone, or until a
-        task ended [s]
-    :param response_time_s: of a stimulus by the page's clock, from the picture that showed it; of
-        a request until the first input with hands or pedals [s]
-    :param outcome: of a stimulus hit, premature, missed, unseen (no page showed it) or open (run
-        or task ended before it was over); unrequested of an answer to none; of a request taken or
-        none; of what lasts begun.
-    :param value: number of the stimulus or request, from 1; 0 of anything else.
+    :param duration_s: time that the light was on, until a request was obeyed or withdrawn, or
+        until a task ended [s]
+    :param response_time_s: for a stimulus, by the page's clock, from the frame that showed it;
+        for a request, until the first input with hands or pedals [s]
+    :param outcome: for a stimulus hit, premature, missed, unseen (no page showed it) or open (run
+        or task ended before it was over); unrequested for an answer without a stimulus; for a
+        request taken or none; for a span begun.
+    :param value: number of the stimulus or request, from 1; 0 for anything else.
     :param seat: the vehicle whose driver it was for.
     :param what: stimulus, unrequested, request or span (from beginning to end of a task).
-    :param times: as the page has measured them.
+    :param times: times that the page measured.
     """
 
     kind: TaskKind
@@ -96,7 +96,7 @@ def _or_inf(seconds: float) -> float:
 
 
 def controls_of(run: RunRecord, vehicle_id: str) -> DriverControls | None:
-    """Return the commands that a driven vehicle obeyed; None of one that is not in the run."""
+    """Return the commands that a driven vehicle obeyed; None if it is not in the run."""
     ids = [item.id for item in run.log.vehicles]
     if vehicle_id not in ids:
         return None
@@ -111,8 +111,9 @@ def first_input(run: RunRecord, vehicle_id: str, request_s: float) -> float:
     """
     Return the time from a request to the first input with hands or pedals.
 
-    Of an AV the first that makes hands on (as of a take-over), of a vehicle that somebody drives
-    already the first response to an event (throttle released, brake pressed, wheel turned).
+    For an AV this is the first input that counts as hands on (see `take_overs`). For a vehicle
+    that a human drives already it is the first response to an event (throttle released, brake
+    pressed, wheel turned).
 
     :return: NaN without one [s]
     """
@@ -133,11 +134,12 @@ class DetectionScore(NamedTuple):
 
     :param task: its name.
     :param seat: the vehicle whose driver answered.
-    :param stimuli: that were shown and are neither open nor answered too early.
+    :param stimuli: number of those that were shown and are neither open nor answered too early.
     :param hits: stimuli answered in time.
     :param misses: stimuli without an answer in time.
-    :param premature: stimuli answered so early that it was no answer to them.
-    :param unrequested: answers to no stimulus: before the first, a second one, one too late.
+    :param premature: stimuli answered too early to be a response to them.
+    :param unrequested: answers without a stimulus: before the first one, a second answer to the
+        same, or one too late.
     :param hit_rate: hits over hits and misses; NaN without either.
     :param response_mean_s: mean response time of the hits; NaN without one [s]
     :param response_sd_s: their standard deviation, N - 1; NaN below two [s]
@@ -157,7 +159,7 @@ class DetectionScore(NamedTuple):
     response_median_s: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it in JSON's terms: what is not defined is null."""
+        """Return the fields as a JSON-compatible dictionary; undefined values are None."""
         return {key: None if isinstance(value, float) and math.isnan(value) else value
                 for key, value in self._asdict().items()}
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a vehicle was driven, in lines for people."""
+"""Lines of text on how a vehicle was driven."""
 
 from collections.abc import Iterator
 import math
@@ -14,7 +14,7 @@ from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour, LaneChangeGap
 
 
 def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
-    """Yield how a vehicle was driven; what is not defined is left out."""
+    """Yield lines on how a vehicle was driven; undefined values are left out."""
     values = found.values
     yield f'{found.vehicle_id} as it was driven'
     for name in ('speed', 'acceleration', 'jerk'):
@@ -44,7 +44,7 @@ def behaviour_lines(found: DriverBehaviour) -> Iterator[str]:
 
 
 def detection_lines(found: DetectionScore) -> Iterator[str]:
-    """Yield how somebody did in a detection response task."""
+    """Yield lines on a driver's results in a detection response task."""
     yield f'{found.task}, answered in {found.seat}'
     yield (f'  hit_rate             {found.hit_rate:9.2f}        {found.hits} hits, '
            f'{found.misses} misses, {found.premature} premature, {found.unrequested} unrequested')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of how a vehicle was driven: values, reactions, lane changes and take-overs."""
+"""The measured behaviour of a vehicle: values, reactions, lane changes and take-overs."""
 
 from dataclasses import dataclass
 import math
@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EventReaction:
-    """How a driver reacted to an event, which took effect at a time since the start [s]."""
+    """A driver's reaction to an event, with the event's time since the run's start [s]."""
 
     event: str
     event_s: float
@@ -30,10 +30,11 @@ class LaneChangeGap:
     """
     The gap that a driver accepted.
 
-    :param time_s: first wheel across, since the run's start; NaN if it was before [s]
+    :param time_s: time at which the first wheel crossed, since the run's start; NaN if it was
+        across before [s]
     :param side: `left` or `right`.
     :param gap: in the lane entered.
-    :param leader: id of the leader in it, None without one; `follower` likewise.
+    :param leader: id of the leader in that lane, None without one; `follower` likewise.
     """
 
     time_s: float
@@ -46,18 +47,18 @@ class LaneChangeGap:
 @dataclass(frozen=True)
 class DriverBehaviour:
     """
-    How a vehicle was driven.
+    The behaviour of a vehicle's driver.
 
-    :param vehicle_id: of it.
-    :param human: whether its driver is a human by the game; an AV is driven by its planner but for
-        its take-overs, and its measures of motion are over both.
-    :param driven_s: for how long commands drove it [s]
-    :param values: by name, those measures of `MEASURES` of which there is one value.
-    :param reactions: to each event.
-    :param limits: what counted as a response.
-    :param lane_changes: with the gaps that were accepted.
-    :param take_overs: of an AV.
-    :param times_s: (K) of the steps, since the run's start [s]
+    :param vehicle_id: id of the vehicle.
+    :param human: whether the game assigns a human driver; an AV is driven by its planner except
+        during take-overs, and its measures of motion cover both.
+    :param driven_s: time for which commands of a human drove it [s]
+    :param values: by name, the measures of `MEASURES` with one value per vehicle.
+    :param reactions: reactions to each event.
+    :param limits: limits that defined a response.
+    :param lane_changes: lane changes with the gaps accepted.
+    :param take_overs: take-overs of an AV.
+    :param times_s: (K) times of the steps, since the run's start [s]
     :param tlc_s: (K) time to lane crossing; NaN off the lanes, inf without a crossing [s]
     :param tlc_linear_s: (K) its linear form [s]
     """
@@ -76,9 +77,9 @@ class DriverBehaviour:
 
     def as_dict(self, series: bool = False) -> dict[str, Any]:
         """
-        Return it as JSON has it; null where a value is not finite.
+        Return the fields as a JSON-compatible dictionary; None where a value is not finite.
 
-        :param series: with the time series, too.
+        :param series: whether to include the time series.
         """
         found: dict[str, Any] = {
             'human': self.human, 'driven_s': self.driven_s,

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Measures of a subject and somebody ahead of it on its path, from gap and speeds alone.
+Measures of a subject and the leader on its path, from gap, speeds and accelerations.
 
-Speeds and accelerations count along the subject's path. What is undefined is NaN, inf or 0 as said
-of each.
+Speeds and accelerations count along the subject's path. Each function states its value where the
+measure is undefined: NaN, inf or 0.
 """
 
 import math
@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# The corridor is as wide as the vehicle, and so much more on either side [m].
+# The corridor is wider than the vehicle by this on either side [m].
 MARGIN = 0.25
-# What the distance to the nearest sample may differ by from that to the path, and s too [m].
+# Tolerance between the distance to the nearest sample and that to the path; also for s [m].
 SLACK = 2.0
 
 
 class Ahead(NamedTuple):
     """
-    The nearest one ahead in the corridor.
+    The leader: the nearest one ahead in the corridor.
 
-    :param number: its number among the others.
-    :param gap: from the subject's front to its rear, along the path [m]; negative where they
-        overlap along it
-    :param own_heading: of the path where the subject's centre is [rad]
-    :param heading: of the path where the leader's centre is [rad]
+    :param number: its index among the others.
+    :param gap: from the subject's front to the leader's rear, along the path [m]; negative where
+        they overlap along it
+    :param own_heading: heading of the path at the subject's centre [rad]
+    :param heading: heading of the path at the leader's centre [rad]
     """
 
     number: int
@@ -44,11 +44,11 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
     """
     Find the nearest one ahead whose footprint overlaps the corridor of a vehicle.
 
-    :param seen: path of the vehicle, from its centre, its corners and the centres of the others;
-        the corridor keeps the offset that the vehicle has now.
+    :param seen: path of the vehicle, with its centre, its corners and the centres of the others
+        as positions; the corridor keeps the vehicle's current lateral offset.
     :param others: (N, D, 2) corners of the others [m]
-    :param radii: (N) of circles around their centres that hold their footprints [m]
-    :param touching: (N) whether they touch it; of those beside it these alone lead
+    :param radii: (N) radii of circles around their centres that contain their footprints [m]
+    :param touching: (N) whether they touch the vehicle; of those beside it only these can lead
     """
     path, mine = seen.path, len(seen.positions) - len(others)
     s, d = (each.tolist() for each in path.refined(seen.positions[:mine], seen.guess[:mine]))
@@ -64,7 +64,7 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
                     for each in path.refined(positions, path.near(positions)[1]))
     rears, right, left = (along[:, 1:].min(axis=1), aside[:, 1:].min(axis=1),
                           aside[:, 1:].max(axis=1))
-    # Who is passed closely is not in the way.
+    # A vehicle that is passed closely is not in the way.
     ahead = (along[:, 0] > s[0]) & (right <= high) & (left >= low) & (
         (rears >= front) | touching[candidates])
     if not ahead.any():
@@ -78,13 +78,14 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
 
 def time_gap(gap: float, speed: float) -> float:
     """
-    Return the time in which the subject drives the gap [s].
+    Return the time in which the subject covers the gap [s].
 
-    The time until its front passes the point where the other's rear is now (thw) is the same.
+    It equals the time headway (thw): the time until the subject's front passes the point where
+    the leader's rear is now.
 
-    :param gap: between the subject's front and the other's rear [m]; NaN without a leader
-    :param speed: of the subject [m/s]
-    :return: inf for a subject that stands or goes back; NaN without a leader.
+    :param gap: between the subject's front and the leader's rear [m]; NaN without a leader
+    :param speed: speed of the subject [m/s]
+    :return: inf for a subject that stands or drives backwards; NaN without a leader.
     """
     if math.isnan(gap):
         return math.nan
@@ -106,12 +107,12 @@ def time_to_collision(gap: float, speed: float, leader_speed: float) -> float:
 def time_to_collision_accelerating(gap: float, speed: float, leader_speed: float,
                                    acceleration: float, leader_acceleration: float) -> float:
     """
-    Return the time to collision where each keeps its acceleration until it stands [s].
+    Return the time to collision where each vehicle keeps its acceleration until it stands [s].
 
-    Who stands stays standing while the other goes on: braking never turns into driving back.
+    A vehicle that has come to a stop stays there: braking never turns into driving backwards.
 
-    :return: the smallest positive time; 0 where they touch already, inf without one or without a
-        leader.
+    :return: the smallest positive time; 0 where they touch already, inf without a collision or
+        without a leader.
     """
     if math.isnan(gap):
         return math.inf
@@ -162,7 +163,7 @@ def required_acceleration(gap: float, speed: float, leader_speed: float,
 
 
 def _standstill(speed: float, acceleration: float) -> float:
-    """Return the time after which a braking vehicle stands; inf for one that does not brake."""
+    """Return the time after which a braking vehicle stands [s]; inf without braking."""
     brakes = speed * acceleration < 0.0 or (speed == 0.0 and acceleration < 0.0)
     return -speed / acceleration if brakes else math.inf
 
@@ -172,7 +173,7 @@ def _smallest_root(gap: float, slope: float, bend: float) -> float:
     discriminant = slope ** 2 - 2.0 * bend * gap
     if not discriminant >= 0.0:
         return math.inf
-    # The form without cancellation; both roots, whatever the signs.
+    # This form avoids cancellation and gives both roots, whatever the signs.
     q = -(slope + math.copysign(math.sqrt(discriminant), slope))
     roots = [numerator / denominator for numerator, denominator in ((2.0 * gap, q), (q, bend))
              if denominator != 0.0]

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The criticality of a run: what each driven vehicle has left to everybody near it, tick by tick.
+Measures the criticality of a run: of each driven vehicle to each one near it, at every tick.
 
-The same code looks on at offline runs, and at recordings. All definitions are in
-`docs/criticality.md`; distances are bumper to bumper, along the subject's own path.
+The same code observes offline runs and measures recordings. All definitions are in
+`docs/criticality.md`. Distances are bumper to bumper, along the subject's own path.
 """
 
 from dataclasses import dataclass
@@ -39,12 +39,12 @@ FloatArray = NDArray[np.float64]
 
 class Measure(NamedTuple):
     """
-    A measure of a pair.
+    A criticality measure of a pair.
 
     :param unit: as tables write it.
-    :param worst: the smaller (-1) or the greater (1) values are the more critical.
+    :param worst: whether smaller (-1) or greater (1) values are more critical.
     :param undefined: the value where there is nothing to measure.
-    :param definition: in a sentence.
+    :param definition: one sentence.
     """
 
     unit: str
@@ -81,9 +81,9 @@ def most_critical(values: FloatArray, others: NDArray[np.int64]
     Choose the most critical value of each measure.
 
     :param values: (P, measures) columns as in `MEASURES`.
-    :param others: (P) whom they are to.
-    :return: (measures) values, as undefined where there is none, and (measures) whom they are to,
-        -1 there.
+    :param others: (P) number of the other of each row.
+    :return: (measures) values, the undefined value where there is none, and (measures) the
+        numbers of the others, -1 there.
     """
     if not len(others):
         return UNDEFINED.copy(), np.full(len(UNDEFINED), -1)
@@ -98,12 +98,12 @@ def most_critical(values: FloatArray, others: NDArray[np.int64]
 
 class TickMeasures(NamedTuple):
     """
-    What a subject has left at a tick.
+    The measures of a subject at a tick.
 
     :param subject: its number among the driven vehicles.
-    :param others: (P) who is near: driven vehicles, then objects, by number.
-    :param values: (P, measures) columns as in `MEASURES`; those of car following are of the
-        leader alone, as undefined for all others.
+    :param others: (P) numbers of those near: driven vehicles, then objects.
+    :param values: (P, measures) columns as in `MEASURES`; measures of car following have values
+        for the leader only, and are undefined for all others.
     """
 
     subject: int
@@ -111,13 +111,13 @@ class TickMeasures(NamedTuple):
     values: FloatArray
 
     def worst(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        """Return the most critical value of each measure, and to whom (`most_critical`)."""
+        """Return the most critical values and the others' numbers (`most_critical`)."""
         return most_critical(self.values, self.others)
 
 
 @dataclass
 class Worst:
-    """The most critical value of a measure: of whom, and when [s]."""
+    """The most critical value of a measure, with the other's id and the time [s]."""
 
     value: float
     other: str
@@ -129,10 +129,10 @@ class VehicleCriticality:
     """
     The criticality of a run for one vehicle.
 
-    :param worst: by measure; those that were never defined are missing.
-    :param tet_s: time with a ttc below its threshold (TET) [s]; each tick stands for its step
-    :param tit: integral of what the ttc is below it (TIT) [s^2]
-    :param crossings: with whom it crossed ways, and how much later (PET).
+    :param worst: by measure; measures that were never defined are missing.
+    :param tet_s: time with a ttc below its threshold (TET) [s]; each tick counts as one step
+    :param tit: integral of the ttc's amount below its threshold (TIT) [s^2]
+    :param crossings: crossings with other paths, with their PET.
     """
 
     vehicle_id: str
@@ -146,13 +146,13 @@ class Criticality:
     """
     Measures every scenario tick of a run (`RunObserver`).
 
-    :param run: what is known of it beforehand; who has no planning problem follows its lane.
-    :param thresholds: what counts as critical.
-    :ivar vehicles: how many are driven.
-    :ivar ids: of everybody: driven vehicles, then objects.
+    :param run: description of the run; a vehicle without a planning problem follows its lane.
+    :param thresholds: thresholds of critical values.
+    :ivar vehicles: number of driven vehicles.
+    :ivar ids: ids of driven vehicles, then of objects.
     :ivar n: simulation step that was measured last; -1 before the first.
-    :ivar latest: what each vehicle had left then.
-    :ivar new_crossings: crossings that are known since then.
+    :ivar latest: measures of each vehicle at that step.
+    :ivar new_crossings: crossings that were detected at that step.
     """
 
     def __init__(self, run: ObservedRun, thresholds: Thresholds = USUAL) -> None:
@@ -177,7 +177,7 @@ class Criticality:
 
     def observe(self, n: int, since_tick_s: float, vehicle_states: FloatArray,
                 objects: ObjectStates | None) -> None:
-        """Measure a published state, if it is that of a tick (`RunObserver`)."""
+        """Measure a published state, if it belongs to a tick (`RunObserver`)."""
         if objects is None or since_tick_s != 0.0:
             return
         self.n, time_s = n, n * self._scheduler.dt_s
@@ -194,11 +194,11 @@ class Criticality:
         self._sum_up(time_s)
 
     def report(self) -> tuple[VehicleCriticality, ...]:
-        """Sum up what has been observed so far."""
+        """Return the criticality of each vehicle over all ticks so far."""
         return tuple(self._found)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what was found, as JSON has it: times in s since the start, SI units."""
+        """Return the results as a JSON-compatible dictionary: SI units, times since the start."""
         return {
             'thresholds': self.thresholds._asdict(),
             'vehicles': {
@@ -216,7 +216,7 @@ class Criticality:
 
     def _accelerations(self, time_s: float, states: FloatArray, poses: FloatArray,
                        moves: FloatArray) -> FloatArray:
-        """Return all accelerations (N, 2): the vehicles' own, the others' by differences."""
+        """Return all accelerations (N, 2): from states for vehicles, by differences for others."""
         result = np.zeros_like(moves)
         if self._before is not None and time_s > self._before[0]:
             lapse = time_s - self._before[0]
@@ -227,7 +227,7 @@ class Criticality:
         return result
 
     def _measure(self, scene: Scene) -> tuple[TickMeasures, ...]:
-        """Measure what each vehicle that is there has left to everybody near it."""
+        """Return the measures of each present vehicle to all near it."""
         footprints = self._footprints
         subjects = [subject for subject in range(self.vehicles)
                     if math.isfinite(scene.poses[subject, 0])]
@@ -246,7 +246,7 @@ class Criticality:
 
     def _follow(self, subject: int, others: NDArray[np.int64], scene: Scene,
                 values: FloatArray) -> None:
-        """Fill in the measures of car following, of the one that leads the vehicle."""
+        """Fill in the measures of car following for the leader of the vehicle."""
         if not len(others):
             return
         poses, outlines = scene.poses, scene.outlines
@@ -294,6 +294,5 @@ def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acce
             required_acceleration(gap, speed, leader_speed, leader_acceleration))
 
 
-# Of who leads nobody.
-# The measures of car following to somebody who is not the leader.
+# The measures of car following to one that is not the leader.
 WITHOUT_LEADER = _compute_leader_measures(math.nan, 0.0, 0.0, 0.0, 0.0)

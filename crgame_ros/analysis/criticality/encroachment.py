@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Post-encroachment: how long after one has left a conflict area another enters it (PET)."""
+"""Post-encroachment time (PET): from when one leaves a conflict area to when another enters."""
 
 from collections import deque
 from itertools import pairwise
@@ -14,25 +14,25 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Nobody asks who was here longer ago [s].
+# Earlier positions are forgotten: PETs beyond this are not measured [s].
 MEMORY_S = 10.0
-# Paths cross at an angle between this and half a turn less this; else one follows or meets [rad].
+# Paths cross at an angle between this and pi less this; else one follows or meets the other [rad].
 LEAST_ANGLE = math.radians(20.0)
-# The second one's way through the conflict area is taken as straight on so far [m].
+# The second one's path through the conflict area is extended straight ahead by this [m].
 AHEAD = 15.0
-# Who moves less in a step has no direction [m].
+# A shorter movement in a step has no direction [m].
 STANDING = 1e-3
 ROUNDING_S = 1e-9
 
 
 class WayCrossed(NamedTuple):
     """
-    Two have crossed each other's way.
+    A crossing of two paths.
 
     :param first: number of the one that was in the conflict area first.
     :param second: number of the other.
-    :param entered_s: when the second entered it [s]
-    :param pet_s: from when the first had left it [s]; 0 if it had not
+    :param entered_s: time at which the second entered the area [s]
+    :param pet_s: time since the first had left it [s]; 0 if it had not
     """
 
     first: int
@@ -42,7 +42,7 @@ class WayCrossed(NamedTuple):
 
 
 class _Moment(NamedTuple):
-    """Where everybody was at a time; NaN where absent."""
+    """All positions and footprints at a time; NaN where absent."""
 
     time_s: float
     outlines: FloatArray
@@ -51,22 +51,22 @@ class _Moment(NamedTuple):
 
 class EncroachmentDetector:
     """
-    Follows footprints from tick to tick and finds who crosses whose way.
+    Detector of crossing paths, from footprints at successive ticks.
 
     The conflict area is the intersection of the areas that both footprints sweep. Between two
-    ticks they move evenly. Only crossing ways count, not those of who follows or comes towards:
+    ticks they move evenly. Only crossing paths count, not those of followers or oncoming traffic:
     the table of definitions leaves a measure without crossing undefined.
 
-    :param watched: how many, from the first on, are looked at with everybody; others among each
-        other are not.
-    :param radii: (N) of circles around the centres that hold the footprints [m]
+    :param watched: number of vehicles, from the first on, that are checked against all; pairs
+        among the others are not checked.
+    :param radii: (N) radii of circles around the centres that contain the footprints [m]
     """
 
     def __init__(self, watched: int, radii: FloatArray) -> None:
         self._watched = watched
         self._radii = radii
         self._past: deque[_Moment] = deque()
-        # How they moved from each moment to the next (T, N, 2), how far (T, N), and whence.
+        # Movements from each moment to the next (T, N, 2), their lengths (T, N), and their starts.
         count = len(radii)
         self._moves, self._lengths = np.empty((0, count, 2)), np.empty((0, count))
         self._begins = np.empty((0, count, 2))
@@ -78,9 +78,9 @@ class EncroachmentDetector:
     def observe(self, time_s: float, outlines: FloatArray,
                 centers: FloatArray) -> list[WayCrossed]:
         """
-        Take where everybody is, and give the crossings that are known from now on.
+        Add the positions of a tick, and return the crossings that it completes.
 
-        :param time_s: of this tick, later than the one before [s]
+        :param time_s: time of this tick, later than the previous one [s]
         :param outlines: (N, C, 2) corners of convex footprints [m]; NaN where absent
         :param centers: (N, 2) [m]
         """
@@ -92,7 +92,7 @@ class EncroachmentDetector:
             lengths = np.hypot(ways[:, 0], ways[:, 1])
             if len(self._past) > 1:
                 entering = self._candidates(before, ways, lengths)
-                # Who has come out of an area may enter it anew.
+                # One that has left an area may enter it again.
                 self._inside &= entering.keys()
                 for pair, segments in entering.items():
                     crossing = self._enters(*pair, segments, now)
@@ -111,11 +111,11 @@ class EncroachmentDetector:
     def _candidates(self, here: FloatArray, ways: FloatArray,
                     lengths: FloatArray) -> dict[tuple[int, int], list[int]]:
         """
-        List by (first, second) the steps of the first that the second's way may cross now.
+        Find by (first, second) the steps of the first that the second's movement may cross now.
 
-        :param here: (N, 2) where everybody was before this step [m]
-        :param ways: (N, 2) of this step [m]
-        :param lengths: (N) of these [m]
+        :param here: (N, 2) positions before this step [m]
+        :param ways: (N, 2) movements in this step [m]
+        :param lengths: (N) their lengths [m]
         """
         pairs: dict[tuple[int, int], list[int]] = {}
         unwatched = self._unwatched
@@ -124,7 +124,7 @@ class EncroachmentDetector:
                            + self._radii[others] + self._lengths[:, others] + lengths[i])
             rows, columns = np.nonzero(near)
             self._add(pairs, rows, others[columns], np.full(len(rows), i), ways)
-            # Those that are watched have their turn as the second one.
+            # Watched ones are the second in the pairs above; here they are the first.
             if len(unwatched):
                 near = _within(here[unwatched] - self._begins[:, None, i], self._radii[i]
                                + self._radii[unwatched] + self._lengths[:, i, None]
@@ -135,7 +135,7 @@ class EncroachmentDetector:
 
     def _add(self, pairs: dict[tuple[int, int], list[int]], steps: NDArray[np.int64],
              firsts: NDArray[np.int64], seconds: NDArray[np.int64], ways: FloatArray) -> None:
-        """Note those whose ways cross, by their angle."""
+        """Add the pairs whose movements cross, judged by their angle."""
         if not len(steps):
             return
         (ax, ay), (bx, by) = self._moves[steps, firsts].T, ways[seconds].T
@@ -148,7 +148,7 @@ class EncroachmentDetector:
 
     def _enters(self, first: int, second: int, segments: list[int],
                 now: _Moment) -> WayCrossed | None:
-        """Look whether a second one enters, in this step, what a first one has swept."""
+        """Return the crossing if the second enters in this step the area swept by the first."""
         before = self._past[-1]
         way = now.centers[second] - before.centers[second]
         lapse = now.time_s - before.time_s
@@ -157,7 +157,7 @@ class EncroachmentDetector:
         contact = float(time_to_contact(_hulls(begins, ends), before.outlines[second],
                                         np.zeros(2), way / lapse).min())
         pair = (first, second)
-        # A touch at the very tick belongs to the step that ends there.
+        # A contact exactly at a tick belongs to the step that ends there.
         if contact > lapse + ROUNDING_S:
             self._inside.discard(pair)
             return None
@@ -170,7 +170,7 @@ class EncroachmentDetector:
         return WayCrossed(first, second, entered_s, max(entered_s - left_s, 0.0))
 
     def _left(self, first: int, outline: FloatArray, way: FloatArray, now: _Moment) -> float:
-        """Find when the first one left the area through which the second one is to go."""
+        """Return when the first one left the area that the second one is about to cross [s]."""
         through = _hulls(outline[None], outline[None] + AHEAD * way / np.hypot(*way))[0]
         latest = -math.inf
         for begin, end in pairwise((*self._past, now)):
@@ -178,7 +178,7 @@ class EncroachmentDetector:
                 continue
             lapse = end.time_s - begin.time_s
             back = (begin.centers[first] - end.centers[first]) / lapse
-            # Backwards in time it comes into the area when it leaves it forwards.
+            # Backwards in time, it enters the area at the moment at which it left it.
             contact = float(time_to_contact(through, end.outlines[first], np.zeros(2), back))
             if contact <= lapse + ROUNDING_S:
                 latest = max(latest, end.time_s - contact)
@@ -199,6 +199,6 @@ def _hulls(first: FloatArray, second: FloatArray) -> FloatArray:
     corners, owner = shapely.get_coordinates(hulls, return_index=True)
     lengths = np.bincount(owner, minlength=count)
     starts = np.cumsum(lengths) - lengths
-    # Those of fewer corners repeat their last one, which is the first again.
+    # Hulls with fewer corners repeat their last one, which equals the first.
     rows = np.minimum(np.arange(lengths.max()), lengths[:, None] - 1)
     return np.asarray(corners[starts[:, None] + rows])

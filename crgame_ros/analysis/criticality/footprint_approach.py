@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Two convex footprints that move: when they touch, and how far apart they are.
+Computes when two moving convex footprints touch, and how far apart they are.
 
-For arrays of footprints, and, to the last bit the same, for two of them with numbers: arrays as
-small as these take longer to call for than to compute.
+There is a form for arrays of footprints, and one with plain numbers for a single pair, which gives
+the same bits: for small arrays numpy's calls take longer than the computation.
 """
 
 import math
@@ -19,23 +19,23 @@ Corners = list[list[float]]
 def time_to_contact(first: FloatArray, second: FloatArray, velocity: FloatArray,
                     second_velocity: FloatArray) -> FloatArray:
     """
-    Find when footprints touch that keep their velocity and yaw (ttc_2d), whatever the direction.
+    Return the time until footprints touch that keep velocity and yaw (ttc_2d), in any direction.
 
-    In closed form: along the normal of each edge the projections of both overlap during one
-    interval of time; they touch from when all of these overlap (separating axes).
+    Closed form by separating axes: along the normal of each edge, the projections of both overlap
+    during one interval of time; the footprints touch while all intervals overlap.
 
-    :param first: (..., C, 2) corners of convex footprints in turn [m]; shorter ones repeat a
-        corner
+    :param first: (..., C, 2) corners of convex footprints in turn [m]; footprints with fewer
+        corners repeat one
     :param second: (..., D, 2) corners of the others.
-    :param velocity: (..., 2) of the first [m/s]
-    :param second_velocity: (..., 2) of the second [m/s]
+    :param velocity: (..., 2) velocities of the first [m/s]
+    :param second_velocity: (..., 2) velocities of the second [m/s]
     :return: (...) time [s]; 0 where they touch now, inf where they never will.
     """
     relative = second_velocity - velocity
     x, y = _both(first, second, relative.shape[:-1])
     edge_x, edge_y = _edges(x), _edges(y)
-    # Turned by a right angle: the direction of the edge's normal, of any length. Axes are of
-    # whom, to whose edges, (...), edge and corner.
+    # The edge turned by a right angle is its normal, of any length. Axes of the arrays: footprint
+    # of the corners, footprint of the edges, (...), edge, corner.
     along = edge_x[None, ..., None] * y[:, None, ..., None, :] \
         - edge_y[None, ..., None] * x[:, None, ..., None, :]
     low, high = along.min(axis=-1), along.max(axis=-1)
@@ -55,14 +55,14 @@ def distance(first: FloatArray, second: FloatArray,
     """
     Return the smallest distance of convex footprints (min_distance) [m].
 
-    :param first: (..., C, 2) corners in turn [m]; shorter ones repeat a corner
+    :param first: (..., C, 2) corners in turn [m]; footprints with fewer corners repeat one
     :param second: (..., D, 2) corners of the others.
     :param touching: (...) whether they touch now, where that is known.
     :return: (...) 0 where they overlap.
     """
     x, y = _both(first, second)
     edge_x, edge_y = (_edges(each)[::-1, ..., None, :] for each in (x, y))
-    # From where the edges of the one begin to the corners of the other.
+    # From the starts of one's edges to the corners of the other.
     offset_x, offset_y = (each[..., :, None] - each[::-1, ..., None, :] for each in (x, y))
     lengths = edge_x * edge_x + edge_y * edge_y
     along = offset_x * edge_x + offset_y * edge_y
@@ -83,7 +83,7 @@ def approach(first: Corners, second: Corners, relative: list[float]) -> tuple[fl
 
     :param first: (C, 2) corners in turn [m]
     :param second: (D, 2) corners of the other.
-    :param relative: (2) its velocity less that of the first [m/s]
+    :param relative: (2) velocity of the other minus that of the first [m/s]
     """
     entered, left = -math.inf, math.inf
     for polygon in (first, second):
@@ -123,7 +123,7 @@ def _least_square(corners: Corners, polygon: Corners) -> float:
 
 def _both(first: FloatArray, second: FloatArray,
           shape: tuple[int, ...] = ()) -> tuple[FloatArray, FloatArray]:
-    """Return x and y of both in one array (2, ..., C); who has fewer corners repeats the last."""
+    """Return x and y of both in one array (2, ..., C); a shorter one repeats its last corner."""
     shape = np.broadcast_shapes(first.shape[:-2], second.shape[:-2], shape)
     result = np.empty((2, 2, *shape, max(first.shape[-2], second.shape[-2])))
     for row, corners in enumerate((first, second)):
@@ -134,7 +134,7 @@ def _both(first: FloatArray, second: FloatArray,
 
 
 def _edges(values: FloatArray) -> FloatArray:
-    """Return what leads from each corner to the next, and from the last to the first."""
+    """Return the vectors from each corner to the next, and from the last to the first."""
     edges = np.empty_like(values)
     np.subtract(values[..., 1:], values[..., :-1], out=edges[..., :-1])
     np.subtract(values[..., 0], values[..., -1], out=edges[..., -1])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Everybody's footprint at a tick: who is near a vehicle, how far away and how soon there."""
+"""All footprints at a tick: which are near a vehicle, at what distance and time to collision."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -22,18 +22,18 @@ Numbers = NDArray[np.int64]
 
 NEAR = 100.0
 CIRCLE_CORNERS = 32
-# Pairs that have no more corners than this together are measured one by one.
+# Pairs with no more corners than this in total are measured one by one.
 FEW_CORNERS = 16
 
 
 class Scene(NamedTuple):
     """
-    Where everybody (N) is at a tick, driven vehicles first.
+    The scene at a tick: N vehicles and objects, driven vehicles first.
 
-    :param poses: (N, 3) of the centres.
-    :param moves: (N, 2) their velocities.
+    :param poses: (N, 3) poses of the centres.
+    :param moves: (N, 2) velocities.
     :param accelerations: (N, 2)
-    :param outlines: (N, C, 2) corners of the footprints; who has fewer repeats the last.
+    :param outlines: (N, C, 2) corners of the footprints; a shorter one repeats its last corner.
     """
 
     poses: FloatArray
@@ -44,16 +44,16 @@ class Scene(NamedTuple):
 
 class NearbyFootprints:
     """
-    The footprints of everybody in a run, as the smallest convex ones around them.
+    The convex hulls of all footprints in a run.
 
     :param everybody: (N) driven vehicles, then all others.
-    :ivar radii: (N) of circles around the centres that hold the footprints [m]
+    :ivar radii: (N) radii of circles around the centres that contain the footprints [m]
     """
 
     def __init__(self, everybody: Sequence[ObjectDescription]) -> None:
         outlines = [_convex(outline(item.shape, CIRCLE_CORNERS)) for item in everybody]
         self.radii = np.array([np.hypot(*corners.T).max() for corners in outlines])
-        # In one array, shorter ones filled up; and who has as many corners, to compute no more.
+        # All in one padded array, and groups by number of corners, to compute no more than needed.
         self._most = max(map(len, outlines), default=1)
         self._outlines = np.array([
             np.concatenate((corners, np.repeat(corners[-1:], self._most - len(corners), axis=0)))
@@ -61,11 +61,11 @@ class NearbyFootprints:
         self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
 
     def scene(self, poses: FloatArray, moves: FloatArray, accelerations: FloatArray) -> Scene:
-        """Return where everybody is; parameters as of `Scene`."""
+        """Return the scene; parameters as for `Scene`."""
         return Scene(poses, moves, accelerations, placed(self._outlines, poses))
 
     def on_road(self, scene: Scene, transform: RigidTransform) -> Scene:
-        """Return a scene where the road of a vehicle is."""
+        """Return a scene in the coordinates of a vehicle's road."""
         if transform.is_identity:
             return scene
         return self.scene(transform.to_scenario(scene.poses),
@@ -73,7 +73,7 @@ class NearbyFootprints:
                           transform.turn_to_scenario(scene.accelerations))
 
     def near(self, subject: int, scene: Scene) -> Numbers:
-        """List by number who is near a vehicle."""
+        """Return the numbers of those near a vehicle."""
         x, y = (scene.poses[:, :2] - scene.poses[subject, :2]).T
         away = np.hypot(x, y)
         away[subject] = np.nan
@@ -85,8 +85,8 @@ class NearbyFootprints:
         Return ttc_2d [s] and min_distance [m] of vehicles to those near them, (P, 2) each.
 
         :param subjects: numbers of the vehicles, one at least.
-        :param near: who is near each.
-        :param scenes: where the road of each is.
+        :param near: numbers of those near each vehicle.
+        :param scenes: the scene in the coordinates of each vehicle's road.
         """
         counts = [len(others) for others in near]
         if sum(counts) * self._most <= FEW_CORNERS:
@@ -116,6 +116,6 @@ class NearbyFootprints:
 
 
 def _convex(corners: FloatArray) -> FloatArray:
-    """Return the corners of the smallest convex footprint around one."""
+    """Return the corners of a footprint's convex hull."""
     hull = shapely.convex_hull(shapely.multipoints(corners))
     return np.asarray(shapely.get_coordinates(hull)[:-1])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The path that a driven vehicle is on: its lane, and the lanes that follow on its route."""
+"""The path of a driven vehicle: its lane, and the lanes that follow on its route."""
 
 from collections.abc import Sequence
 import math
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# How far ahead somebody is looked for [m], and how far samples of the path are apart [m].
+# Search distance ahead [m], and spacing of the path's samples [m].
 REACH = 300.0
 SPACING = 1.0
-# A position is projected when it is so near to the normal [m], or after so many rounds.
+# The projection ends within this distance of the normal [m], or after so many iterations.
 EXACT, ROUNDS = 1e-11, 19
-# Who drives at a greater angle to its lane is not on it [rad].
+# A vehicle at a greater angle to its lane is not on it [rad].
 MAX_ANGLE = math.radians(60.0)
 
 
@@ -29,8 +29,8 @@ class OwnPath(NamedTuple):
     """
     A path, straight beyond both ends.
 
-    :param line: with arc length and offset.
-    :param samples: (S, 2) points of it, `SPACING` apart [m]
+    :param line: the path as a line with arc length and lateral offset.
+    :param samples: (S, 2) points on it, `SPACING` apart [m]
     """
 
     line: Curve
@@ -38,7 +38,7 @@ class OwnPath(NamedTuple):
 
     @classmethod
     def along(cls, points: FloatArray) -> 'OwnPath':
-        """Make it of a polyline (n, 2) [m]."""
+        """Build the path from a polyline (n, 2) [m]."""
         return cls(Curve.from_polyline(points), resample(points, SPACING))
 
     def near(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -50,22 +50,22 @@ class OwnPath(NamedTuple):
 
     def refined(self, positions: FloatArray, guess: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
-        Find arc lengths and offsets to the left (N), (N) of positions (N, 2) [m].
+        Find arc lengths (N) and offsets to the left (N) of positions (N, 2) [m].
 
-        By Newton's method from the nearest samples: in the same coordinates as those of the line.
+        Newton's method starts from the nearest samples. Positions are in the line's coordinates.
 
-        :param guess: (N) their arc lengths, as `near` gives them [m]
+        :param guess: (N) arc lengths that `near` returned [m]
         """
         return self.line.refine(positions, guess, ROUNDS, EXACT)
 
 
 class SeenPath(NamedTuple):
     """
-    A path, and who is beside it.
+    A path, with positions relative to it.
 
-    :param positions: (N, 2), that of the vehicle whose path it is first [m]
+    :param positions: (N, 2), first that of the vehicle whose path it is [m]
     :param away: (N) their distances to the path's nearest samples [m]
-    :param guess: (N) arc lengths of these [m]
+    :param guess: (N) arc lengths of these samples [m]
     """
 
     path: OwnPath
@@ -76,12 +76,12 @@ class SeenPath(NamedTuple):
 
 class OwnPaths:
     """
-    The paths of all driven vehicles, each made when its vehicle first comes to a lane.
+    The paths of all driven vehicles, each built when its vehicle first comes to a lane.
 
-    Off the road, and at a great angle to the lane, a vehicle's path is straight on.
+    Off the road, and at a large angle to the lane, a vehicle's path is straight ahead.
 
     :param roads: the road network.
-    :param goals: (V) lanelets of each vehicle's goal; none: it follows its lane.
+    :param goals: (V) lanelets of each vehicle's goal; empty: it follows its lane.
     """
 
     def __init__(self, roads: RoadNetwork, goals: Sequence[frozenset[int]]) -> None:
@@ -91,11 +91,11 @@ class OwnPaths:
 
     def at(self, vehicle: int, yaw: float, positions: FloatArray) -> SeenPath:
         """
-        Return the path of a vehicle, as it is seen from some positions.
+        Return the path of a vehicle, with positions relative to it.
 
         :param vehicle: its number among the driven ones.
-        :param yaw: of the vehicle [rad]
-        :param positions: (N, 2) of its centre, then of whomever [m]
+        :param yaw: yaw of the vehicle [rad]
+        :param positions: (N, 2) the vehicle's centre, then any other points [m]
         """
         x, y = positions[0].tolist()
         lanelet = self._roads.lanelet_at(x, y, yaw) if self._roads.lanelet_ids else None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The criticality of a run that is over, from its log."""
+"""The criticality of a finished run, from its log."""
 
 from collections.abc import Callable
 
@@ -18,10 +18,10 @@ def measure_log(log: RunTrajectories, thresholds: Thresholds = USUAL,
     """
     Measure every scenario step of a run.
 
-    :param log: of a recording (`read_trajectories`) or of an offline run (`trajectories_of`).
-    :param progress: is told how much has been measured, from 0 to 1.
-    :param on_tick: is given the observer after each step, to take what it found there.
-    :raises InputError: if the scenario in it cannot be used.
+    :param log: log of a recording (`read_trajectories`) or an offline run (`trajectories_of`).
+    :param progress: called with the share measured so far, 0 to 1.
+    :param on_tick: called with the observer after each step, to read its results.
+    :raises InputError: if the scenario in the log cannot be used.
     """
     game = log.game
     loaded = parse_scenario(log.xml_text, '/scenario/xml')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of `/criticality`: what each driven vehicle has left to whom, tick by tick."""
+"""The rows of `/criticality`: the measures of each driven vehicle to each one near, per tick."""
 
 from collections.abc import Sequence
 import math
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 CRITICALITY_TOPIC = '/criticality'
 PLACE_COLUMNS = ('epoch', 'n', 'subject', 'other')
-# What stands in a row; pet is there at the tick at which the second has come.
+# The columns of a row; pet has a value at the tick at which the second vehicle has entered.
 COLUMNS = (*PLACE_COLUMNS, *MEASURES, 'pet')
 PET = COLUMNS.index('pet')
 
@@ -26,9 +26,9 @@ FloatArray = NDArray[np.float64]
 
 def criticality_rows(criticality: Criticality, epoch: int, n: int) -> FloatArray:
     """
-    Return the rows (P, `COLUMNS`) of what was observed last: one for each pair that is near.
+    Return the rows (P, `COLUMNS`) of the last observed tick: one for each pair that is near.
 
-    :param epoch: counts resets.
+    :param epoch: number of resets so far.
     :param n: simulation step of the tick.
     """
     blocks = []
@@ -46,7 +46,7 @@ def criticality_rows(criticality: Criticality, epoch: int, n: int) -> FloatArray
                 continue
             known = np.flatnonzero((rows[:, 2] == subject) & (rows[:, 3] == other))
             if not len(known):
-                # Whom one has crossed may be far away by now.
+                # The other of a crossing may be far away by now, without a row of its own.
                 rows = np.concatenate((rows, [[epoch, n, subject, other, *UNDEFINED, np.nan]]))
                 known = np.array([len(rows) - 1])
             rows[known, PET] = crossing.pet_s
@@ -57,7 +57,7 @@ def read_criticality_rows(label: str, data: Sequence[float]) -> FloatArray:
     """
     Read the rows (P, `COLUMNS`) of a message.
 
-    :param label: of the second dimension: the columns, separated by commas.
+    :param label: label of the second dimension: the columns, separated by commas.
     :param data: the flattened rows.
     :raises InputError: if columns are missing, or rows are not whole.
     """
@@ -73,11 +73,11 @@ def read_criticality_rows(label: str, data: Sequence[float]) -> FloatArray:
 
 def most_critical_rows(rows: FloatArray) -> FloatArray:
     """
-    Choose of each subject the most critical values of one tick.
+    Return the most critical values of each subject at one tick.
 
     :param rows: (P, `COLUMNS`)
-    :return: (S, 1 + 2 (measures + 1)) the subject's number; then of each measure, and of pet, the
-        value and the number of whom it is to, -1 where there is none.
+    :return: (S, 1 + 2 (measures + 1)) the subject's number; then for each measure, and for pet,
+        the value and the number of the other, -1 where there is none.
     """
     subjects = np.unique(rows[:, 2])
     chosen = np.empty((len(subjects), 1 + 2 * (len(MEASURES) + 1)))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What counts as critical."""
+"""Thresholds beyond which measures are critical."""
 
 import math
 from typing import NamedTuple
@@ -10,11 +10,11 @@ from crgame_ros.errors import InputError
 
 class Thresholds(NamedTuple):
     """
-    What counts as critical, as in the SSM device of SUMO.
+    Thresholds of critical values, as in the SSM device of SUMO.
 
-    :param ttc_s: smaller times to collision are [s]
-    :param drac: greater decelerations are [m/s^2]
-    :param pet_s: smaller post-encroachment times are [s]
+    :param ttc_s: smaller times to collision are critical [s]
+    :param drac: greater decelerations are critical [m/s^2]
+    :param pet_s: smaller post-encroachment times are critical [s]
     """
 
     ttc_s: float = 3.0
@@ -22,15 +22,15 @@ class Thresholds(NamedTuple):
     pet_s: float = 2.0
 
     def exceeded(self, measure: str, value: float) -> bool:
-        """Return whether a value is critical; of measures without a threshold none is."""
+        """Return whether a value is critical; False for measures without a threshold."""
         return {'ttc': value < self.ttc_s, 'drac': value > self.drac,
                 'pet': value < self.pet_s}.get(measure, False)
 
     def check(self, prefix: str = '') -> None:
         """
-        Refuse what is no threshold.
+        Check the thresholds.
 
-        :param prefix: of the names by which the user knows them.
+        :param prefix: prefix of the option names, for the message.
         :raises InputError: if one is not positive.
         """
         for name, value in self._asdict().items():

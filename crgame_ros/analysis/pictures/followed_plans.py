@@ -36,7 +36,7 @@ def read_followed_plans(bag: Path, log: RunTrajectories,
     Whether the engine took a plan is not recorded one by one: a refused one counts as well.
 
     :param log: of the same run.
-    :param progress: is told how much of the recording has been read, 0 to 1.
+    :param progress: called with the share of the recording read so far, 0 to 1.
     :raises InputError: as `read_plans`.
     """
     scheduler = log.game.scheduler

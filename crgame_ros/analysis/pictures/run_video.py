@@ -37,7 +37,7 @@ def write_video(scene: FrameScene, path: Path,
     Write a video that lasts as long as the run; the file is there whole or not at all.
 
     :param path: of the file, *.mp4 or *.gif.
-    :param progress: is told how much has been drawn, 0 to 1.
+    :param progress: called with the share drawn so far, 0 to 1.
     :return: the file, a GIF where there is no ffmpeg for MP4.
     :raises InputError: if the name is another, or the file cannot be written.
     """

@@ -70,7 +70,7 @@ class ReportRun:
 
     @property
     def outcome(self) -> Mapping[str, Any] | None:
-        """Return plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        """Return plans, violations and contacts as in `timing.json`; None if unknown."""
         return self.timing if self.offline is None else self.offline
 
     @cached_property
@@ -106,7 +106,7 @@ def read_report_run(path: Path, epoch: int | None = None,
 
     :param path: folder of a run, or its recording.
     :param epoch: which run, where a recording holds several; None for the last.
-    :param progress: is told how much is done, from 0 to 1.
+    :param progress: called with the share done so far, 0 to 1.
     :raises InputError: if it cannot be read.
     """
     bag = recording_in(path)

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well planners did: CommonRoad's costs, feasibility, nuPlan's score and our own."""
+"""Scores of planners: CommonRoad's costs, feasibility, nuPlan's score and the project's own."""

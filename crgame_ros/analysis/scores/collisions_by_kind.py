@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Collisions as nuPlan's closed-loop score sees them: which kind, and at whose fault."""
+"""Collisions as nuPlan's closed-loop score classifies them: by kind and by fault."""
 
 from dataclasses import dataclass
 import math
@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 import shapely
 
 FloatArray = NDArray[np.float64]
-# Whose centre is at a smaller angle to the heading is ahead of the rear axle, at a greater one
-# behind it (nuplan-devkit, observation/idm/utils.py) [rad].
+# Another is ahead of the rear axle if its centre is at an angle to the heading below the first,
+# and behind if above the second (nuplan-devkit, observation/idm/utils.py) [rad].
 AHEAD, BEHIND = math.radians(30.0), math.radians(150.0)
 
 
 @dataclass(frozen=True)
 class JudgedCollision:
     """
-    The first touch of the vehicle and one other.
+    The first contact of the vehicle with another.
 
-    :param other_id: whom it touched.
-    :param other_kind: what that is.
-    :param step: time step, from the drive's first.
-    :param time_s: the same [s]
-    :param kind: of the collision.
+    :param other_id: id of the other.
+    :param other_kind: kind of the other.
+    :param step: time step, counted from the drive's first.
+    :param time_s: the same as a time [s]
+    :param kind: kind of the collision.
     :param at_fault: whether it counts as the vehicle's fault.
     """
 
@@ -42,17 +42,17 @@ class JudgedCollision:
     at_fault: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {'with': self.other_id, 'group': self.other_kind, 'time_s': self.time_s,
                 'kind': self.kind, 'at_fault': self.at_fault}
 
 
 def find_collisions(drive: ScoredDrive, lanes: LanesDriven) -> tuple[JudgedCollision, ...]:
     """
-    Find the first touch with each other, in order of time.
+    Find the first contact with each of the others, in order of time.
 
-    A vehicle that stands, one that is hit from behind, and one that is hit at the side within its
-    lane are not at fault; one that hits what stands, or hits with its front, is.
+    The vehicle is not at fault if it stands, is hit from behind, or is hit at the side within its
+    lane. It is at fault if it hits a standing obstacle, or hits with its front.
     """
     found = []
     for track in drive.tracks:
@@ -101,7 +101,7 @@ def _kind(drive: ScoredDrive, track: Track, step: int) -> Kind:
         return 'stopped track'
     if float(angle_to(drive.rear_axles[step], track.poses[step, :2])) > BEHIND:
         return 'rear'
-    # Of a rectangle the first and the last corner are those of the front.
+    # The first and the last corner of a rectangle are its front corners.
     front = shapely.linestrings(drive.outlines[step][[0, -1]])
     body = shapely.polygons(placed(outline(track.shape), track.poses[step]))
     return 'active front' if shapely.intersects(front, body) else 'lateral'

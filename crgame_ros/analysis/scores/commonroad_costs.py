@@ -21,7 +21,7 @@ _PATH_LENGTH = 'the code takes the path length L where the site has the offset f
 
 
 class CostDefinition(NamedTuple):
-    """A cost function as the checker's code has it: a sentence, and where the site differs."""
+    """A cost function as in the checker's code: a sentence, and how the website differs."""
 
     definition: str
     variant: str
@@ -49,10 +49,10 @@ class TrajectoryCost:
     """
     The cost of a trajectory by one function.
 
-    :param name: of the function.
+    :param name: name of the function.
     :param total: its value; None where it cannot be computed.
-    :param parts: its parts without their weights, by name.
-    :param reason: why there is none; empty otherwise.
+    :param parts: its partial costs without weights, by name.
+    :param reason: why there is no value; empty otherwise.
     """
 
     name: str
@@ -61,14 +61,14 @@ class TrajectoryCost:
     reason: str = ''
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         if self.total is None:
             return {'total': None, 'reason': self.reason}
         return {'total': self.total, 'parts': self.parts}
 
 
 def checker_version() -> str:
-    """Name the checker and its version."""
+    """Return the name of the checker with its version."""
     return f'{CHECKER} {version(CHECKER)}'
 
 
@@ -78,13 +78,13 @@ def evaluate_costs(scenario: Scenario, problem: PlanningProblem, trajectory: Tra
     """
     Evaluate cost functions.
 
-    :param scenario: without the vehicle itself.
-    :param problem: that the trajectory solves.
-    :param trajectory: states of the centre, as CommonRoad's vehicle models have them.
-    :param kind: vehicle type: how wide the vehicle is.
+    :param scenario: the scenario without the vehicle itself.
+    :param problem: the planning problem that the trajectory solves.
+    :param trajectory: states of the centre, as in CommonRoad's vehicle models.
+    :param kind: vehicle type, which gives the width.
     """
     found = tuple(_evaluate(scenario, problem, trajectory, kind, name) for name in names)
-    # The checker keeps its last scenario for ever, whose package complains of it at the end.
+    # The checker caches its last scenario until exit, at which its package would warn.
     LaneletRouteMatcher.scenario_cc.cache_clear()
     return found
 
@@ -96,7 +96,7 @@ def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajecto
         found = evaluator.evaluate_pp_solution(scenario, problem, trajectory)
         parts = {part.name: float(value) for part, value in found.partial_costs.items()}
         total = float(found.total_costs)
-    except Exception as error:  # the checker raises whatever its code stumbles over
+    except Exception as error:  # the checker can raise any exception
         return TrajectoryCost(name, None, {}, _reason(error))
     if not math.isfinite(total):
         return TrajectoryCost(name, None, {}, 'a part of it is not finite')
@@ -104,12 +104,12 @@ def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajecto
 
 
 def _reason(error: BaseException) -> str:
-    """Return in a line what the checker stumbled over: the cause, where it names one."""
+    """Return in a line why the checker failed: the cause, where the error has one."""
     cause = error.__cause__ or error
     lacking = re.search(r"has no attribute '(\w+)'", str(cause))
     if isinstance(cause, AttributeError) and lacking:
         return f'its states have no {lacking[1]}'
     if cause is error:
-        # Before any cost there is the way along the lanes, which the checker looks for.
+        # Before it computes costs, the checker searches for a route along the lanes.
         return one_line(f'the checker finds no lanes for it ({type(cause).__name__}: {cause})')
     return one_line(f'{type(cause).__name__}: {cause}')

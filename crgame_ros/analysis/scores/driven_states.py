@@ -14,17 +14,17 @@ from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import StateColumn
 
-# Vehicles that differ by no more are the same [m].
+# Dimensions that differ by no more are equal [m].
 _SAME = 1e-6
 
 
 class ChosenType(NamedTuple):
     """
-    The vehicle type of CommonRoad that stands for a vehicle.
+    The vehicle type of CommonRoad that represents a vehicle.
 
     :param kind: number 1 to 4 in benchmark ids.
-    :param difference: sum of what length, width, wheelbase and the place of the centre differ by
-        [m]
+    :param difference: sum of the differences in length, width, wheelbase and position of the
+        centre [m]
     """
 
     kind: VehicleType
@@ -37,7 +37,7 @@ class ChosenType(NamedTuple):
 
 
 def choose_type(vehicle: VehicleParameters) -> ChosenType:
-    """Choose the vehicle type whose dimensions are nearest: CommonRoad knows four."""
+    """Return the one of CommonRoad's four vehicle types with the nearest dimensions."""
     found = []
     for kind, known in vehicle_parameters.items():
         differences = (known.l - vehicle.length, known.w - vehicle.width,
@@ -49,9 +49,9 @@ def choose_type(vehicle: VehicleParameters) -> ChosenType:
 
 def driven_states(log: RunTrajectories, vehicle: int, kind: VehicleType) -> list[KSState]:
     """
-    Return a vehicle's states from time step 0 on, as the model KS has them.
+    Return a vehicle's states of the KS model, from time step 0 on.
 
-    The rear axle is where it was; the model's centre lies the type's own distance ahead.
+    The rear axle keeps its position; the model's centre is ahead of it by the type's own distance.
 
     :param vehicle: its number among the driven ones.
     """
@@ -76,7 +76,7 @@ def goal_step(problem: PlanningProblem, states: list[KSState]) -> int | None:
 
 
 def is_reached(problem: PlanningProblem, state: KSState) -> bool:
-    """Return whether a state meets the goal; one that asks for what the state lacks is not met."""
+    """Return whether a state meets the goal; a goal on a value that the state lacks is not met."""
     try:
         return bool(problem.goal.is_reached(state))
     except (AttributeError, ValueError):
@@ -84,6 +84,6 @@ def is_reached(problem: PlanningProblem, state: KSState) -> bool:
 
 
 def until_goal(states: list[KSState], step: int | None) -> Trajectory:
-    """Return the trajectory that ends where the goal is reached, as a solution does."""
+    """Return the trajectory up to the goal, as a solution needs it."""
     kept = states if step is None else states[:max(step, 1) + 1]
     return Trajectory(kept[0].time_step, kept)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which lanes a vehicle was in, step by step."""
+"""The lanes that a vehicle was in at each step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# Neighbouring lanelets are often millimetres apart; nobody is between them [m].
+# Neighbouring lanelets are often millimetres apart; such gaps are closed [m].
 _SLIT = 0.01
 _CARS = frozenset({RoadUser.VEHICLE, RoadUser.CAR})
 
@@ -24,9 +24,10 @@ class LanesDriven:
     """
     The lanes of K steps.
 
-    :param lanelets: (K) lanelet of the centre, that whose direction fits best; -1 off the lanes.
-    :param in_one_lane: (K) whether the whole footprint is in one lane: a lanelet with those before
-        and behind it.
+    :param lanelets: (K) lanelet of the centre, the one with the best fitting direction; -1 off
+        the lanes.
+    :param in_one_lane: (K) whether the whole footprint is in one lane: a lanelet with its
+        predecessors and successors.
     :param in_intersection: (K) whether the rear axle is in an intersection.
     """
 
@@ -54,7 +55,7 @@ def find_lanes(roads: RoadNetwork, drive: ScoredDrive) -> LanesDriven:
 
 
 def intersection_lanelets(network: LaneletNetwork) -> frozenset[int]:
-    """List the lanelets that lie in intersections, by their type or as an incoming's ways out."""
+    """Return the lanelets in intersections, by type or as successors of an incoming."""
     found = {lanelet.lanelet_id for lanelet in network.lanelets
              if LaneletType.INTERSECTION in lanelet.lanelet_type}
     for intersection in network.intersections:
@@ -71,7 +72,7 @@ def is_two_way(network: LaneletNetwork, lanelet_id: int) -> bool:
 
 def _inside(tree: shapely.STRtree, points: NDArray[np.float64],
             roads: RoadNetwork) -> list[frozenset[int]]:
-    """List the lanelets at each of the points (K, 2)."""
+    """Return the lanelets at each of the points (K, 2)."""
     rows, hits = tree.query(shapely.points(points), predicate='dwithin', distance=_SLIT)
     found: list[set[int]] = [set() for _ in points]
     for row, hit in zip(rows.tolist(), hits.tolist(), strict=True):
@@ -90,7 +91,7 @@ def _share_a_lane(network: LaneletNetwork, corners: Sequence[frozenset[int]],
 
 
 def _chains(network: LaneletNetwork, start: int, length: float) -> list[frozenset[int]]:
-    """List the lanes that begin with a lanelet and go on for at least a length [m]."""
+    """Return the lanes that begin with a lanelet and go on for at least a length [m]."""
     done: list[frozenset[int]] = []
     open_ones: list[tuple[tuple[int, ...], float]] = [((start,), 0.0)]
     while open_ones:

@@ -11,10 +11,10 @@ class ScoreMeasure(NamedTuple):
     """
     A score.
 
-    :param unit: as tables write it; 1 of a share.
-    :param definition: in a sentence.
+    :param unit: as tables write it; 1 for a share.
+    :param definition: one sentence.
     :param variant: which of several definitions this is.
-    :param undefined: where there is none; empty of what there always is.
+    :param undefined: when the score has no value; empty if it always has one.
     """
 
     unit: str

@@ -31,19 +31,22 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# How far ahead is looked, and how finely [s].
+# Horizon and sampling of the time to collision [s].
 HORIZON_S, STRIDE_S = 3.0, 0.1
-# Who is slower has no time to collision [m/s] (nuplan-devkit, time_to_collision_within_bound.py).
+# A slower vehicle has no time to collision [m/s] (nuplan-devkit,
+# time_to_collision_within_bound.py).
 STANDS = 0.005
-# nuPlan smooths over so many samples of 0.1 s: accelerations and yaw, and jerks.
+# nuPlan smooths over windows of samples of 0.1 s: a short one for accelerations and yaw, a long one
+# for jerks.
 _SAMPLE_S, _SHORT, _LONG = 0.1, 5, 15
-# Fewer steps have no jerk.
+# Jerk needs at least so many steps.
 LEAST_STEPS = 5
-# So much above the limit, all the time, gives nothing [m/s] (nuplan-devkit,
+# A mean excess over the limit of this gives a score of 0 [m/s] (nuplan-devkit,
 # speed_limit_compliance.py).
 TOO_FAST = 2.23
-# Over so long [s] less than the first distance is none, less than the second half a violation [m]
-# (nuplan-devkit, driving_direction_compliance.py).
+# Within the window [s], driving against the lane for less than the first distance is no violation,
+# for less than the second it halves the score [m] (nuplan-devkit,
+# driving_direction_compliance.py).
 WINDOW_S, TOLERATED, VIOLATED = 1.0, 2.0, 6.0
 
 
@@ -52,9 +55,9 @@ def times_to_contact(drive: ScoredDrive, lanes: LanesDriven,
     """
     Return the time to collision of each step (K), inf where none is within the horizon [s].
 
-    Who is ahead counts, and who is beside while the vehicle is between lanes or in an
-    intersection; nobody counts from the step on at which it was touched. 0 at the step of a
-    collision at fault.
+    Others ahead count; others beside count while the vehicle is between lanes or in an
+    intersection. One that was touched does not count from that step on. The time is 0 at the step
+    of a collision at fault.
     """
     times = np.full(len(drive.poses), np.inf)
     beside = lanes.in_intersection | ~lanes.in_one_lane
@@ -76,7 +79,7 @@ def times_to_contact(drive: ScoredDrive, lanes: LanesDriven,
 
 
 def _time(drive: ScoredDrive, track: Track, step: int) -> float:
-    """Find the first sample at which two footprints touch that keep speed and heading."""
+    """Return the time of the first sample at which two footprints touch, at constant velocity."""
     ahead_s = STRIDE_S * np.arange(1.0, round(HORIZON_S / STRIDE_S))
     own = _moved(drive.poses[step], float(drive.speeds[step]), ahead_s)
     theirs = _moved(track.poses[step], float(track.speeds[step]), ahead_s)
@@ -98,7 +101,7 @@ def _moved(pose: FloatArray, speed: float, ahead_s: FloatArray) -> FloatArray:
 
 
 class Bound(NamedTuple):
-    """Between what values a quantity is comfortable, and its unit."""
+    """The comfortable range of a quantity, and its unit."""
 
     lowest: float
     highest: float
@@ -129,12 +132,12 @@ class DriveComfort(NamedTuple):
 
     @property
     def exceeded(self) -> tuple[str, ...]:
-        """Name what is beyond its bounds."""
+        """Return the names of quantities beyond their bounds."""
         return tuple(name for name, bound in BOUNDS.items()
                      if self.lowest[name] < bound.lowest or self.highest[name] > bound.highest)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {name: {'lowest': self.lowest[name], 'highest': self.highest[name],
                        'unit': bound.unit, 'comfortable': name not in self.exceeded}
                 for name, bound in BOUNDS.items()}
@@ -142,12 +145,12 @@ class DriveComfort(NamedTuple):
 
 def measure_comfort(drive: ScoredDrive) -> DriveComfort | None:
     """
-    Find the extremes; None of fewer than `LEAST_STEPS` steps.
+    Return the extremes of a drive; None for fewer than `LEAST_STEPS` steps.
 
-    Speed v of the rear axle and yaw are smoothed and differentiated by Savitzky and Golay's filter
-    of order 2 over 0.5 s; the centre, r ahead, has the acceleration v' - r w^2 along and
-    v w + r w' across, w being the yaw rate. Jerk is the derivative of their length, longitudinal
-    jerk that of the first, over 1.5 s.
+    A Savitzky-Golay filter of order 2 over 0.5 s smooths and differentiates the speed v of the rear
+    axle and the yaw. With yaw rate w, the centre, r ahead of the rear axle, has the longitudinal
+    acceleration v' - r w^2 and the lateral one v w + r w'. Jerk is the derivative of the
+    acceleration's magnitude, longitudinal jerk that of the longitudinal one, over 1.5 s.
     """
     if len(drive.poses) < LEAST_STEPS:
         return None
@@ -167,7 +170,7 @@ def measure_comfort(drive: ScoredDrive) -> DriveComfort | None:
 
 
 def _filtered(values: FloatArray, dt_s: float, samples: int, order: int) -> FloatArray:
-    """Differentiate so many times over a window of so many samples of 0.1 s."""
+    """Return values smoothed over a window of samples of 0.1 s, differentiated `order` times."""
     window = max(LEAST_STEPS, round(samples * _SAMPLE_S / dt_s))
     window = min(window, len(values))
     window -= window % 2 == 0
@@ -176,11 +179,11 @@ def _filtered(values: FloatArray, dt_s: float, samples: int, order: int) -> Floa
 
 class SpeedCompliance(NamedTuple):
     """
-    A drive and the limits.
+    The compliance of a drive with speed limits.
 
     :param score: 1 - mean excess / `TOO_FAST`, 0 at least.
-    :param mean_excess: over the whole time, 0 below the limit [m/s]
-    :param worst_excess: [m/s]
+    :param mean_excess: mean over the whole time, 0 below the limit [m/s]
+    :param worst_excess: greatest excess [m/s]
     :param limited: share of the steps at which a limit is known.
     """
 
@@ -202,7 +205,7 @@ def measure_speed(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) ->
         if limit is not None:
             limits[lanes.lanelets == lanelet] = limit
     excess = np.maximum(np.abs(drive.speeds) - limits, 0.0)
-    # The sum of nuPlan: each step stands for one interval, one more than there are.
+    # nuPlan's sum: each step counts as one interval, which is one more than there are.
     mean = float(excess.sum() * drive.dt_s / drive.duration_s) if len(excess) > 1 else 0.0
     return SpeedCompliance(max(0.0, 1.0 - mean / TOO_FAST), mean, float(excess.max()),
                            float(np.isfinite(limits).mean()))
@@ -210,11 +213,11 @@ def measure_speed(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) ->
 
 def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -> float:
     """
-    Return the longest way of the centre against its lane within any window of 1 s, 0 or more [m].
+    Return the longest distance driven against the lane within any window of 1 s, 0 or more [m].
 
-    The way of a step is measured along the lanelet in which it ends; off the lanes, and where cars
-    may drive in both directions, there is no direction. nuPlan leaves out the steps at which
-    the lane changes, so that a drive over short lanelets would go unseen.
+    The distance of a step is that of the centre along the lanelet in which the step ends. Off the
+    lanes, and where cars may drive in both directions, there is no direction. nuPlan leaves out the
+    steps at which the lane changes, and would miss a drive over short lanelets.
     """
     network = roads.lanelet_network
     ways = np.zeros(len(drive.poses))
@@ -225,7 +228,7 @@ def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -
         ends = np.flatnonzero(lanes.lanelets[1:] == lanelet) + 1
         line = roads.line(lanelet)
         ways[ends] = line.project(points[ends])[0] - line.project(points[ends - 1])[0]
-    # As in nuPlan, the window is the steps of the last second and the present one.
+    # As in nuPlan, the window has the steps of the last second and the present one.
     window = int(WINDOW_S / drive.dt_s + 1e-9) + 1
     total: NDArray[np.float64] = np.concatenate(([0.0], np.cumsum(ways)))
     first = np.maximum(np.arange(1, len(total)) - window, 0)
@@ -233,29 +236,29 @@ def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -
 
 
 def direction_score(against: float) -> float:
-    """Return 1, 0.5 or 0 for a way against the lane [m]."""
+    """Return the score 1, 0.5 or 0 for a distance against the lane [m]."""
     return 1.0 if against < TOLERATED else 0.5 if against < VIOLATED else 0.0
 
 
 # nuplan-devkit, metric_aggregator/closed_loop_nonreactive_agents_weighted_average.yaml.
 WEIGHTS = {'progress': 5.0, 'time_to_collision': 5.0, 'speed_limit': 4.0, 'comfort': 2.0}
-# By less than the first the drivable area may be left [m]; up to the second share nothing is
-# progress, and up to the third [s] a time to collision is out of bounds.
+# The footprint may leave the drivable area by less than the first [m]. A progress up to the second
+# [share] counts as none. A time to collision up to the third [s] is out of bounds.
 OVERHANG, LEAST_PROGRESS, LEAST_TTC_S = 0.3, 0.2, 0.95
-# So many collisions at fault with each kind give nothing.
+# Numbers of collisions at fault, by kind, that give a multiplier of 0.
 FATAL: dict[TrackKind, int] = {'vulnerable': 1, 'vehicle': 1, 'object': 2}
-# No free drive comes farther than with this speed [m/s].
+# Greatest speed of the free drive [m/s].
 FASTEST = 100.0
-# An expert who starts farther away drove another scenario, perhaps [m].
+# An expert that starts farther away may have driven another scenario [m].
 ELSEWHERE = 5.0
 
 
 class Expert(NamedTuple):
     """
-    With whose progress that of a drive is compared.
+    The expert with whose progress that of a drive is compared.
 
-    :param name: who it was, for people.
-    :param poses: (K, 3) of its centre, from the same time on and at the same steps; NaN: absent.
+    :param name: name, for people.
+    :param poses: (K, 3) poses of its centre, at the same steps as the drive; NaN: absent.
     """
 
     name: str
@@ -265,20 +268,20 @@ class Expert(NamedTuple):
 @dataclass(frozen=True)
 class NuplanScore:
     """
-    The score of a drive and what it is made of.
+    The score of a drive and its parts.
 
     :param multipliers: each 0 to 1, by name.
     :param weighted: likewise, to be weighted with `WEIGHTS`.
-    :param collisions: first touches.
-    :param overhang: by which the footprint left the road at worst [m]
-    :param against: longest way against the lane within a second [m]
-    :param own_progress: along the expert's route [m]
-    :param expert_progress: the expert's [m]
-    :param expert: who that was.
+    :param collisions: first contact with each of the others.
+    :param overhang: greatest distance by which the footprint left the road [m]
+    :param against: longest distance driven against the lane within a second [m]
+    :param own_progress: progress along the expert's route [m]
+    :param expert_progress: progress of the expert [m]
+    :param expert: name of the expert.
     :param least_ttc_s: smallest time to collision within the horizon; inf without one [s]
-    :param speed: the limits kept.
-    :param comfort: extremes.
-    :param remarks: what is to be known when it is compared, one line each.
+    :param speed: compliance with speed limits.
+    :param comfort: extremes of comfort.
+    :param remarks: notes that matter for comparisons, one line each.
     """
 
     multipliers: dict[str, float]
@@ -301,7 +304,7 @@ class NuplanScore:
         return math.prod(self.multipliers.values()) * mean / sum(WEIGHTS.values())
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {
             'score': self.score, 'multipliers': self.multipliers,
             'weighted': {name: {'value': value, 'weight': WEIGHTS[name]}
@@ -331,8 +334,8 @@ class NuplanScorer:
         """
         Score a drive.
 
-        :param expert: None: the progress is that of a free drive at the speed limit.
-        :param problem: whose goal the free drive leads to; None: it follows the lane.
+        :param expert: None to compare the progress with a free drive at the speed limit.
+        :param problem: planning problem with the goal of the free drive; None: it follows the lane.
         :raises InputError: if the drive is too short.
         """
         comfort = measure_comfort(drive)
@@ -362,14 +365,14 @@ class NuplanScorer:
             float(times.min()), speed, comfort, tuple(remarks))
 
     def _overhang(self, drive: ScoredDrive) -> float:
-        """Return how far the farthest corner was off the road [m]."""
+        """Return the greatest distance of a corner off the road [m]."""
         off = drive.poses[self._boundary.are_off_road(drive.poses, drive.shape)]
         return max((self._boundary.overhang(x, y, yaw, drive.shape)
                     for x, y, yaw in off.tolist()), default=0.0)
 
     def _progress(self, drive: ScoredDrive, expert: Expert | None, problem: PlanningProblem | None,
                   remarks: list[str]) -> tuple[float, float | None]:
-        """Return the progress of a drive and of its expert [m]; None of one without a route."""
+        """Return the progress of a drive and of its expert [m]; None for one without a route."""
         if expert is None:
             return self._free_progress(drive, problem)
         steps = min(len(drive.poses), len(expert.poses))
@@ -393,7 +396,7 @@ class NuplanScorer:
             return 0.0, None
         start, start_s = start_lanelet(self._roads, *drive.poses[0].tolist())
         goals = frozenset[int]() if problem is None else goal_lanelets(self._roads, problem)
-        # Who has no goal goes on from where it came to.
+        # Without a goal the free drive continues along the route driven.
         driven = [] if goals else route_of(self._roads, drive.poses).lanelets
         start = driven[-1] if driven else start
         found = find_route(self._roads, start, start_s, goals, FASTEST * drive.duration_s)
@@ -407,7 +410,7 @@ class NuplanScorer:
 
 
 def collision_score(collisions: Sequence[JudgedCollision]) -> float:
-    """Return the multiplier of collisions at fault: 0.5 with an object, 0 for any other."""
+    """Return the multiplier for collisions at fault: 0.5 with an object, 0 for any other."""
     counts = {kind: sum(each.at_fault and each.other_kind == kind for each in collisions)
               for kind in FATAL}
     return math.prod(max(0.0, 1.0 - counts[kind] / fatal) for kind, fatal in FATAL.items())

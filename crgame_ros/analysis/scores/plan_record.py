@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an AV's planner answered in a run, and how an AV came to its goal."""
+"""The record of an AV's plans in a run, and of how it reached its goal."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ class PlanRecord:
     """
     The plans of one AV.
 
-    :param counts: by name; None where it was not recorded.
-    :param fallbacks: braking plans given, because the planner failed.
-    :param reasons: how often each reason for one came, as far as it was told.
-    :param last_refusal: why a plan was refused last.
+    :param counts: by name; None where a count was not recorded.
+    :param fallbacks: number of braking plans sent because the planner failed.
+    :param reasons: number of fallbacks by reason, as far as reasons were recorded.
+    :param last_refusal: reason of the last refusal of a plan.
     :param spreads: p50, p99 and max by name: latency_ms from request to plan, plan_time_ms of the
-        planner itself, age_ms of the plan in use; None where nobody measured it.
-    :param tracking: worst errors of a tracked AV by name [m], [rad], [m/s]; None of one that
+        planner itself, age_ms of the plan in use; None where it was not measured.
+    :param tracking: worst errors of a tracked AV by name [m], [rad], [m/s]; None for an AV that
         follows its plans exactly.
     """
 
@@ -44,14 +44,14 @@ class PlanRecord:
 
     @property
     def accepted_share(self) -> float | None:
-        """Share of the planner's answers that were accepted and no fallback; None: none."""
+        """The share of answers that were accepted and are no fallback; None without answers."""
         accepted, plans = self.counts['accepted'], self.counts['plans']
         if accepted is None or not plans:
             return None
         return max(0, accepted - (self.fallbacks or 0)) / plans
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {'accepted_share': self.accepted_share, **self.counts,
                 'fallbacks': self.fallbacks, 'fallback_reasons': self.reasons,
                 'last_refusal': self.last_refusal, **self.spreads,
@@ -61,11 +61,12 @@ class PlanRecord:
 @dataclass(frozen=True)
 class GoalRecord:
     """
-    How a vehicle came to its goal.
+    A vehicle's way to its goal.
 
-    :param reached_s: when a state first met the goal, since the run's start; None: never [s]
-    :param last_distance: from the centre to the goal's area at the end; None: it has none [m]
-    :param least_distance: smallest of the run [m]
+    :param reached_s: time at which a state first met the goal, since the run's start; None: never
+        [s]
+    :param last_distance: from the centre to the goal's area at the end; None: it has no area [m]
+    :param least_distance: smallest such distance of the run [m]
     """
 
     reached_s: float | None
@@ -73,16 +74,16 @@ class GoalRecord:
     least_distance: float | None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {'reached_s': self.reached_s, 'last_distance_m': self.last_distance,
                 'least_distance_m': self.least_distance}
 
 
 def plans_of_report(report: Mapping[str, Any] | None) -> dict[str, PlanRecord]:
     """
-    Take the plans of each AV out of a timing report.
+    Return the plan record of each AV from a timing report.
 
-    :param report: of `recording.timing_report` or `offline_outcome`; None where nobody knows.
+    :param report: from `recording.timing_report` or `offline_outcome`; None if there is none.
     """
     return {} if report is None else {
         av: PlanRecord({name: entry[name] for name in _COUNTS}, entry['fallback'],
@@ -93,15 +94,15 @@ def plans_of_report(report: Mapping[str, Any] | None) -> dict[str, PlanRecord]:
 
 
 def plans_of_result(result: OfflineResult) -> dict[str, PlanRecord]:
-    """Take the plans of each AV out of an offline run."""
+    """Return the plan record of each AV from an offline run."""
     return plans_of_report({'planners': planner_entries(result)})
 
 
 def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) -> GoalRecord:
     """
-    Find when and how near a drive came to its goal.
+    Find when a drive reached its goal, and how near it came.
 
-    :param states: from time step 0 on.
+    :param states: states from time step 0 on.
     """
     step = goal_step(problem, list(states))
     points = shapely.points([state.position for state in states])

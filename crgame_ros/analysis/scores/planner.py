@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scores of everybody who drove in a run, or of the solutions of a scenario."""
+"""The scores of all driven vehicles of a run, or of the solutions of a scenario."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,13 +20,13 @@ REMARKS = (
 @dataclass(frozen=True)
 class SolutionScores:
     """
-    What CommonRoad's tools say of the solution of one planning problem.
+    The results of CommonRoad's tools for the solution of one planning problem.
 
     :param solved: the solution; its cost function is one of several.
     :param exact_type: whether its vehicle type has the vehicle's dimensions.
-    :param costs: by function; empty where the trajectory cannot be had.
-    :param checks: those of `valid_solution`.
-    :param feasibility: against the vehicle model.
+    :param costs: costs by function; empty without a trajectory.
+    :param checks: checks of `valid_solution`.
+    :param feasibility: feasibility with the vehicle model.
     """
 
     solved: PlanningProblemSolution
@@ -36,7 +36,7 @@ class SolutionScores:
     feasibility: TrajectoryFeasibility
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {
             'planning_problem': self.solved.planning_problem_id,
             'vehicle': self.solved.vehicle_id, 'exact_vehicle_type': self.exact_type,
@@ -45,7 +45,7 @@ class SolutionScores:
             **self.checks.as_dict(), 'feasibility': self.feasibility.as_dict()}
 
     def solutions(self, scenario_id: ScenarioID) -> dict[str, Solution]:
-        """Return a solution for each cost function that the vehicle model may be judged by."""
+        """Return a solution for each cost function that the vehicle model supports."""
         found = self.solved
         return {name: Solution(scenario_id, [PlanningProblemSolution(
             found.planning_problem_id, found.vehicle_model, found.vehicle_type,
@@ -57,10 +57,10 @@ class PlannerScores:
     """
     The scores of a run, or of solutions.
 
-    :param scenario_id: of the scenario against which was judged.
+    :param scenario_id: id of the scenario that the vehicles or solutions drove in.
     :param xml_text: that scenario.
-    :param vehicles: one after the other.
-    :param remarks: one line each.
+    :param vehicles: scores of each vehicle.
+    :param remarks: notes, one line each.
     """
 
     scenario_id: ScenarioID
@@ -69,7 +69,7 @@ class PlannerScores:
     remarks: tuple[str, ...] = REMARKS
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what was found, as JSON has it: SI units, times since the start."""
+        """Return the scores as a JSON-compatible dictionary: SI units, times since the start."""
         return {'scenario': str(self.scenario_id), 'checker': checker_version(),
                 'vehicles': [each.as_dict() for each in self.vehicles],
                 'remarks': list(self.remarks)}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far a vehicle came along a route, compared with somebody else's drive over it."""
+"""Progress of a vehicle along a route, compared with that of another drive along it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Shorter ways are noise, and one that is as long backwards is none (nuplan-devkit,
+# Shorter progress is noise, and backwards progress counts as none beyond this (nuplan-devkit,
 # docs/metrics_description.md) [m].
 NOISE = 0.1
-# In the free drive a vehicle gains speed by what nuPlan still calls comfortable [m/s^2], and where
-# no limit is known drives as fast as this [m/s], 50 km/h.
+# In the free drive a vehicle accelerates at nuPlan's limit of comfort [m/s^2]. Where no limit is
+# known, it drives at this speed [m/s], 50 km/h.
 FREE_ACCELERATION, UNLIMITED = 2.40, 50.0 / 3.6
 _FREE_STEP_S = 0.01
 
 
 @dataclass(frozen=True)
 class _Block:
-    """A lanelet of the route and the lanes beside it: where it is, and from which way on."""
+    """A lanelet of the route with the lanes beside it: their area, and its start on the route."""
 
     lanelet: int
     area: shapely.Geometry
@@ -32,10 +32,10 @@ class _Block:
 
 class ComparedRoute:
     """
-    Lanelets one after the other; those of the same direction beside one count as that one.
+    A route of successive lanelets; neighbours in the same direction count as the lanelet itself.
 
     :param roads: the road network.
-    :param lanelets: in driving order; neighbours and repetitions are taken together.
+    :param lanelets: in driving order; neighbours and repetitions are merged.
     """
 
     def __init__(self, roads: RoadNetwork, lanelets: Sequence[int]) -> None:
@@ -63,10 +63,10 @@ class ComparedRoute:
 
     def progress(self, points: FloatArray) -> float:
         """
-        Return how far points (K, 2) in turn come along the route [m].
+        Return the progress along the route of points (K, 2) in order [m].
 
-        A point counts where it is in the part of the one before, or in a later one; off the route
-        nothing is gained.
+        A point counts if it is in the part of the previous point, or in a later one. Points off
+        the route add no progress.
         """
         index = 0
         first: float | None = None
@@ -84,7 +84,7 @@ class ComparedRoute:
         return 0.0 if last is None or first is None else last - first
 
     def way_to(self, point: FloatArray) -> float | None:
-        """Return where a point (2) is along the route; None beside it [m]."""
+        """Return the arc length of a point (2) along the route; None beside it [m]."""
         for block in self._blocks:
             if shapely.intersects_xy(block.area, *point.tolist()):
                 return block.start + self._roads.locate(block.lanelet, *point.tolist())[0]
@@ -92,13 +92,13 @@ class ComparedRoute:
 
     def free_way(self, start: float, speed: float, duration_s: float, end: float) -> float:
         """
-        Return how far an unhindered vehicle comes at the speed limit [m].
+        Return the distance that an unhindered vehicle drives at the speed limit [m].
 
-        It gains speed with `FREE_ACCELERATION` and loses it at once where a lower limit begins.
+        It accelerates with `FREE_ACCELERATION`, and slows down at once where a lower limit begins.
 
-        :param start: where on the route it starts [m]
-        :param speed: at which it starts [m/s]
-        :param end: where its way ends; the route does at the latest [m]
+        :param start: arc length at which it starts [m]
+        :param speed: initial speed [m/s]
+        :param end: arc length at which it ends; at most the route's end [m]
         """
         if not self._blocks:
             return 0.0
@@ -118,7 +118,7 @@ class ComparedRoute:
 
 
 def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
-    """Return the route that somebody took, by the poses (K, 3) of the centre."""
+    """Return the route of a drive, from the poses (K, 3) of its centre."""
     if not roads.lanelet_ids:
         return ComparedRoute(roads, ())
     numbers = roads.lanelets_at(poses[np.isfinite(poses).all(axis=1)])
@@ -127,5 +127,5 @@ def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
 
 
 def progress_ratio(own: float, expert: float) -> float:
-    """Return the share of the expert's way that was driven, 0 to 1 (nuplan-devkit)."""
+    """Return progress as a share of the expert's, 0 to 1 (nuplan-devkit)."""
     return 0.0 if own < -NOISE else min(1.0, max(own, NOISE) / max(expert, NOISE))

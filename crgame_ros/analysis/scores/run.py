@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scores of a run for tables and reports: what cannot be scored is told, and costs no more."""
+"""The scores of a run for tables and reports; a run that cannot be scored gives the reason."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -17,8 +17,8 @@ class RunScores(NamedTuple):
     """
     The scores of a run.
 
-    :param vehicles: of each driven vehicle, in the log's order; empty where there are none.
-    :param refusal: why there are none; empty otherwise.
+    :param vehicles: scores of each driven vehicle, in the log's order; empty without scores.
+    :param refusal: why there are no scores; empty otherwise.
     """
 
     vehicles: tuple[VehicleScores, ...] = ()
@@ -30,9 +30,9 @@ def scores_of(record: RunRecord, plans: Mapping[str, PlanRecord], *, drives_only
     """
     Score a run as `crgame score` does.
 
-    :param plans: what planners answered, by AV, as far as it is known.
-    :param drives_only: without CommonRoad's tools, which take most of the time.
-    :param progress: is told how much has been done, 0 to 1.
+    :param plans: plan records by AV, as far as known.
+    :param drives_only: whether to leave out CommonRoad's tools, which take most of the time.
+    :param progress: called with the share done so far, 0 to 1.
     """
     try:
         if drives_only:
@@ -41,5 +41,5 @@ def scores_of(record: RunRecord, plans: Mapping[str, PlanRecord], *, drives_only
         from crgame_ros.analysis.scores.scored_run import score_run
         return RunScores(score_run(record, plans=plans, progress=progress).vehicles)
     except (CrgameError, ValueError, GEOSException) as error:
-        # Of states that somebody else sent there may be no outlines, and no file.
+        # States from another publisher may have no outlines, and cannot be exported.
         return RunScores((), one_line(str(error)))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who shows how far a vehicle might have come: a recorded human, or whose drive it repeats."""
+"""The expert for a run's progress: a vehicle of another run, or the recorded obstacle."""
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.nuplan import Expert
@@ -13,12 +13,12 @@ import numpy as np
 
 def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> Expert:
     """
-    Take the expert out of a run: its first human, or else its first vehicle.
+    Return the expert from a run: its first human, or else its first vehicle.
 
-    :param expert: the run.
-    :param log: the run that is scored: whose steps the expert's are cut and filled to.
-    :param name: of the run, for people.
-    :raises InputError: if nobody drives in it, or in another scenario or at other times.
+    :param expert: the expert's run.
+    :param log: the run that is scored; the expert's poses are cut and padded to its steps.
+    :param name: name of the expert's run, for people.
+    :raises InputError: if the expert's run has no driven vehicle, or another scenario or times.
     """
     if not expert.vehicles:
         raise InputError('it has no driven vehicle', name, 'give a run with a human')
@@ -39,10 +39,10 @@ def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> E
 def recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
                     first_k: int, steps: int) -> Expert | None:
     """
-    Take the recorded obstacle that a planning problem replaced; None where there is none.
+    Return the recorded obstacle that a planning problem replaced; None where there is none.
 
     :param first_k: time step at which the drive begins.
-    :param steps: how many it has.
+    :param steps: number of its steps.
     """
     obstacle = None if problem is None else scored.own.get(problem.planning_problem_id)
     if obstacle is None:

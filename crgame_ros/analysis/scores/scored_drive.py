@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How one vehicle drove among others: what closed-loop scores are computed from."""
+"""The motion of one vehicle among others, from which closed-loop scores are computed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,13 +29,13 @@ OBJECTS = frozenset({'constructionZone', 'roadBoundary', 'building', 'pillar', '
 @dataclass(frozen=True)
 class Track:
     """
-    Somebody or something beside the vehicle that is scored.
+    The motion of another vehicle, person or object.
 
     :param id: its name in the run, `o<id>` of a scenario's obstacle.
     :param kind: as nuPlan groups them.
     :param shape: footprint around the centre.
-    :param poses: (K, 3) of its centre x [m], y [m], yaw [rad]; NaN where absent.
-    :param speeds: (K) of its centre, never negative [m/s]; NaN where absent.
+    :param poses: (K, 3) its centre's x [m], y [m], yaw [rad]; NaN where absent.
+    :param speeds: (K) speeds of its centre, never negative [m/s]; NaN where absent.
     """
 
     id: str  # noqa: A003
@@ -50,12 +50,12 @@ class ScoredDrive:
     """
     A vehicle's motion at K equal time steps, in the coordinates of the road.
 
-    :param vehicle_id: who drove.
+    :param vehicle_id: id of the vehicle.
     :param dt_s: time between the steps [s]
     :param shape: footprint around the centre.
     :param rear_to_center: from the rear axle forward to the centre [m]
-    :param poses: (K, 3) of the centre x [m], y [m], yaw [rad]
-    :param speeds: (K) of the rear axle, negative backwards [m/s]
+    :param poses: (K, 3) the centre's x [m], y [m], yaw [rad]
+    :param speeds: (K) speeds of the rear axle, negative backwards [m/s]
     :param tracks: all others.
     """
 
@@ -84,14 +84,14 @@ class ScoredDrive:
 
 
 def kind_of_type(type_name: str) -> TrackKind:
-    """Group an obstacle type of CommonRoad (XML spelling) as nuPlan does; unknown: a vehicle."""
+    """Return nuPlan's group of an obstacle type of CommonRoad (XML spelling); unknown: vehicle."""
     return 'vulnerable' if type_name in VULNERABLE else 'object' if type_name in OBJECTS \
         else 'vehicle'
 
 
 def drive_of(log: RunTrajectories, vehicle: int) -> ScoredDrive:
     """
-    Take one vehicle's drive out of a run.
+    Return one vehicle's drive from a run.
 
     :param vehicle: its number among the driven ones.
     """
@@ -101,7 +101,7 @@ def drive_of(log: RunTrajectories, vehicle: int) -> ScoredDrive:
     centers = shifted(log.vehicle_states[:, :, :3], offsets)
     poses = np.concatenate((centers, log.object_poses), axis=1)
     if vehicle >= humans and not (transform := game.avs[vehicle - humans].transform).is_identity:
-        # Where its road is.
+        # In the coordinates of its road.
         poses = transform.to_scenario(poses)
     speeds = log.vehicle_states[:, :, StateColumn.SPEED]
     others = np.hypot(log.object_velocities[..., 0], log.object_velocities[..., 1])
@@ -116,10 +116,10 @@ def drive_among(vehicle_id: str, shape: Shape, rear_to_center: float, poses: Flo
                 speeds: FloatArray, first_k: int, loaded: LoadedScenario,
                 without: Sequence[int] = ()) -> ScoredDrive:
     """
-    Put a motion among the obstacles of a scenario.
+    Build a drive from a motion and the obstacles of a scenario.
 
-    :param poses: (K, 3) of the centre at consecutive time steps.
-    :param speeds: (K) of the rear axle [m/s]
+    :param poses: (K, 3) poses of the centre at consecutive time steps.
+    :param speeds: (K) speeds of the rear axle [m/s]
     :param first_k: time step of the first pose.
     :param without: ids of obstacles to leave out.
     :raises InputError: if the obstacles cannot be used.

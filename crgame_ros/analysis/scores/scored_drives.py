@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scores the drives of a run alone: nuPlan's score and plans, without CommonRoad's checker."""
+"""Scores only the drives of a run: nuPlan's score and plans, without CommonRoad's checker."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -21,13 +21,13 @@ def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
                  put_back: Mapping[str, Sequence[int]] | None = None
                  ) -> tuple[VehicleScores, ...]:
     """
-    Score how every driven vehicle of a run drove; CommonRoad's tools are not asked.
+    Score the drive of every driven vehicle of a run, without CommonRoad's tools.
 
-    :param put_back: last scenario steps before vehicles were put back on their lane: they are
-        scored up to the first of them, for nobody drives such a jump.
+    :param put_back: last scenario steps before vehicles were put back on their lane: each is
+        scored up to the first of these, because the jump is not driven.
     :param expert: as for `score_run`.
     :param plans: as for `score_run`.
-    :raises InputError: if nobody drives in the run.
+    :raises InputError: if the run has no driven vehicle.
     """
     if not log.vehicles:
         raise InputError('it has no driven vehicle', 'the run',
@@ -46,12 +46,12 @@ def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
 
 def first_ends(log: RunTrajectories,
                put_back: Mapping[str, Sequence[int]]) -> dict[str, RunTrajectories]:
-    """Return the run of each vehicle that was put back on its lane, up to just before that."""
+    """Return the run, up to the step before, for each vehicle that was put back on its lane."""
     return {vehicle: log.until(min(ks)) for vehicle, ks in put_back.items()}
 
 
 def _ended(vehicle_id: str, log: RunTrajectories | None) -> Iterator[str]:
-    """Say up to when a vehicle was scored that was put back on its lane."""
+    """Yield a remark on the time up to which a vehicle that was put back is scored."""
     if log is not None:
         scheduler = log.game.scheduler
         end_s = (int(log.ks[-1]) - scheduler.k0) * scheduler.time_step_s
@@ -72,7 +72,7 @@ class _Drives:
 
     def score(self, number: int, log: RunTrajectories
               ) -> tuple[NuplanScore | None, tuple[str, ...]]:
-        """Score a vehicle by its number over a log; without a score the remark says why."""
+        """Score the vehicle of a number over a log; without a score, the remarks say why."""
         av = log.game.av(log.vehicles[number].id)
         problem = None if av is None else self._problems.get(av.planning_problem)
         expert = self._expert or recorded_expert(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scores a run, recorded or offline: each of its driven vehicles."""
+"""Scores each driven vehicle of a run, recorded or offline."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -31,11 +31,11 @@ def score_run(record: RunRecord, *, expert: Expert | None = None,
     Score every driven vehicle of a run.
 
     :param record: the run.
-    :param expert: with whose progress the vehicles' is compared; None: the recorded obstacle that
-        a planning problem replaced, else a free drive at the speed limit.
-    :param plans: what planners answered, by AV (`plan_record`).
-    :param progress: is told how much has been done, 0 to 1.
-    :raises InputError: if nobody drives in the run, or it cannot be exported.
+    :param expert: expert with which the vehicles' progress is compared; None: the recorded
+        obstacle that a planning problem replaced, else a free drive at the speed limit.
+    :param plans: plan records by AV (`plan_record`).
+    :param progress: called with the share done so far, 0 to 1.
+    :raises InputError: if the run has no driven vehicle, or cannot be exported.
     """
     log = record.log
     drives = score_drives(log, expert=expert, plans=plans, put_back=record.put_back)
@@ -58,7 +58,7 @@ def _share(progress: Callable[[float], object], number: int, count: int, done: f
 def _judged(log: RunTrajectories, number: int, drive: VehicleScores, problem_id: int,
             scored: ScoredScenario, judge: SolutionJudge,
             progress: Callable[[float], object]) -> VehicleScores:
-    """Add what CommonRoad's tools say, and how the vehicle came to its goal."""
+    """Return a vehicle's scores with the results of CommonRoad's tools and its way to the goal."""
     chosen = choose_type(log.game.vehicles[number].vehicle)
     states = driven_states(log, number, chosen.kind)
     problem = scored.problem(problem_id)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scenario that solutions are checked against: without the vehicle that is judged itself."""
+"""The scenario against which solutions are checked, without the judged vehicle itself."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -32,18 +32,18 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# An obstacle that begins so near to a planning problem and in its direction is the vehicle from
-# whose drive the problem was made [m], [rad]: two cars cannot be there.
+# An obstacle that starts this near to a planning problem [m], with this heading [rad], is the
+# vehicle from which the problem was made: two cars cannot be there.
 _SAME_PLACE, _SAME_HEADING = 0.5, 0.1
 
 
 @dataclass(frozen=True)
 class ScoredScenario:
     """
-    A scenario, and which of its obstacles are the vehicles that solve its problems.
+    A scenario, with the obstacles that represent the vehicles of its planning problems.
 
     :param loaded: the scenario.
-    :param own: those obstacles' ids, by planning problem.
+    :param own: ids of these obstacles, by planning problem.
     """
 
     loaded: LoadedScenario
@@ -52,9 +52,9 @@ class ScoredScenario:
     @classmethod
     def from_file(cls, loaded: LoadedScenario) -> 'ScoredScenario':
         """
-        Take a scenario as it is published.
+        Build it from a published scenario.
 
-        The obstacle that a planning problem replaced is the recorded human of a run, or begins
+        The obstacle that a planning problem replaced is the recorded human of a run, or starts
         where the problem does.
         """
         obstacles = loaded.scenario.dynamic_obstacles
@@ -74,7 +74,7 @@ class ScoredScenario:
     @classmethod
     def from_run(cls, log: RunTrajectories) -> tuple['ScoredScenario', ExportedScenario]:
         """
-        Export a run and take its scenario.
+        Export a run, and return it with the exported scenario.
 
         :raises InputError: if it cannot be exported.
         """
@@ -100,11 +100,11 @@ class ScoredScenario:
 
     @functools.cached_property
     def obstacles(self) -> ScenarioObstacles:
-        """Everything in it, over time."""
+        """All obstacles, over time."""
         return ScenarioObstacles(self.loaded)
 
     def course(self, obstacle_id: int) -> FloatArray:
-        """Return the poses (n, 3) of an obstacle's centre from time step 0; NaN where absent."""
+        """Return the poses (n, 3) of an obstacle's centre from time step 0 on; NaN where absent."""
         column = self.obstacles.ids.index(f'o{obstacle_id}')
         poses = self.obstacles.poses[:, column]
         before = np.full((max(self.obstacles.first_k, 0), 3), np.nan)
@@ -114,8 +114,8 @@ class ScoredScenario:
         """
         Return the scenario without the vehicles that solve some problems.
 
-        What comes later than time step 0 is a phantom obstacle in files, which the checker passes
-        over; here it is an obstacle that begins later.
+        In files, obstacles that appear after time step 0 are phantom obstacles, which the checker
+        ignores; here they are obstacles that start later.
         """
         original = self.loaded.scenario
         scenario = Scenario(original.dt, original.scenario_id)
@@ -128,7 +128,7 @@ class ScoredScenario:
         return scenario
 
     def own_obstacles(self, numbers: Collection[int]) -> frozenset[int]:
-        """List the obstacles that are the vehicles which solve some problems."""
+        """Return the obstacles that represent the vehicles of some planning problems."""
         return frozenset(self.own[number] for number in numbers if number in self.own)
 
     def _later(self, obstacle_id: int) -> DynamicObstacle:

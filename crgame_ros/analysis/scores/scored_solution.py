@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scores solutions, whoever made them, against their scenario."""
+"""Scores solutions from any source against their scenario."""
 
 from collections.abc import Callable, Mapping
 import copy
@@ -32,7 +32,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class _Part:
-    """One planning problem's solution: the states it holds, or that its inputs lead to."""
+    """One planning problem's solution: its states, or those that result from its inputs."""
 
     found: PlanningProblemSolution
     driven: Trajectory
@@ -44,9 +44,9 @@ def score_solutions(scored: ScoredScenario, solutions: Mapping[str, Solution],
     Score solutions of a scenario.
 
     :param scored: the scenario.
-    :param solutions: by the name under which each is reported.
-    :param progress: is told how much has been done, 0 to 1.
-    :raises InputError: if one solves another scenario, or cannot be driven at all.
+    :param solutions: solutions by the name used in the scores.
+    :param progress: called with the share done so far, 0 to 1.
+    :raises InputError: if one is for another scenario, or cannot be driven at all.
     """
     judge, nuplan = SolutionJudge(scored), NuplanScorer(scored.loaded)
     vehicles: list[VehicleScores] = []
@@ -93,7 +93,7 @@ def _part(scored: ScoredScenario, found: PlanningProblemSolution, name: str) -> 
 
 
 def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
-    """Ask the checks of the checker that are about a solution as a whole."""
+    """Run the checks that concern a solution as a whole; return failures by name."""
     problems = PlanningProblemSet(list(scored.loaded.planning_problems))
     failed = {}
     for name, check in (
@@ -103,7 +103,7 @@ def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
                 scored.loaded.scenario, problems, solution))):
         try:
             check()
-        except Exception as error:  # the checker raises whatever its code stumbles over
+        except Exception as error:  # the checker can raise any exception
             failed[name] = one_line(str(error) or type(error).__name__)
     return failed
 
@@ -132,7 +132,7 @@ def _drive(scored: ScoredScenario, part: _Part, solved: frozenset[int]) -> Score
 
 
 def _track(other: ScoredDrive, mate: _Part, mine: ScoredDrive, part: _Part) -> Track:
-    """Make a track of who is solved together with one, at the steps of this."""
+    """Build the track of a vehicle solved together with one, at the steps of the latter."""
     rows = np.arange(len(mine.poses)) + int(
         part.driven.state_list[0].time_step - mate.driven.state_list[0].time_step)
     known = (rows >= 0) & (rows < len(other.poses))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a solution is valid: the checks of the drivability checker, each with what it found."""
+"""Checks whether a solution is valid with the drivability checker, each check with its result."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 @dataclass(frozen=True)
 class SolutionChecks:
     """
-    What the checks say.
+    The results of the checks.
 
-    :param failed: what each failed check found, by its name in the checker.
+    :param failed: reason of each failed check, by its name in the checker.
     :param passed: names of the others.
     """
 
@@ -34,11 +34,11 @@ class SolutionChecks:
 
     @property
     def is_valid(self) -> bool:
-        """Return whether all were passed."""
+        """Return whether all checks passed."""
         return not self.failed
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {'valid': self.is_valid, 'failed': self.failed, 'passed': list(self.passed)}
 
 
@@ -49,15 +49,15 @@ def check_solution(scenario: Scenario, problem: PlanningProblem,
     """
     Check the solution of one problem, as `valid_solution` does.
 
-    That function stops at the first failure, and its road boundary needs the package triangle,
-    which is not free, and has crashed on a roundabout. So its checks are asked one by one, and
-    the road is ours: no part of the footprint may be off the union of the lanelets.
+    `valid_solution` stops at the first failure. Its road boundary needs the package triangle,
+    which is not free, and has crashed on a roundabout. Therefore each check runs by itself, with
+    the project's own road check: no part of the footprint may be off the union of the lanelets.
 
-    :param scenario: without the vehicle itself.
-    :param poses: (K, 3) of the centre.
-    :param feasibility: what the feasibility check said.
-    :param boundary: of the road.
-    :param earlier: what checks of the whole solution have found, by name.
+    :param scenario: the scenario without the vehicle itself.
+    :param poses: (K, 3) poses of the centre.
+    :param feasibility: result of the feasibility check.
+    :param boundary: boundary of the road.
+    :param earlier: failures of checks of the whole solution, by name.
     """
     problems = PlanningProblemSet([problem])
     solution = Solution(scenario.scenario_id, [found])
@@ -71,7 +71,7 @@ def check_solution(scenario: Scenario, problem: PlanningProblem,
     for name, check in checks.items():
         try:
             check()
-        except Exception as error:  # the checker raises whatever its code stumbles over
+        except Exception as error:  # the checker can raise any exception
             failed[name] = one_line(str(error) or type(error).__name__)
     shape = _shape(found)
     off = np.flatnonzero(boundary.are_off_road(poses, shape))

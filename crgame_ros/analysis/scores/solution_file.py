@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Solution files of CommonRoad: read with care, and written."""
+"""Reads and writes solution files of CommonRoad, and validates them."""
 
 from datetime import datetime
 import math
@@ -22,10 +22,10 @@ _REMEDY = 'compare it with what CommonRoadSolutionWriter writes'
 
 def read_solution(path: Path) -> Solution:
     """
-    Read a solution file; nothing in it is trusted.
+    Read a solution file, and validate its content.
 
-    :raises InputError: if it is none, or holds what no vehicle drives: numbers that are not
-        finite, time steps that are not consecutive, no state.
+    :raises InputError: if it is no solution file, or contains numbers that are not finite, time
+        steps that are not consecutive, or no state.
     """
     source = str(path)
     root = guard.parse_hardened(guard.read_text(path), source, ROOT)
@@ -35,7 +35,7 @@ def read_solution(path: Path) -> Solution:
     _check_numbers(root, source)
     try:
         solution = CommonRoadSolutionReader.fromstring(etree.tostring(root).decode())
-    except Exception as error:  # commonroad-io raises whatever its code stumbles over
+    except Exception as error:  # commonroad-io can raise any exception
         text = str(error) or 'no further explanation'
         raise InputError(f'commonroad-io cannot read it ({type(error).__name__}: {text[:200]})',
                          source, _REMEDY) from error
@@ -47,18 +47,18 @@ def read_solution(path: Path) -> Solution:
 
 
 def solution_text(solution: Solution) -> str:
-    """Write a solution as commonroad-io does."""
+    """Return a solution as XML text, as commonroad-io writes it."""
     return str(CommonRoadSolutionWriter(solution).dump())
 
 
 def solution_name(solution: Solution, vehicle_id: str = '') -> str:
-    """Name a solution's file, without the colons that some file systems don't take."""
+    """Return a solution's file name, without colons, which some file systems refuse."""
     name = solution.benchmark_id.replace(':', '_')
     return f'solution_{name}{f".{vehicle_id}" if vehicle_id else ""}.xml'
 
 
 def dated(solution: Solution, when: datetime | None) -> Solution:
-    """Return a solution the day and time at which it was made; None: without."""
+    """Return a solution with the date at which it was made; None: without a date."""
     solution.date = None if when is None else when.replace(tzinfo=None, microsecond=0)
     return solution
 

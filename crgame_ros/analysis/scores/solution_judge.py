@@ -40,11 +40,11 @@ class SolutionJudge:
         Judge one solution.
 
         :param found: the solution.
-        :param driven: its states: those of its inputs, where it holds inputs.
+        :param driven: its states; if it holds inputs, the states that result from these.
         :param exact_type: whether its vehicle type has the vehicle's dimensions.
-        :param failed: what other checks of the solution have found, by name.
+        :param failed: failures of other checks of the solution, by name.
         :param others: planning problems that are solved together with it.
-        :param progress: is told how much has been done, 0 to 1.
+        :param progress: called with the share done so far, 0 to 1.
         """
         problem = self._scored.problem(found.planning_problem_id)
         scenario = self._scored.without_own({found.planning_problem_id, *others})
@@ -57,19 +57,19 @@ class SolutionJudge:
 
 
 def poses_of(states: list[TraceState]) -> FloatArray:
-    """Return the poses (K, 3) of the centre; a point mass is turned to where it moves."""
+    """Return the poses (K, 3) of the centre; a point mass heads in its direction of motion."""
     return np.array([(*state.position, heading_of(state)) for state in states])
 
 
 def speeds_of(states: list[TraceState]) -> FloatArray:
-    """Return the speeds (K) of states; a point mass moves where it is turned to [m/s]."""
+    """Return the speeds (K) of states [m/s]; those of a point mass are never negative."""
     return np.array([np.hypot(state.velocity, state.velocity_y)
                      if getattr(state, 'orientation', None) is None else state.velocity
                      for state in states])
 
 
 def heading_of(state: TraceState) -> float:
-    """Return the direction of a state [rad]."""
+    """Return the heading of a state [rad]."""
     if getattr(state, 'orientation', None) is None:
         return float(np.arctan2(state.velocity_y, state.velocity))
     return float(state.orientation)

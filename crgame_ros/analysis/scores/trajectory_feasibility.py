@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a vehicle model could have driven a trajectory, and by how much it could not."""
+"""Checks whether a vehicle model could drive a trajectory, and by how much it falls short."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,32 +19,33 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# The checker's tolerance is a distance, whatever the time: over shorter steps nearly anything
-# passes [s].
+# The checker's tolerance is a distance that does not depend on the step: over shorter steps nearly
+# any transition passes [s].
 LEAST_STEP_S = 0.1
-# Who comes out nearer than this, as the length of all errors [m], [m/s], [rad] taken together, is
-# within each tolerance of the checker whatever better inputs it might find.
+# If the norm of all errors [m], [m/s], [rad] is below this, the state is within each tolerance of
+# the checker, whatever better inputs the checker might find.
 _NEAR = 0.02
-# Inputs beyond the limits by less are rounding [share].
+# Inputs beyond the limits by less than this are rounding errors [share].
 _ROUNDING = 1e-3
 
 
 @dataclass(frozen=True)
 class TrajectoryFeasibility:
     """
-    What the drivability checker says of a trajectory.
+    The drivability checker's result for a trajectory.
 
-    :param feasible: whether every transition is; None where it could not be asked.
+    :param feasible: whether every transition is feasible; None where it could not be checked.
     :param first_step: time step at which the first infeasible transition begins; None: none.
-    :param reason: why that one is not, or why it could not be asked; empty otherwise.
-    :param transitions: how many were asked.
-    :param infeasible: how many of them are not feasible.
-    :param position_error: largest distance between a state and what the model makes of the one
+    :param reason: why that one is infeasible, or why it could not be checked; empty otherwise.
+    :param transitions: number of transitions checked.
+    :param infeasible: number of infeasible transitions.
+    :param position_error: largest distance between a state and the model's step from the state
         before, with inputs that lead near enough or else fit best [m]
-    :param heading_error: likewise [rad]
-    :param excess_acceleration: by which the needed acceleration exceeds the model's limit [m/s^2]
-    :param excess_steering_rate: likewise [rad/s]
-    :param excess_friction: likewise of the acceleration's length, along and across [m/s^2]
+    :param heading_error: likewise for the heading [rad]
+    :param excess_acceleration: excess of the needed acceleration over the model's limit [m/s^2]
+    :param excess_steering_rate: likewise for the steering rate [rad/s]
+    :param excess_friction: likewise for the magnitude of the acceleration, with its lateral part
+        [m/s^2]
     :param step_s: time of a transition [s]
     """
 
@@ -61,11 +62,11 @@ class TrajectoryFeasibility:
     step_s: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {
             'feasible': self.feasible, 'first_step': self.first_step, 'reason': self.reason,
             'transitions': self.transitions, 'infeasible': self.infeasible,
-            # Beyond all numbers where no inputs were found.
+            # Infinite where no inputs were found.
             'position_error_m': _finite(self.position_error),
             'heading_error_rad': _finite(self.heading_error),
             'excess_acceleration_m_s2': self.excess_acceleration,
@@ -77,12 +78,12 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
                       progress: Callable[[float], object] = lambda _: None
                       ) -> TrajectoryFeasibility:
     """
-    Ask the drivability checker of every transition of a solution's trajectory.
+    Check every transition of a solution's trajectory with the drivability checker.
 
-    Where time steps are shorter than `LEAST_STEP_S`, as many are taken together as make it.
+    If time steps are shorter than `LEAST_STEP_S`, a transition combines enough of them.
 
-    :param dt_s: of the time steps [s]
-    :param progress: is told how much has been asked, 0 to 1.
+    :param dt_s: time step [s]
+    :param progress: called with the share asked so far, 0 to 1.
     """
     dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
     if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):
@@ -95,7 +96,7 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     for number, (now, then) in enumerate(zip(states[:-1], states[1:], strict=True)):
         try:
             measured.append(_transition(now, then, dynamics, stride * dt_s))
-        except Exception as error:  # the checker raises whatever its code stumbles over
+        except Exception as error:  # the checker can raise any exception
             return TrajectoryFeasibility(
                 None, int(now.time_step), one_line(f'{type(error).__name__}: {error}'))
         progress((number + 1) / (len(states) - 1))
@@ -115,7 +116,7 @@ def _finite(value: float) -> float | None:
 
 def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, step_s: float
                 ) -> tuple[bool, tuple[float, float, float, float, float]]:
-    """Ask of one transition; give the verdict, both errors and what exceeds the three limits."""
+    """Check one transition; return the verdict, both errors and the excess over three limits."""
     start, end = dynamics.state_to_array(now)[0], dynamics.state_to_array(then)[0]
     made, feasible = _apparently_made(start, end, dynamics, step_s), True
     if made is None:
@@ -145,9 +146,9 @@ def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, st
 def _apparently_made(start: FloatArray, end: FloatArray, dynamics: VehicleDynamics,
                      step_s: float) -> FloatArray | None:
     """
-    Return where the KS model comes with the inputs that speeds and steering angles ask for.
+    Return the KS model's next state with the inputs that speeds and steering angles imply.
 
-    :return: its state; None where it is not near, and better inputs have to be looked for.
+    :return: the state; None if it is not near the target, and better inputs have to be searched.
     """
     if dynamics.vehicle_model is not VehicleModel.KS:
         return None
@@ -176,11 +177,11 @@ def _why(position: float, heading: float, acceleration: float, rate: float,
 
 def _check_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
                   dynamics: VehicleDynamics, dt_s: float) -> TrajectoryFeasibility:
-    """Ask of a solution that holds inputs: each within bounds and friction."""
+    """Check a solution that holds inputs: each input must be within bounds and friction."""
     try:
         feasible, made = feasibility_checker.input_vector_feasibility(
             problem.initial_state, found.trajectory, dynamics, dt_s)
-    except Exception as error:  # the checker raises whatever its code stumbles over
+    except Exception as error:  # the checker can raise any exception
         return TrajectoryFeasibility(None, None, one_line(f'{type(error).__name__}: {error}'))
     last = int(made.state_list[-1].time_step)
     return TrajectoryFeasibility(
@@ -192,9 +193,9 @@ def _check_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
 def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
               dt_s: float) -> Trajectory:
     """
-    Return a solution's states: of inputs what the model makes of them, until one is beyond bounds.
+    Return a solution's states; for inputs, those of the model, until an input is out of bounds.
 
-    :raises ValueError: if the model cannot be driven with them.
+    :raises ValueError: if the model cannot be driven with the inputs.
     """
     if found.trajectory_type not in (TrajectoryType.Input, TrajectoryType.PMInput):
         return found.trajectory
@@ -202,5 +203,5 @@ def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
     try:
         return feasibility_checker.input_vector_feasibility(
             problem.initial_state, found.trajectory, dynamics, dt_s)[1]
-    except Exception as error:  # the checker raises whatever its code stumbles over
+    except Exception as error:  # the checker can raise any exception
         raise ValueError(one_line(f'{type(error).__name__}: {error}')) from error

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scores of one vehicle: nuPlan's, CommonRoad's, of its goal and of its plans."""
+"""The scores of one vehicle: nuPlan's and CommonRoad's, with its goal and its plans."""
 
 from dataclasses import dataclass
 from typing import Any, TYPE_CHECKING
@@ -18,14 +18,14 @@ class VehicleScores:
     """
     The scores of one vehicle.
 
-    :param vehicle_id: who it was; of a solution the name of its file.
+    :param vehicle_id: id of the vehicle; for a solution the name of its file.
     :param role: human, autonomous or solution.
     :param planner: name of an AV's planner; empty otherwise.
-    :param nuplan: nuPlan's score; None where it cannot be had.
-    :param commonroad: by CommonRoad's tools; None where they were not asked.
-    :param goal: how it came to its goal; None likewise.
-    :param plans: what its planner answered; None of who has none, or where it is not known.
-    :param remarks: one line each.
+    :param nuplan: nuPlan's score; None where it cannot be computed.
+    :param commonroad: results of CommonRoad's tools; None where they were not run.
+    :param goal: its way to the goal; None likewise.
+    :param plans: its planner's answers; None without a planner, or where they are unknown.
+    :param remarks: notes, one line each.
     """
 
     vehicle_id: str
@@ -38,7 +38,7 @@ class VehicleScores:
     remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
+        """Return the fields as a JSON-compatible dictionary."""
         return {
             'vehicle': self.vehicle_id, 'role': self.role, 'planner': self.planner,
             **{name: None if part is None else part.as_dict() for name, part in (
@@ -47,7 +47,7 @@ class VehicleScores:
             'remarks': list(self.remarks)}
 
     def values(self) -> dict[str, float | None]:
-        """Return each score of `MEASURES`, of spreads the median; None where there is none."""
+        """Return each score of `MEASURES`, the median for spreads; None where there is none."""
         found: dict[str, float | None] = dict.fromkeys(MEASURES)
         if self.nuplan is not None:
             found |= {'nuplan_score': self.nuplan.score, **self.nuplan.multipliers,

@@ -56,7 +56,7 @@ def score_vehicles(run: TableRun, *, drives_only: bool = False,
     Score a run, for the table of vehicles; why it cannot be scored is for the table of runs.
 
     :param drives_only: without CommonRoad's tools, which take most of the time.
-    :param progress: is told how much has been done, 0 to 1.
+    :param progress: called with the share done so far, 0 to 1.
     """
     found = scores_of(run.record, plans_of_report(run.outcome), drives_only=drives_only,
                       progress=progress)

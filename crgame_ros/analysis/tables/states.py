@@ -87,7 +87,7 @@ def state_rows(run: TableRun, progress: Callable[[float], object] = lambda _: No
     """
     Yield the rows of a run, in pieces: by time step, driven vehicles first.
 
-    :param progress: is told how much has been given, 0 to 1.
+    :param progress: called with the share given so far, 0 to 1.
     :raises InputError: if its scenario cannot be used.
     """
     log = run.record.log

@@ -66,7 +66,7 @@ class TableRun:
 
     @property
     def outcome(self) -> Mapping[str, Any] | None:
-        """Return plans, violations and contacts as `timing.json` has them; None: nobody knows."""
+        """Return plans, violations and contacts as in `timing.json`; None if unknown."""
         return self.timing if self.offline is None else self.offline
 
     @cached_property

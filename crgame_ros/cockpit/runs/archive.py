@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The runs that a page may look back at: those of the session, and of the folder around it."""
+"""The past runs that a page may show: those of the session and of the folder around it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
 MAX_RUNS = 500
 MAX_TITLE = 80
 GAME = 'game.yaml'
-# Says that the processes of a session are alive, or were killed.
+# The file that exists while the processes of a session are alive or after they were killed.
 CLAIM = '.started'
 PICTURE = '.picture.svg'
 _TIMES = re.compile(r'nanoseconds(?:_since_epoch)?: (\d{1,19})')
@@ -30,7 +30,7 @@ class PastRun:
     """
     A run that was recorded by this program.
 
-    :param id: by which pages name it; says nothing of where it is.
+    :param id: its id on pages, which does not reveal its path.
     :param folder: its files.
     :param session: folder of its session.
     """
@@ -41,27 +41,27 @@ class PastRun:
 
     @property
     def name(self) -> str:
-        """Return what people call it: its session and, of a later run of that, its own folder."""
+        """Return its readable name: its session, and for a later run of it also its own folder."""
         return self.folder.relative_to(self.session.parent).as_posix()
 
     @property
     def bag(self) -> Path:
-        """Name its first recording."""
+        """Return the path of its first recording."""
         return self.folder / 'bag'
 
     @property
     def is_closed(self) -> bool:
-        """Whether its last recording has been closed, so that it can be read whole."""
+        """Return whether its last recording has been closed, so that it can be read whole."""
         bags = bags_of(self.folder)
         return bool(bags) and (bags[-1] / METADATA_FILE).is_file()
 
     @property
     def is_finished(self) -> bool:
-        """Whether nobody writes to it any more: its session is over, or has done with it."""
+        """Return whether it is no longer written: its session is over or has finished it."""
         return not (self.session / CLAIM).exists() or (self.folder / FINISHED_MARK).exists()
 
     def files(self) -> dict[str, Path]:
-        """Return its files by the names that pages know."""
+        """Return its files by their names on pages."""
         return {path.relative_to(self.folder).as_posix(): path
                 for kind in RUN_FILES for found in sorted(self.folder.glob(kind))
                 for path in _plain_files(found)}
@@ -69,9 +69,9 @@ class PastRun:
 
 class RunArchive:
     """
-    Finds runs, and deletes what somebody wants to be rid of.
+    The archive of runs, which finds and deletes them.
 
-    :param session: folder of the session that goes on.
+    :param session: folder of the current session.
     :param root: folder of other sessions; None for none.
     """
 
@@ -81,7 +81,7 @@ class RunArchive:
         self._told: dict[tuple[Path, int], Mapping[str, Any]] = {}
 
     def runs(self) -> dict[str, PastRun]:
-        """Find the runs that are there now, the latest first, by their ids."""
+        """Return the runs that exist now by their ids, the latest first."""
         sessions = [self.session]
         if self._root is not None and self._root.is_dir():
             others = (path for path in self._root.iterdir()
@@ -113,7 +113,7 @@ class RunArchive:
         """
         Delete the files of a run, and its folder where nothing else is in it.
 
-        :return: what was done, for people.
+        :return: readable text of what was done.
         :raises InputError: if there is no such run, it is still being written, or its files cannot
             be removed.
         """
@@ -137,7 +137,7 @@ class RunArchive:
                 'files': [{'name': name, 'bytes': _size(path)} for name, path in files.items()]}
 
     def _facts(self, run: PastRun) -> Mapping[str, Any]:
-        """Read what does not change once a run is over, once."""
+        """Return the facts that do not change once a run is over; read them once."""
         timing = run.folder / 'timing.json'
         metadata = run.bag / METADATA_FILE
         changed = max((path.stat().st_mtime_ns for path in (timing, metadata) if path.is_file()),
@@ -150,12 +150,12 @@ class RunArchive:
 
 
 def _is_run(folder: Path) -> bool:
-    """Return whether this program has recorded a run there."""
+    """Return whether a folder holds a run that this program has recorded."""
     return (folder / GAME).is_file() and (folder / 'bag').is_dir() and not folder.is_symlink()
 
 
 def _plain_files(path: Path) -> Iterator[Path]:
-    """Yield a file, or those of a recording; nothing that leads elsewhere."""
+    """Yield a file, or the files of a recording, without symbolic links."""
     if path.is_symlink():
         return
     if path.is_file():
@@ -176,14 +176,14 @@ def _game_facts(path: Path) -> dict[str, Any]:
     try:
         game = load_game(path)
     except InputError:
-        # Of another version, or changed by somebody: it can still be fetched and deleted.
+        # A file of another version or a changed one can still be downloaded and deleted.
         return {'title': '', 'scenario': ''}
     return {'title': clean_text(game.title or '', MAX_TITLE),
             'scenario': clean_text(game.scenario.stem, MAX_TITLE)}
 
 
 def _bag_facts(path: Path) -> dict[str, Any]:
-    """Read from when on and how long a recording goes, without reading what it says of topics."""
+    """Read the start and duration of a recording, without its topics."""
     try:
         with path.open(encoding='utf-8', errors='replace') as stream:
             found = _TIMES.findall(stream.read(1000))
@@ -195,7 +195,7 @@ def _bag_facts(path: Path) -> dict[str, Any]:
 
 
 def _contacts(path: Path) -> int | None:
-    """Count the contacts of which the timing report tells; None where there is none."""
+    """Return the number of contacts in the timing report; None if there is no report."""
     try:
         return len(json.loads(path.read_text(encoding='utf-8')).get('contacts') or [])
     except (OSError, ValueError, AttributeError, TypeError):
@@ -203,7 +203,7 @@ def _contacts(path: Path) -> int | None:
 
 
 def _remove(run: PastRun) -> None:
-    """Remove a run's files; until the last is gone it is listed, and can be deleted again."""
+    """Remove a run's files; until the last is gone, the run is listed and can be deleted again."""
     game = run.folder / GAME
     own = [path for path in run.files().values() if path != game]
     for path in (*own, run.folder / PICTURE, run.folder / FINISHED_MARK, game):
@@ -213,5 +213,5 @@ def _remove(run: PastRun) -> None:
         try:
             folder.rmdir()
         except OSError:
-            # Something else is in it: another run of the session, or what somebody put there.
+            # The folder holds something else: another run of the session, or a foreign file.
             continue

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading runs for the page, in a process of its own (`job_loop`): scores, pictures, reports."""
+"""Jobs that read runs for the page, in a process of their own: scores, pictures, reports."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -23,11 +23,11 @@ from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
 import numpy as np
 
-# Hours of a run take some time; several are compared.
+# Time limit of a job [s]: runs can last hours, and several can be compared.
 MOST_CPU_S = 120.0
-# Of a picture [px].
+# Size of a picture [px].
 _WIDTH = 420
-# In which words the parts of a score are told.
+# The labels of the parts of a score.
 _WORDS = {
     'no_collision_at_fault': 'No collision at fault', 'drivable_area': 'On the road',
     'driving_direction': 'With the traffic', 'making_progress': 'Made headway',
@@ -37,9 +37,9 @@ _WORDS = {
 
 def score(path: Path) -> dict[str, Any]:
     """
-    Score a run by nuPlan's measures, which need no more than how everybody moved.
+    Return the score of a run by nuPlan's measures, which need only the motion of all objects.
 
-    :param path: its recording.
+    :param path: recording of the run.
     :return: the answer of /api/runs/score.
     :raises InputError: if it cannot be read.
     """
@@ -53,9 +53,9 @@ def score(path: Path) -> dict[str, Any]:
 
 def picture(path: Path, out: str) -> dict[str, Any]:
     """
-    Draw the end of a run, and the ways of the driven vehicles until there.
+    Draw the end of a run and the paths of the driven vehicles up to it.
 
-    :param path: its recording.
+    :param path: recording of the run.
     :param out: the file to write, SVG.
     :raises InputError: if it cannot be read.
     """
@@ -75,8 +75,8 @@ def compare(path: Path, others: Sequence[str], names: Sequence[str], out: str) -
     Write one report of several runs.
 
     :param path: recording of the first.
-    :param others: those of the others.
-    :param names: what people call them, in that order.
+    :param others: recordings of the others.
+    :param names: readable names of all, in that order.
     :param out: the file to write, HTML.
     :raises InputError: if one of them cannot be read.
     """
@@ -106,7 +106,7 @@ def _score_values(found: NuplanScore | None) -> dict[str, Any]:
 
 
 def _motion(log: RunTrajectories, number: int) -> dict[str, Any]:
-    """Return how far and how fast a vehicle came [m, m/s]."""
+    """Return the distance and the speeds of a vehicle [m, m/s]."""
     states = log.vehicle_states[:, number]
     states = states[np.isfinite(states[:, 0])]
     ways = np.hypot(*np.diff(states[:, :2], axis=0).T)

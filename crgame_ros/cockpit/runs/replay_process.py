@@ -3,8 +3,8 @@
 """
 The replay of one run beside the cockpit of another: `python -m … BAG`, with a token as a line.
 
-It listens on loopback, says at which port on its standard output, and ends with its standard
-input: with the cockpit.
+It listens on loopback, prints the port on its standard output, and ends when its standard
+input ends, so with the cockpit.
 """
 
 import asyncio

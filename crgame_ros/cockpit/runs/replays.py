@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Replays of past runs: a process for each, and the cockpit passes on what pages ask of it."""
+"""Replays of past runs: a process for each, to which the cockpit forwards requests of pages."""
 
 import asyncio
 from collections import OrderedDict
@@ -18,7 +18,7 @@ from crgame_ros.errors import CrgameError, InputError
 PROCESS = 'crgame_ros.cockpit.runs.replay_process'
 MOST_REPLAYS = 3
 BEGIN_S = 60.0
-# Of an answer, what the page needs; the rest is the server's own affair.
+# The headers of an answer that the page needs; the server sets the others.
 _PASSED = (hdrs.CONTENT_TYPE, hdrs.CONTENT_ENCODING)
 _PACKAGES = Path(__file__).resolve().parents[3]
 
@@ -39,7 +39,7 @@ class _Replay:
 
 
 class RunReplays:
-    """Starts and ends the processes, the one that was not asked for longest first."""
+    """The processes of replays; the least recently used ends first."""
 
     def __init__(self) -> None:
         self._replays: OrderedDict[str, _Replay] = OrderedDict()
@@ -61,7 +61,7 @@ class RunReplays:
 
     async def forward(self, run: PastRun, rest: str, request: web.Request) -> web.StreamResponse:
         """
-        Answer a request as the process does that shows the run.
+        Return the answer of the process that shows the run.
 
         :param rest: path below its address.
         :raises CrgameError: if the run cannot be shown.

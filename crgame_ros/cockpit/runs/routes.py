@@ -28,7 +28,7 @@ _CHUNK_BYTES = 256 * 1024
 
 
 class _Pending:
-    """What has been written and not yet been sent; it cannot be sought in."""
+    """A buffer of written data that is not yet sent; it does not support seek."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
@@ -38,10 +38,10 @@ class _Pending:
         return len(data)
 
     def flush(self) -> None:
-        """Do nothing: what is written is there."""
+        """Do nothing: written data is available at once."""
 
     def close(self) -> None:
-        """Do nothing: who sends it knows its end."""
+        """Do nothing: the sender knows the end."""
 
     def read(self) -> bytes:
         data = b''.join(self._parts)
@@ -51,11 +51,11 @@ class _Pending:
 
 def zip_chunks(name: str, files: Mapping[str, Path]) -> Iterator[bytes]:
     """
-    Pack files.
+    Pack files into a ZIP archive.
 
-    :param name: of the folder in the archive.
-    :param files: by their names in that folder.
-    :return: the archive, piece by piece; a file that has gone meanwhile is left out.
+    :param name: name of the folder in the archive.
+    :param files: files by their names in that folder.
+    :return: the archive in pieces; a file that has been deleted meanwhile is left out.
     """
     pending = _Pending()
     # Recordings are compressed already.
@@ -77,7 +77,7 @@ READER = 'crgame_ros.cockpit.runs.jobs'
 READ_S = 120.0
 MOST_COMPARED = 6
 SCORES_KEPT = 100
-# A report brings scripts and styles of its own: it may run them, away from the cockpit.
+# A report has scripts and styles of its own: it may run them, isolated from the cockpit.
 _REPORT = ("sandbox allow-scripts allow-downloads; default-src 'none'; "
            "script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:")
 _PICTURE = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
@@ -85,7 +85,7 @@ _PICTURE = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
 def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> None:
     """
-    Add /api/runs and what is below it, and /replay/.
+    Add the routes below /api/runs and /replay/.
 
     :param archive: the runs.
     :param work: folder for comparisons.
@@ -118,7 +118,7 @@ def add_run_routes(app: web.Application, archive: RunArchive, work: Path) -> Non
 
 class RunRoutes:
     """
-    Answers what pages ask of runs.
+    The handlers of requests about runs.
 
     :param archive: the runs.
     :param work: folder for comparisons.
@@ -127,28 +127,28 @@ class RunRoutes:
     def __init__(self, archive: RunArchive, work: Path) -> None:
         self._archive = archive
         self._work = work.resolve()
-        # Two: a score is wanted at once, while pictures of a long list are drawn.
+        # Two processes: a score is needed at once, while pictures of a long list are drawn.
         self._scorer = JobProcess(READER, 'run', READ_S)
         self._painter = JobProcess(READER, 'run', READ_S)
         self._replays = RunReplays()
         self._scores: dict[str, bytes] = {}
 
     async def warm_up(self) -> None:
-        """Start what scores: when a run is over somebody waits for it."""
+        """Start the scoring process early: clients wait for the score at the end of a run."""
         await self._scorer.start()
 
     async def close(self) -> None:
-        """End what still runs."""
+        """Stop the running processes."""
         await self._scorer.close()
         await self._painter.close()
         await self._replays.close()
 
     async def runs(self, _: web.Request) -> web.Response:
-        """List the runs."""
+        """Return the list of the runs."""
         return web.json_response(await asyncio.to_thread(self._archive.listing))
 
     async def picture(self, request: web.Request) -> web.StreamResponse:
-        """Return how a run went, as a picture that is drawn once."""
+        """Return a picture of a run, which is drawn once."""
         run = await self._closed(request)
         path = run.folder / PICTURE
         if not path.is_file():
@@ -158,7 +158,7 @@ class RunRoutes:
             'Content-Security-Policy': _PICTURE, hdrs.CONTENT_TYPE: 'image/svg+xml'})
 
     async def score(self, request: web.Request) -> web.Response:
-        """Return how well everybody drove in a run."""
+        """Return the scores of the driven vehicles in a run."""
         run = await self._closed(request)
         if run.id not in self._scores:
             answer = await self._scorer.run('score', path=str(run.bag),
@@ -169,7 +169,7 @@ class RunRoutes:
         return web.Response(body=self._scores[run.id], content_type='application/json')
 
     async def file(self, request: web.Request) -> web.StreamResponse:
-        """Send one file of a run; its report to be looked at, others to be kept."""
+        """Send one file of a run; the report is shown, other files are downloaded."""
         run = await self._run(request)
         name = request.query.get('file', '')[:MAX_TEXT]
         path = run.files().get(name)
@@ -191,7 +191,7 @@ class RunRoutes:
             hdrs.CONTENT_DISPOSITION: _attachment(f'{name}.zip')})
         await response.prepare(request)
         chunks = zip_chunks(name, run.files())
-        # Beside the loop, in which somebody's hands may be on the wheel.
+        # Not in the event loop, which may carry a driver's inputs.
         while (chunk := await asyncio.to_thread(next, chunks, None)) is not None:
             if chunk:
                 await response.write(chunk)
@@ -199,7 +199,7 @@ class RunRoutes:
         return response
 
     async def comparison(self, request: web.Request) -> web.StreamResponse:
-        """Write and show one report of several runs."""
+        """Write and return one report of several runs."""
         keys = request.query.get('ids', '')[:MAX_TEXT].split(',')
         if not 2 <= len(keys) <= MOST_COMPARED or len(set(keys)) != len(keys):
             raise InputError(f'choose 2 to {MOST_COMPARED} runs', 'comparison')
@@ -223,7 +223,7 @@ class RunRoutes:
         return web.json_response({'ok': True, 'text': text})
 
     async def replay(self, request: web.Request) -> web.StreamResponse:
-        """Pass a request on to the process that shows a run."""
+        """Forward a request to the process that shows a run."""
         known = await asyncio.to_thread(self._archive.runs)
         run = _readable(known.get(request.match_info['run']))
         return await self._replays.forward(run, request.match_info['rest'], request)

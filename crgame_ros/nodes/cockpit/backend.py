@@ -33,7 +33,7 @@ class _Told(NamedTuple):
 
 class PageReport:
     """
-    Tells of the page of each held seat how it sounds and what it shows: each second, at a change.
+    Reports of the sound and view of each held seat's page: every second and at each change.
 
     :param diagnostics: of the node.
     """
@@ -45,7 +45,7 @@ class PageReport:
     def publish(self, seats: Iterable[HeldSeat], clients: Mapping[str, Client],
                 stamp_ns: int) -> None:
         """
-        Publish what has changed, and what has not been told for a second.
+        Publish the states that have changed, and those not published for a second.
 
         :param clients: by id.
         :param stamp_ns: simulation time [ns]
@@ -90,14 +90,14 @@ def _number(value: float | None, digits: int) -> str:
 
 # Half a cycle at 100 Hz: a state is passed on, and answered with a command, well within it [s].
 PERIOD_S = 0.004
-# While people only watch, and while nobody does [s].
+# While clients only watch, and while there are none [s].
 WATCH_PERIOD_S = 0.01
 IDLE_PERIOD_S = 0.05
-# Between two looks at what may wait: services, names of people, orders without an answer [s].
+# Period of the work that may wait: services, names of people, orders without an answer [s].
 SERVE_PERIOD_S = 0.1
-# Of one line about messages that cannot be read: peers repeat them [s].
+# Period of log lines about messages that cannot be read: peers repeat them [s].
 COMPLAIN_S = 1.0
-# In which a game that somebody uploaded has to begin, for them to get its seat [s].
+# A client that uploads a game gets its seat if the game begins within this time [s].
 BEGINS_WITHIN_S = 60.0
 _DEEDS = {'start': 'started the run', 'pause': 'paused the run', 'step': 'stepped through the run',
           'reset': 'reset the run', 'stop': 'stopped the run'}
@@ -105,10 +105,10 @@ _DEEDS = {'start': 'started the run', 'pause': 'paused the run', 'step': 'steppe
 
 class LiveBackend:
     """
-    Stands behind the page of a live run.
+    The backend of the page of a live run.
 
     :param node: owner of the endpoints.
-    :param runs: folder of the session's files; None where nobody keeps any.
+    :param runs: folder of the session's files; None where none are kept.
     """
 
     mode: Literal['live', 'replay'] = 'live'
@@ -123,11 +123,11 @@ class LiveBackend:
         self._served_s = 0.0
         self._lost: dict[str, bool] = {}
         self._pump: asyncio.Task[None] | None = None
-        # Who gets the seat of a game to come, after which epoch, and until when.
+        # The client that gets a seat in the next game, after which epoch, and until when.
         self._expected: tuple[Client, int, float] | None = None
 
     async def start(self, hub: Hub) -> None:
-        """Begin to pass the run on."""
+        """Start passing the run on to the pages."""
         self._hub = hub
         self._feed = CockpitFeed(self._endpoints, hub, self._runs)
         self._desk = SeatDesk(self._node, self._endpoints, self._orders, hub, self._feed)
@@ -136,7 +136,7 @@ class LiveBackend:
         self._pump = asyncio.create_task(self._run())
 
     async def stop(self) -> None:
-        """Let go of every seat and end."""
+        """Release every seat and end."""
         self._desk.close()
         if self._pump is not None:
             self._pump.cancel()
@@ -144,7 +144,7 @@ class LiveBackend:
         self._orders.close()
 
     async def _run(self) -> None:
-        """Pass the run on until stopped; no part ends it or keeps the others from their work."""
+        """Pass the run on until stopped; a failure in one part stops neither it nor the others."""
         while True:
             attempt(self._node, self._pass_on)
             attempt(self._node, self._desk.drive)
@@ -174,7 +174,7 @@ class LiveBackend:
     def _serve(self) -> None:
         self._orders.serve()
         self._seat_who_chose()
-        # People come and change their names.
+        # People join and change their names.
         self._desk.serve()
         self._people.publish(time.monotonic())
         if self._feed.scenario is not None:
@@ -183,7 +183,7 @@ class LiveBackend:
                 self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 
     def _seat_who_chose(self) -> None:
-        """Put whoever uploaded the game that has begun into its seat."""
+        """Put the client that uploaded the game that has begun into a seat of it."""
         scenario = self._feed.scenario
         if self._expected is None or scenario is None:
             return
@@ -196,17 +196,17 @@ class LiveBackend:
             self._expected = None
 
     def joined(self, client: Client) -> None:
-        """Set the pace of a new page, and give who has come back their seat."""
+        """Set the rate of a new page, and return its seat to a client that has come back."""
         self._feed.pace(client)
         self._desk.joined(client)
 
     def left(self, client: Client) -> None:
-        """Take the hands of a page that is gone off the controls, at once."""
+        """Release the controls of a page that is gone, at once."""
         self._desk.left(client)
 
     async def command(self, client: Client, message: Mapping[str, Any]) -> str:
         """
-        Do what a page asks.
+        Carry out a page's command.
 
         :raises CrgameError: if it cannot be done.
         """
@@ -232,7 +232,7 @@ class LiveBackend:
         return self._desk.order(client, message)
 
     async def _control(self, client: Client, action: str, for_all: bool) -> str:
-        """Steer the run; the start of who sits among several in its seats is their readiness."""
+        """Control the run; a start by one of several drivers in seats declares them ready."""
         seat = self._desk.gate_seat(client)
         if action == 'start' and seat is not None and not (for_all and client.rights.directs) \
                 and (len(self._desk.cockpit_seats) > 1 or not client.rights.directs):
@@ -260,7 +260,7 @@ class LiveBackend:
     def _report_task(self, client: Client, message: Mapping[str, Any]) -> str:
         """Pass on what the page of a seat has shown, or what its driver has answered."""
         seat, what = message['seat'], message['what']
-        # A request to take over is seen before anybody has the seat.
+        # A take-over request is shown before any client has the seat.
         if what != 'shown' or seat in self._desk.table.held or not client.rights.drives:
             self._desk.table.holding(client.id, seat)
         self._orders.report_task(TaskReport(
@@ -273,7 +273,7 @@ class LiveBackend:
             raise InputError('takes no part in this game', av)
 
     def _announce(self, actor: Client | None, deed: str) -> None:
-        """Tell the others, and the recording, who has done what."""
+        """Report an action and its actor to the other clients and to the recording."""
         name = 'a client without a page' if actor is None else actor.name
         self._endpoints.diagnostics.publish(
             'cockpit_node: order', DiagnosticStatus.OK, f'{name} {deed}',
@@ -286,7 +286,7 @@ class LiveBackend:
     async def load_game(self, path: Path, client: Client | None = None, *,
                         takes_seat: bool = False) -> str:
         """
-        Begin a game: it is taken at a reset.
+        Load a game, and reset the run so that the game begins.
 
         :raises CrgameError: if the simulation refuses it.
         """

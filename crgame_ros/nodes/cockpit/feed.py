@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the cockpit shows of a live run: topics in, documents and frames for the page out."""
+"""
+The live run for the cockpit: topics turned into documents and frames for the page.
+"""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -36,15 +38,15 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
-# Between two estimated poses that are shown: the page moves them on [s].
+# Between two estimated poses; the page extrapolates from them [s].
 LOOK_PERIOD_S = 1.0 / 30.0
-# The sensors of an AV share a topic: of each the newest scan is wanted.
+# The sensors of an AV share a topic, and the newest scan of each is needed.
 SCAN_DEPTH = 64
 
 
 class AvFeed:
     """
-    Passes on what the planners of AVs say and are told, as far as some page shows it.
+    The plans, requests and perception of AVs, passed on to the pages that show them.
 
     :param endpoints: of the node.
     :param hub: all pages.
@@ -55,7 +57,7 @@ class AvFeed:
         self._hub = hub
         self._slots: dict[tuple[str, str], PolledSubscription] = {}
         self._map = endpoints.polled('/occupancy')
-        # The newest map, for an epoch that goes on with it, and the file that it is of.
+        # The newest map, for the next epoch if it keeps the map, and the map's file.
         self._map_message: Any | None = None
         self._map_path: object = None
         self._frames: MessageFrames | None = None
@@ -83,13 +85,13 @@ class AvFeed:
             self._map_message = None
 
     def show_map(self) -> None:
-        """Send the map again: a new scene has made all frames void."""
+        """Send the map again, because a new scene invalidates all frames."""
         if self._map_message is not None and self._map_path is not None:
             self._send_map(self._map_message)
 
     def poll_plans(self, frames_skipped: bool) -> None:
         """
-        Pass on plans, and of requests what some page shows.
+        Pass on plans, and those requests that a page shows.
 
         :raises CrgameError: or one of MALFORMED, if a message cannot be read.
         """
@@ -109,7 +111,7 @@ class AvFeed:
 
     def poll_perception(self, frames_skipped: bool) -> None:
         """
-        Pass on the map, and of estimates and scans what some page shows.
+        Pass on the map, and those estimates and scans that a page shows.
 
         :raises CrgameError: or one of MALFORMED, if a message cannot be read.
         """
@@ -173,24 +175,24 @@ def _perceives_as(av: str, scans: bool = False) -> Callable[[Client], bool]:
 
 
 STATUS_PERIOD_S = 0.2
-# Of the state frames that a client gets: who drives gets each.
+# Period of state frames for a client that watches; a client that drives gets every frame [s].
 WATCHER_PERIOD_S = 1.0 / 30.0
 SKIPPING_PERIOD_S = 0.1
-# sim_node tells its state every second; after a longer silence it is gone [s].
+# sim_node publishes its state every second; after this much silence it counts as gone [s].
 SILENCE_S = 3.0
 QUEUE = 100
-# What people do not notice the delay of is looked at less often than what moves [s].
+# Topics whose delay people do not notice are polled at this longer period [s].
 SLOW_PERIOD_S = 0.02
 UNREADABLE = (CrgameError, IndexError, *MALFORMED)
 
 
 class CockpitFeed:
     """
-    Reads the graph without an executor and passes on what the page shows.
+    The live run as the page shows it, read from the graph without an executor.
 
     :param endpoints: of the node.
     :param hub: all pages.
-    :param runs: folder of the session's files; None where nobody keeps any.
+    :param runs: folder of the session's files; None where none are kept.
     """
 
     def __init__(self, endpoints: Endpoints, hub: Hub, runs: Path | None = None) -> None:
@@ -200,7 +202,7 @@ class CockpitFeed:
         self.status = RunStatus()
         self._documents = ScenarioDocuments(endpoints)
         self._avs = AvFeed(endpoints, hub)
-        # Of what moves the newest is enough.
+        # For these topics the newest message is enough.
         self._states = endpoints.polled('/vehicles/state', depth=1)
         self._objects = endpoints.polled('/traffic/objects', depth=1)
         self._cycles = endpoints.polled('/timing/cycle', depth=1)
@@ -218,7 +220,7 @@ class CockpitFeed:
         self._commands: NDArray[np.float64] | None = None
         self.n = 0
         self._time = RunTime()
-        # How often time has run back: pages then forget what they have shown.
+        # Number of times that time has run back; each time pages discard what they have shown.
         self._again = 0
         self._run_heard_s = 0.0
         self._slow_s = 0.0
@@ -234,9 +236,9 @@ class CockpitFeed:
 
     def poll(self) -> list[str]:
         """
-        Take what has come, and pass it on.
+        Read the messages that have come, and pass them on.
 
-        :return: what went wrong, one line each
+        :return: problems, one line each
         """
         problems: list[str] = []
         now_s = time.monotonic()
@@ -247,8 +249,8 @@ class CockpitFeed:
                 _read(work, problems)
         for work in (self._poll_commands, self.poll_states, self._poll_tasks, self._poll_objects):
             _read(work, problems)
-        # The page holds its picture still in a pause, and sounds at a collision: it must not
-        # learn of them late.
+        # The page freezes its picture in a pause and plays a sound at a collision, so it must
+        # learn of both at once.
         urgent = (self.status.run, self.status.verdicts)
         if now_s - self._status_s >= STATUS_PERIOD_S or urgent != self._told:
             self._status_s = now_s
@@ -257,7 +259,7 @@ class CockpitFeed:
         return problems
 
     def pace(self, client: Client) -> None:
-        """Choose how many state frames a client gets."""
+        """Set the period of a client's state frames."""
         client.state_period_s = SKIPPING_PERIOD_S if self.frames_skipped else (
             0.0 if client.drives else WATCHER_PERIOD_S)
 
@@ -299,12 +301,12 @@ class CockpitFeed:
         self._avs.poll_perception(self.frames_skipped)
 
     def _poll_commands(self) -> None:
-        """Keep what the vehicles obeyed in the last cycle."""
+        """Keep the commands that the vehicles executed in the last cycle."""
         cycle: Float64MultiArray | None = self._cycles.latest()
         if cycle is None or self.scenario is None:
             return
         table = CycleTable.from_message(cycle.layout.dim[1].label, cycle.data)
-        # One of the game before or after this one tells nothing.
+        # A table of the game before or after this one is ignored.
         if table.epoch == self.scenario.game.epoch:
             self._commands = table.commands_of(self._vehicle_ids)[-1]
 
@@ -316,12 +318,12 @@ class CockpitFeed:
             return
         course = self._time.follow(from_time(message.header.stamp))
         if course is TimeCourse.BACK and self.scenario is not None:
-            # A recording that is played once more.
+            # A recording is played again.
             self._again += 1
             self._begin(self.scenario)
         elif course is TimeCourse.BEHIND:
             return
-        # Those of the game before or after this one are passed over.
+        # States of the game before or after this one are skipped.
         with suppress(InputError):
             states = frames.states(message)
             self.n = place.n
@@ -368,7 +370,7 @@ class CockpitFeed:
 
     def _poll_diagnostics(self) -> None:
         for slot in (self._diagnostics, *self._verdicts.values()):
-            # A flood waits its turn.
+            # The rest of a flood waits for the next call.
             for _ in range(QUEUE):
                 message = slot.pop()
                 if message is None:
@@ -378,12 +380,12 @@ class CockpitFeed:
                     self._add_status(status, stamp_ns)
 
     def _add_status(self, status: DiagnosticStatus, stamp_ns: int) -> None:
-        # Others speak before they have heard of any time.
+        # Other nodes report before they have received any time.
         timeless = stamp_ns == 0 and not (
             status.name.startswith('sim_node: ') or status.name.endswith('/drivability'))
         if self.scenario is not None and not timeless \
                 and stamp_ns < self.scenario.game.scheduler.clock_offset_ns:
-            # Of the run before.
+            # From the previous run.
             return
         self.status.add(read_status(status), self.t)
         if status.name == 'sim_node: run':
@@ -413,7 +415,7 @@ class CockpitFeed:
 
 
 def _read(work: Callable[[], None], problems: list[str]) -> None:
-    """Take in one kind of message; one that cannot be read keeps nobody from the others."""
+    """Read one kind of message; one that cannot be read does not block the others."""
     try:
         work()
     except UNREADABLE as error:

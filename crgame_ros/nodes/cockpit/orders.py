@@ -23,7 +23,7 @@ LOOK_S = 0.005
 
 class CockpitOrders:
     """
-    Sends orders and waits for their answers without holding anything up.
+    The page's orders to the graph, sent and awaited without blocking.
 
     :param node: owner of the clients.
     :param endpoints: of the node.
@@ -43,7 +43,7 @@ class CockpitOrders:
         self._task_reports = endpoints.publisher(REPORT_TOPIC)
 
     def close(self) -> None:
-        """Let go of the executor."""
+        """Release the executor."""
         self._executor.remove_node(self._node)
         self._executor.shutdown()
 
@@ -52,22 +52,22 @@ class CockpitOrders:
         self._executor.spin_once(timeout_sec=0)
 
     def trigger(self, event: str) -> None:
-        """Fire an event of the game, or let a task begin or end."""
+        """Fire an event of the game, or begin or end a task."""
         self._triggers.publish(String(data=event))
 
     def report_task(self, report: TaskReport) -> None:
-        """Tell what a page has shown of a task, or what its driver has answered."""
+        """Report what a page has shown of a task, or its driver's answer."""
         self._task_reports.publish(String(data=report_text(report)))
 
     def order_seat(self, demand: SeatDemand) -> None:
-        """Order who drives a vehicle, or tell of who does."""
+        """Publish a demand about the driver of a seat."""
         self._seat_orders.publish(String(data=demand_text(demand)))
 
     async def control(self, action: str) -> str:
         """
-        Start, pause, step, reset or stop.
+        Start, pause, step, reset or stop the run.
 
-        :return: what the simulation answers.
+        :return: the answer of the simulation.
         :raises CrgameError: if it refuses or does not answer.
         """
         response = await self._call(self._controls[action], Trigger.Request(), f'/sim/{action}')
@@ -75,7 +75,7 @@ class CockpitOrders:
 
     async def run_planner(self, av: str, run: bool) -> str:
         """
-        Let an AV's planner go or stop.
+        Start or stop an AV's planner.
 
         :raises CrgameError: if there is no answer.
         """

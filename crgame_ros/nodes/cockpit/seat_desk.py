@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The seats of a live run as the people at this cockpit take, drive, offer and leave them."""
+"""The seats of a live run: how people at this cockpit take, drive, offer and leave them."""
 
 from collections.abc import Mapping
 import time
@@ -31,12 +31,12 @@ TELL_PERIOD_S = 1.0
 
 class PeopleFeed:
     """
-    Tells once a second.
+    The list of people at this cockpit and their delays, published once a second.
 
     :param endpoints: of the node.
     :param hub: all pages.
-    :param table: who holds which seat.
-    :param status: knows of devices at this machine.
+    :param table: the holder of each seat.
+    :param status: lists the devices of this machine.
     """
 
     def __init__(self, endpoints: Endpoints, hub: Hub, table: SeatTable,
@@ -50,7 +50,7 @@ class PeopleFeed:
 
     def publish(self, now_s: float) -> None:
         """
-        Tell who is here if a second has passed, or somebody has come or gone.
+        Publish the people here if a second has passed or the list has changed.
 
         :param now_s: steady clock [s]
         """
@@ -76,7 +76,7 @@ class PeopleFeed:
                     seat.delay.total_ms(client.round_trip_ms))}
 
     def _record(self) -> None:
-        """Publish the delays of those who drive, which makes them part of the recording."""
+        """Publish the delays of the clients that drive, so that they are recorded."""
         for seat in self._table.held.values():
             client = self._hub.clients.get(seat.holder)
             if client is None or seat.away:
@@ -98,13 +98,13 @@ WAITS = ('waiting', 'paused')
 
 class SeatDesk:
     """
-    Carries out what pages ask about seats, and publishes what their hands do.
+    The desk that carries out the pages' orders about seats and publishes their inputs.
 
     :param node: owner of the endpoints.
     :param endpoints: of the node.
     :param orders: to the simulation.
     :param hub: all pages.
-    :param feed: how the run stands.
+    :param feed: the state of the run.
     """
 
     def __init__(self, node: Node, endpoints: Endpoints, orders: CockpitOrders, hub: Hub,
@@ -121,21 +121,21 @@ class SeatDesk:
         self._driven_n = 0
 
     def close(self) -> None:
-        """Let go of every seat."""
+        """Release every seat."""
         for seat in list(self.table.held.values()):
             self._publish_hands_off(seat)
             self._orders.order_seat(SeatDemand(seat.id, left=seat.person))
 
     def receive_seats(self, text: str) -> None:
         """
-        Take what `/seats` says.
+        Read a message of `/seats`.
 
-        :raises InputError: if it is not what the contract says.
+        :raises InputError: if it does not follow the contract.
         """
         seats, tenants = parse_seats_document(text), parse_tenants(text)
         self._awaited.answered(seats, tenants)
         self.table.update(seats, self._awaited, tenants)
-        # Ahead of the first claim: a new publisher takes a while to be discovered.
+        # Made before the first claim, because discovery of a new publisher takes a while.
         for name in seats.keys() - self._commands.keys():
             self._commands[name] = self._endpoints.publisher('/<v>/driver_command', name)
         for name in self._commands.keys() - seats.keys():
@@ -145,7 +145,7 @@ class SeatDesk:
         self.show()
 
     def serve(self) -> None:
-        """Repeat orders without an answer, and tell how the people in the seats have changed."""
+        """Repeat orders without an answer, and publish changes of the people in the seats."""
         for demand in self._awaited.due(time.monotonic()):
             self._orders.order_seat(demand)
         self.table.update(self.table.seats, self._awaited)
@@ -158,7 +158,7 @@ class SeatDesk:
         self.show()
 
     def drive(self) -> None:
-        """Send the command of each held seat for a new cycle; let go of silent ones."""
+        """Send the command of each held seat for a new cycle; release silent ones."""
         now_s = time.monotonic()
         new_cycle, self._driven_n = self._feed.n != self._driven_n, self._feed.n
         for seat in self.table.held.values():
@@ -169,7 +169,7 @@ class SeatDesk:
                 self._publish(seat)
 
     def show(self) -> None:
-        """Tell the pages who has which seat."""
+        """Show the pages the holder of each seat."""
         now_s, lost = time.monotonic(), self._feed.status.seats_lost
         self.table.note_absent(lost, now_s)
         self._hub.set_document('seats', self.table.document(self._drivers(), lost, now_s))
@@ -178,7 +178,9 @@ class SeatDesk:
             self._feed.pace(client)
 
     def joined(self, client: Client) -> None:
-        """Give somebody who has come back their seat; take it from whoever only watches now."""
+        """
+        Return the seat to a client that is back; free the seat of one that now only watches.
+        """
         held = self.table.seat_of(client.id)
         if held is not None and not client.rights.drives:
             self._release(client, held.id)
@@ -186,7 +188,7 @@ class SeatDesk:
         self.show()
 
     def left(self, client: Client) -> None:
-        """Take the hands of a page that is gone off the controls, at once."""
+        """Release the controls of a page that is gone, at once."""
         seat = self.table.left(client.id)
         if seat is not None:
             self._publish_hands_off(seat)
@@ -196,14 +198,14 @@ class SeatDesk:
 
     def input(self, client: Client, message: Mapping[str, Any]) -> str:  # noqa: A003
         """
-        Pass on what hands do.
+        Pass on a client's input.
 
         :raises InputError: if the client does not have the seat.
         """
         seat = self.table.holding(client.id, message['seat'])
         now_s = time.monotonic()
         if seat.apply_input(message, now_s):
-            # The newest step, for the one that obeys this is measured from it.
+            # Read the newest step first: the step that executes this input is measured from it.
             self._feed.poll_states()
             seat.delay.changed(now_s, self._feed.n)
         self._publish(seat)
@@ -211,7 +213,7 @@ class SeatDesk:
 
     def order(self, client: Client, message: Mapping[str, Any]) -> str:
         """
-        Do what a page asks about a seat.
+        Carry out a page's order about a seat.
 
         :raises CrgameError: if it cannot be done.
         """
@@ -224,7 +226,7 @@ class SeatDesk:
         return text
 
     def claim_for(self, client: Client) -> None:
-        """Put somebody into the first free seat that the game leaves to a cockpit."""
+        """Put a client into the first free seat that the game leaves to a cockpit."""
         if self.table.seat_of(client.id) is not None or not client.rights.drives:
             return
         for name, entry in self.table.seats.items():
@@ -234,7 +236,7 @@ class SeatDesk:
                 return
 
     def gate_seat(self, client: Client) -> str | None:
-        """Name the seat whose readiness a client can declare, None where no run waits for it."""
+        """Return the seat whose readiness a client can declare, None if no run waits for it."""
         held = self.table.seat_of(client.id)
         waits = self._feed.n == 0 and self._feed.status.run in WAITS
         return held.id if waits and held is not None and held.id in self.cockpit_seats else None
@@ -249,7 +251,7 @@ class SeatDesk:
         return {item.id: item.name for item in self._hub.clients.values() if item.rights.drives}
 
     def _return(self, client: Client) -> None:
-        """Give the seat back to somebody whose connection was broken."""
+        """Return the seat to a client whose connection was broken."""
         seat = self.table.seat_kept_for(client.person)
         if seat is None or not client.key or client.dropped or not client.rights.drives:
             return
@@ -277,7 +279,7 @@ class SeatDesk:
         return f'you drive {seat}'
 
     def _sit(self, client: Client, held: HeldSeat) -> None:
-        """Order a seat for somebody, in the place of whoever had it."""
+        """Order a seat for a client, in place of its present holder."""
         tenant = self.table.tenants.get(held.id)
         person = self._told[held.id] = _person(client)
         displaced = None if tenant is None or tenant.person.id == person.id else tenant.person.id
@@ -340,7 +342,9 @@ class SeatDesk:
         self._awaited.note(demand, self.table.seats, self.table.tenants, time.monotonic())
 
     def _publish_hands_off(self, seat: HeldSeat) -> None:
-        """Say once that the hands are off; then silence, on which the seat's watchdog brakes."""
+        """
+        Publish once that the hands are off; the seat's watchdog brakes in the silence after.
+        """
         seat.release()
         self._publish(seat)
 
@@ -355,6 +359,6 @@ class SeatDesk:
 
 
 def _person(client: Client) -> SeatPerson:
-    """Describe somebody by what they have said, and by nothing else."""
+    """Build the description of a client from nothing but its own statements."""
     return SeatPerson(client.person, client.name, client.device, client.browser,
                       client.rights.role)

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What only the marker node uses: the scene as markers."""
+"""Parts of the marker node alone: the scene as markers."""

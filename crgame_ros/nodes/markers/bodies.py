@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker
 
 FloatArray = NDArray[np.float64]
 
-# Viewers drop what nobody has renewed for so long [s]: a scene that froze is no scene.
+# Viewers drop markers that are not renewed for this long [s], so that no frozen scene stays.
 LIFETIME_S = 5
 LABEL_HEIGHT = 1.2
 LIGHT_DIAMETER = 1.2
@@ -29,7 +29,7 @@ class Item:
     """
     Markers that are shown together or not at all.
 
-    :param markers: refilled in place by whoever owns the item.
+    :param markers: refilled in place by the owner of the item.
     """
 
     def __init__(self, markers: Sequence[Marker]) -> None:
@@ -38,7 +38,7 @@ class Item:
         self._shown = False
 
     def collect(self, into: list[Marker]) -> None:
-        """Add the markers to a message; once, as deletions, when they are no longer present."""
+        """Add the markers to a message; add deletions once when they are no longer present."""
         if self.present or self._shown:
             action = Marker.ADD if self.present else Marker.DELETE
             for marker in self.markers:
@@ -68,7 +68,7 @@ class Body(Item):
         if item.type in style.MOTOR_TYPES and item.role is not Role.STATIC:
             self._lights = _brake_lights(header, number, item.shape, self._half_height)
             markers.append(self._lights)
-        # One pose for all that is fixed to the body; the label is drawn above it.
+        # All parts fixed to the body share one pose; the label is drawn above it.
         self._pose: Pose = box.pose
         self._pose.position.z = self._half_height
         for marker in markers:
@@ -82,7 +82,7 @@ class Body(Item):
 
     def place(self, x: float, y: float, yaw: float, braking: bool) -> None:
         """
-        Put the markers where the object is; absent if the pose is not finite.
+        Place the markers at the object's pose; hide them if the pose is not finite.
 
         :param x: of its reference point in map, like y [m]
         :param yaw: [rad]
@@ -116,7 +116,7 @@ class Line(Item):
         self._pool: list[Point] = []
 
     def fill(self, places: FloatArray) -> None:
-        """Take new points (n, 2); absent with fewer than two."""
+        """Set new points (n, 2); hide the line with fewer than two."""
         count = len(places)
         self.present = count > 1
         while len(self._pool) < count:
@@ -144,7 +144,7 @@ class LightMarker(Item):
         self.present = True
 
     def show(self, state: str) -> None:
-        """Take the colour of a state in its XML spelling; of an unknown one that of inactive."""
+        """Set the colour of a state in its XML spelling; an unknown state counts as inactive."""
         code = style.LIGHT_COLOURS.get(state, style.LIGHT_COLOURS['inactive'])
         self.markers[0].color = style.colour(code)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scene on `/markers`: the map once, and what moves, in messages refilled in place."""
+"""The scene on `/markers`: the map, sent once, and moving things in messages refilled in place."""
 
 from collections.abc import Mapping
 
@@ -30,14 +30,14 @@ from visualization_msgs.msg import Marker, MarkerArray
 FloatArray = NDArray[np.float64]
 
 PREDICTION_Z, PLAN_Z = 0.06, 0.08
-# Above the roofs of cars: where something is seen and where it is are then both in sight.
+# Above the roofs of cars, so that both the perceived and the true place stay visible [m].
 PERCEIVED_Z = 1.6
-# Predictions are drawn with a point about every half second [s] …
+# Predictions are drawn with a point about every half second [s],
 PREDICTION_STEP_S = 0.5
-# … where they lead anywhere [m], until they are so old [ns].
+# if they move at least this far [m], and until they are this old [ns].
 PREDICTION_MOVES = 0.05
 PREDICTION_AGE_NS = 1_500_000_000
-# Of the line around a round thing.
+# Corners of the line around a circle.
 CIRCLE_CORNERS = 8
 
 
@@ -47,7 +47,7 @@ class SceneMarkers:
 
     Driven vehicles stand where the game starts them until their first states come.
 
-    :param documents: what the run is.
+    :param documents: of the run.
     """
 
     def __init__(self, documents: ScenarioSet) -> None:
@@ -78,9 +78,9 @@ class SceneMarkers:
 
     def map_message(self, clear: bool) -> MarkerArray:
         """
-        Draw the map, which is never drawn again unless asked for.
+        Build the message of the map, which is sent again only on request.
 
-        :param clear: whether to delete whatever was shown before.
+        :param clear: whether to delete everything shown before.
         """
         first = [Marker(header=style.map_header(), action=Marker.DELETEALL)] if clear else []
         return MarkerArray(markers=[*first, *map_markers(self._loaded, self._problems)])
@@ -90,7 +90,7 @@ class SceneMarkers:
         Place the driven vehicles.
 
         :param states: (V, 8) rear-axle states, columns as in `StateColumn`
-        :param stamp_ns: simulation time, to which everything is drawn [ns]
+        :param stamp_ns: simulation time at which everything is drawn [ns]
         """
         self._stamp_ns = stamp_ns
         speed, acceleration = states[:, StateColumn.SPEED], states[:, StateColumn.ACCELERATION]
@@ -100,7 +100,7 @@ class SceneMarkers:
             body.place(x, y, yaw, brakes)
 
     def set_objects(self, objects: ObjectStates, stamp_ns: int) -> None:
-        """Take the other objects at a scenario step; they brake where they got slower."""
+        """Set the other objects at a scenario step; brake lights show where they got slower."""
         before, passed_s = self._objects, (stamp_ns - self._objects_ns) * 1e-9
         if before is not None and passed_s > 0.0:
             slower = (_speeds(objects) - _speeds(before)) / passed_s
@@ -108,20 +108,20 @@ class SceneMarkers:
         self._objects, self._objects_ns = objects, stamp_ns
 
     def set_signals(self, states: Mapping[str, str]) -> None:
-        """Take traffic-light states by light id; lights that are not named are inactive."""
+        """Set traffic-light states by light id; lights that are not named are inactive."""
         for number, light in self._lights.items():
             light.show(states.get(str(number), 'inactive'))
 
     def set_plan(self, av_id: str, series: JointSeries) -> None:
-        """Take an AV's plan."""
+        """Set an AV's plan."""
         self._paths[av_id].set_plan(series)
 
     def set_prediction(self, av_id: str, series: JointSeries) -> None:
-        """Take the request of an AV: what its planner is told of the others' future."""
+        """Set the prediction of the others from an AV's plan request."""
         self._paths[av_id].set_prediction(series)
 
     def message(self) -> MarkerArray:
-        """Return everything that moves or changes, at the time of the vehicles' states."""
+        """Return the markers that move or change, at the time of the vehicles' states."""
         set_time(self._header.stamp, self._stamp_ns)
         self._place_objects()
         items: list[Item] = [*self._lights.values(), *self._bodies]
@@ -135,7 +135,7 @@ class SceneMarkers:
         return self._message
 
     def _place_objects(self) -> None:
-        """Move the objects on from their scenario step: their velocities lead to the next."""
+        """Move the objects on from their scenario step with their velocities."""
         if self._objects is None:
             return
         since_ns = min(max(self._stamp_ns - self._objects_ns, 0), self._time_step_ns)
@@ -155,11 +155,11 @@ def _speeds(objects: ObjectStates) -> FloatArray:
 
 class AvPaths:
     """
-    The plan of an AV, and what it was told of the others, as lines.
+    The plan of an AV and its prediction of the others, as lines.
 
-    :param transform: from simulation to the scenario coordinates in which the planner thinks.
-    :param outlines: corners (n, 2) of each object around its reference point, by id [m]; of an AV
-        that knows the truth, whose planner is told what everybody sees, nothing.
+    :param transform: from simulation to the scenario coordinates that the planner uses.
+    :param outlines: corners (n, 2) of each object around its reference point, by id [m]; empty for
+        an AV that knows the truth.
     """
 
     def __init__(self, header: Header, number: int, av_id: str, transform: RigidTransform,
@@ -181,7 +181,7 @@ class AvPaths:
         self._prediction_end_ns = 0
 
     def set_plan(self, series: JointSeries) -> None:
-        """Draw the rear-axle positions of a plan; one for somebody else is passed over."""
+        """Draw the rear-axle positions of a plan; skip a plan for another AV."""
         if series.names != self._names or not len(series.times_ns):
             return
         places = self._transform.to_simulation(series.positions[:, :3])[:, :2]
@@ -190,7 +190,7 @@ class AvPaths:
 
     def set_prediction(self, series: JointSeries) -> None:
         """
-        Draw where everybody else is expected to go, of their reference points.
+        Draw the predicted paths of the others' reference points.
 
         :raises InputError: if it is another AV's request.
         """
@@ -212,7 +212,7 @@ class AvPaths:
         self._prediction_end_ns = series.stamp_ns + PREDICTION_AGE_NS
 
     def expire(self, stamp_ns: int) -> None:
-        """Take away a plan that is used up and a prediction that is out of date."""
+        """Hide a plan that is used up and a prediction that is out of date."""
         self.plan.present &= stamp_ns <= self._plan_end_ns
         self.prediction.present &= stamp_ns <= self._prediction_end_ns
         self.perceived.present &= stamp_ns <= self._prediction_end_ns

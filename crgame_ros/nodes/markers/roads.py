@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What stands still on `/markers`: road surface, lane lines, stop lines and goals."""
+"""The static part of `/markers`: road surface, lane lines, stop lines and goals."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from visualization_msgs.msg import Marker
 FloatArray = NDArray[np.float64]
 
 NAMESPACES = ('road', 'lane_lines', 'stop_lines', 'goals')
-# Above one another, so that no two surfaces flicker in one plane [m].
+# Different heights, so that no two surfaces flicker in one plane [m].
 ROAD_Z, PATHS_Z, FAINT_Z, LINE_Z, GOAL_Z = -0.05, -0.04, 0.01, 0.02, 0.03
 STOP_LINE_WIDTH = 0.5
 # Lane markings in German towns: lines of 3 m, gaps of 6 m (RMS-1).
@@ -44,7 +44,7 @@ class Paint:
 NARROW, BROAD = Paint(0.15, style.WHITE, LINE_Z), Paint(0.3, style.WHITE, LINE_Z)
 CURB, FAINT = Paint(0.15, style.LIGHT_GREY, FAINT_Z), Paint(0.08, style.GREY, FAINT_Z)
 PAINTS = (NARROW, BROAD, CURB, FAINT)
-# For each line marking its paint and its lines: offset to the left [m], dashed or not.
+# Paint and lines of each line marking; a line is its offset to the left [m] and dashed or not.
 MARKINGS: dict[str, tuple[Paint, tuple[tuple[float, bool], ...]]] = {
     'solid': (NARROW, ((0.0, False),)), 'dashed': (NARROW, ((0.0, True),)),
     'broad_solid': (BROAD, ((0.0, False),)), 'broad_dashed': (BROAD, ((0.0, True),)),
@@ -59,7 +59,7 @@ MARKINGS: dict[str, tuple[Paint, tuple[tuple[float, bool], ...]]] = {
 
 def map_markers(loaded: LoadedScenario, problem_ids: Sequence[int] = ()) -> list[Marker]:
     """
-    Draw the road and the goals, in frame map and without an end of their life.
+    Build the markers of the road and the goals, in frame map and without a lifetime.
 
     :param problem_ids: planning problems whose goals are drawn.
     """
@@ -71,7 +71,7 @@ def map_markers(loaded: LoadedScenario, problem_ids: Sequence[int] = ()) -> list
 
 
 def light_positions(network: LaneletNetwork) -> dict[int, FloatArray]:
-    """Return the place (x, y) of each traffic light: its own, or where its lane ends."""
+    """Return the position (x, y) of each traffic light: its own, or the end of its lane."""
     lights: list[TrafficLight] = network.traffic_lights
     found = {}
     for light in lights:

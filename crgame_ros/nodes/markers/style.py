@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How markers look: colours that the colour-blind can tell apart, heights, and a blank marker."""
+"""
+The look of markers: colours that the colour-blind can distinguish, heights, a blank marker.
+"""
 
 from collections.abc import Iterable
 
@@ -23,7 +25,7 @@ LIGHT_COLOURS = {'red': VERMILLION, 'redYellow': ORANGE, 'yellow': YELLOW, 'gree
                  'inactive': DARK_GREY}
 SOFT_TYPES = frozenset({'pedestrian', 'bicycle'})
 MOTOR_TYPES = frozenset({'car', 'truck', 'bus', 'motorcycle', 'taxi', 'priorityVehicle'})
-# CommonRoad is plane: these heights [m] serve views from the side only.
+# CommonRoad is planar: these heights [m] only serve views from the side.
 HEIGHTS = {'pedestrian': 1.75, 'bicycle': 1.7, 'motorcycle': 1.5, 'truck': 3.5, 'bus': 3.2,
            'train': 3.8, 'building': 6.0}
 HEIGHT = 1.5
@@ -36,7 +38,7 @@ def colour(code: str, alpha: float = 1.0) -> ColorRGBA:
 
 
 def body_colour(item: ObjectDescription) -> str:
-    """Choose the colour of an object: people outside cars stand out, whoever moves them."""
+    """Return the colour of an object; people outside cars stand out."""
     return PURPLE if item.type in SOFT_TYPES else ROLE_COLOURS[item.role]
 
 
@@ -54,7 +56,7 @@ def blank(header: Header, namespace: str, number: int, kind: int, paint: ColorRG
     :param header: shared by the markers of a message.
     :param number: id, unique in the namespace.
     :param kind: Marker.CUBE …
-    :param lifetime_s: after which viewers drop it, 0 for never [s]
+    :param lifetime_s: time after which viewers drop it, 0 for never [s]
     """
     marker = Marker(header=header, ns=namespace, id=number, type=kind, action=Marker.ADD,
                     color=paint, lifetime=Duration(sec=lifetime_s))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The services and parameters by which people steer sim_node."""
+"""The services and parameters that control sim_node."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,16 +20,16 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-# Drivers that do the same wherever they are.
+# Drivers that do not depend on the scenario.
 SCRIPTS = ('keys:', 'joy:')
-# Time to put the hands on the controls after the last one has said that they are ready [s].
+# Time to put the hands on the controls after the last driver is ready [s].
 COUNTDOWN_S = 3.0
 OVER = 'the run is over: reset begins it anew'
 
 
 class SimControl:
     """
-    Orders to the simulation, as flags that its loop reads between cycles.
+    The orders to the simulation, as flags that its loop reads between cycles.
 
     :param node: owner of services and parameters.
     """
@@ -43,20 +43,20 @@ class SimControl:
         self.stop_wanted = False
         # The run has ended, and the node stays for another one.
         self.over = False
-        # Somebody has chosen a game or scenario since the start.
+        # Whether a game or scenario has been chosen since the start.
         self.chosen_later = False
-        # Since the last reset: who chooses a game, be it the same one, says when it begins.
+        # The same since the last reset: a chosen game, even the same one, waits for a start.
         self.chosen_anew = False
-        # Somebody has said start since the last reset.
+        # Whether a start has been ordered since the last reset.
         self.started = False
         # Seats whose driver must come before the run begins.
         self.awaited: tuple[str, ...] = ()
-        # How long until the run begins [s]; 0 unless everybody is ready and waits for it.
+        # Time until the run begins [s]; 0 unless all are ready and wait for it.
         self.countdown_s = 0
         self.seat_sources: dict[str, str] = {}
         self.seat_tenants: dict[str, SeatOccupant] = {}
         self._declare()
-        # Read at every cycle, so kept beside the parameter.
+        # Kept beside the parameter because it is read in every cycle.
         self.real_time_factor = float(self._value('real_time_factor'))
         node.add_on_set_parameters_callback(self._on_parameters)
         node.add_post_set_parameters_callback(self._after_parameters)
@@ -66,7 +66,7 @@ class SimControl:
                                ('/sim/stop', self._on_stop)):
             endpoints.service(name, callback)
         self._chosen = 'game' if self._value('game') or not self._value('scenario') else 'scenario'
-        # What the command line names is trusted; later orders may come from any DDS peer.
+        # Files named on the command line are trusted; later orders may come from any DDS peer.
         self._directories = [Path(item).resolve() for item in self._value('scenario_directories')
                              if item] + [scenarios_directory().resolve()]
         self._first = self._value(self._chosen)
@@ -112,59 +112,59 @@ class SimControl:
 
     @property
     def duration_s(self) -> float:
-        """Duration from the command line [s]; 0 if none."""
+        """Return the duration from the command line [s]; 0 if none."""
         return float(self._value('duration'))
 
     @property
     def countdown_from_s(self) -> float:
-        """How long after all drivers at pages are ready the run begins [s]."""
+        """Return the time from the readiness of all drivers at pages to the start [s]."""
         return float(self._value('countdown'))
 
     @property
     def starts_paused(self) -> bool:
-        """Whether the run waits for /sim/start."""
+        """Return whether the run waits for /sim/start."""
         return bool(self._value('start_paused'))
 
     @property
     def wants_realtime_priority(self) -> bool:
-        """Whether the user asked for SCHED_FIFO."""
+        """Return whether the user asked for SCHED_FIFO."""
         return bool(self._value('realtime_priority'))
 
     @property
     def companions(self) -> tuple[str, ...]:
-        """Nodes that must be connected before the run starts."""
+        """Return the nodes that must be connected before the run starts."""
         return tuple(item for item in self._value('wait_for') if item)
 
     @property
     def roster(self) -> Path | None:
-        """File that tells the launcher which vehicles the game has."""
+        """Return the file in which the launcher reads the vehicles of the game."""
         value = self._value('roster')
         return Path(value) if value else None
 
     @property
     def folder(self) -> Path | None:
-        """Folder of the run's files."""
+        """Return the folder of the run's files."""
         value = self._value('folder')
         return Path(value) if value else None
 
     @property
     def stays(self) -> bool:
-        """Whether the node stays when a run has ended."""
+        """Return whether the node stays when a run has ended."""
         at_end = self._value('at_end')
         return at_end == STAY or (at_end == STAY_IF_CHOSEN and self.chosen_later)
 
     @property
     def planner_timeout_s(self) -> float:
-        """How long to wait for planners and companions [s]."""
+        """Return the time limit of the wait for planners and companions [s]."""
         return float(self._value('planner_timeout'))
 
     @property
     def stands_still(self) -> bool:
-        """Whether the run is paused and no step of it is ordered."""
+        """Return whether the run is paused and no step of it is ordered."""
         return self.paused and not self.steps_wanted
 
     def count_step(self, steps_per_tick: int) -> None:
-        """Count down the scenario steps, of so many steps each, ordered during a pause."""
+        """Count down the scenario steps ordered during a pause, each of `steps_per_tick` steps."""
         if not (self.paused and self.steps_wanted):
             self.steps_wanted = self._stepped = 0
             return
@@ -188,8 +188,8 @@ class SimControl:
         """
         Load the game that the parameters name now, for a reset.
 
-        :param present: a new scenario keeps its humans with their drivers, and its rules; a
-            recording belongs to its own scenario, so that the game's default drives instead.
+        :param present: a new scenario keeps its humans with their drivers, and its rules. A
+            recording fits only its own scenario, so the game's default driver replaces it.
         :raises InputError: if it cannot be used or lies outside the configured directories.
         """
         name = self._value(self._chosen)
@@ -216,7 +216,7 @@ class SimControl:
         return Game(Path(path)) if self._chosen == 'scenario' else load_game(Path(path))
 
     def _allowed(self, name: str, kind: str) -> Path:
-        """Find a game or scenario by its name, or as a file in one of the known directories."""
+        """Return the path of a game or scenario, by its name or as a file in a known directory."""
         for directory in self._directories:
             for ending in ('', '.yaml' if kind == 'game' else '.xml'):
                 path = (directory / f'{name}{ending}').resolve()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What sim_node takes in at each cycle: commands of the seats and plans of the AVs."""
+"""The inputs of sim_node in each cycle: commands of the seats and plans of the AVs."""
 
 from collections.abc import Callable, MutableMapping
 from contextlib import suppress
@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # Recordings are read in few runs, by code that takes time to
 
 # Triggers read at one tick: a flood must not cost the cycle.
 MAX_TRIGGERS = 10
-# Ticks of the agents' states that are read at one of the simulation's.
+# Agents' ticks that are read at one tick of the simulation.
 MAX_AGENTS = 10
 MAX_REPORTS = 10
 
@@ -37,9 +37,9 @@ class SimInputs:
     :param node: owner of the subscriptions.
     :param setup: the run.
     :param clock_offset_ns: simulation time of step 0 [ns]
-    :param seat_sources: who was ordered to drive what, by seat.
-    :param recorded: what drives seats as in a recording; None for nothing.
-    :param tenants: who is in which seat.
+    :param seat_sources: the ordered source of each seat, by seat.
+    :param recorded: recorded inputs that drive seats; None for none.
+    :param tenants: occupants by seat.
     """
 
     def __init__(self, node: Node, setup: Setup, clock_offset_ns: int,
@@ -51,7 +51,7 @@ class SimInputs:
         endpoints = Endpoints(node)
         self.seats = Seats(
             endpoints, setup, clock_offset_ns, seat_sources, recorded, tenants)
-        # Orders to a planner to go or stop, until the loop takes them.
+        # Orders to planners to start or stop, until the loop reads them.
         self.planner_orders: dict[str, bool] = {}
         self._services = [
             endpoints.service('/<av>/planner_run', partial(self._on_planner_run, av.id), av.id)
@@ -59,7 +59,7 @@ class SimInputs:
         self._plans = {
             av.id: endpoints.polled('/<av>/plan', av.id, strict=True, depth=SHARED_DEPTH)
             for av in setup.avs}
-        # What planners are told instead of the truth; a plan is checked against it.
+        # The requests that planners get instead of the true ones; a plan is checked against them.
         self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id, raw=True)
                            for av in setup.avs if av.spec.perception is not None}
         self._agents = None if setup.traffic is None else endpoints.polled(
@@ -73,17 +73,18 @@ class SimInputs:
                                  for human in setup.humans}
 
     def restart_timeout(self, now_ns: int) -> None:
-        """Begin to count the silence of every driver now."""
+        """Restart the timeout of every driver now."""
         for seat in self.seats.all:
             seat.restart_timeout(now_ns)
 
     def choose(self, answers: Callable[[str, int], bool],
                awaits: Callable[[int], bool] | None) -> None:
         """
-        Pass over what others say, before it displaces what is meant for this run.
+        Filter out messages that are not for this run before they displace those that are.
 
-        :param answers: whether a plan with a stamp [ns] is one for an AV.
-        :param awaits: whether agents' states with a stamp [ns] may be of use; None without agents.
+        :param answers: returns whether a plan with a stamp [ns] answers an AV's request.
+        :param awaits: returns whether agents' states with a stamp [ns] can be used; None without
+            agents.
         """
         for av_id, plans in self._plans.items():
             plans.wanted = lambda stamp_ns, _frame, av_id=av_id: answers(av_id, stamp_ns)
@@ -98,7 +99,7 @@ class SimInputs:
 
     def pop_plan(self, av_id: str) -> JointSeries | None:
         """
-        Take an AV's plan, if one has come.
+        Return an AV's plan, None if none has come.
 
         :raises InputError: if the message is malformed.
         """
@@ -107,7 +108,7 @@ class SimInputs:
 
     def pop_perceived(self, av_id: str) -> JointSeries | None:
         """
-        Take the head of the request that perception has sent to an AV's planner, if one has come.
+        Return the head of perception's latest request to an AV's planner, None if there is none.
 
         :raises InputError: if the message is malformed.
         """
@@ -116,7 +117,7 @@ class SimInputs:
         return None if message is None else request_head(message, f'/{av_id}/plan_request')
 
     def pop_agents(self) -> list[JointSeries]:
-        """Take the agents' states that have come; a flood waits its turn."""
+        """Return the agents' states that have come; the rest of a flood waits."""
         taken: list[JointSeries] = []
         while self._agents is not None and len(taken) < MAX_AGENTS \
                 and (message := self._agents.pop()) is not None:
@@ -130,7 +131,7 @@ class SimInputs:
         return None if message is None else bool(message.data)
 
     def triggers(self) -> list[str]:
-        """Take the names of the events that have been triggered; a flood waits its turn."""
+        """Return the names of triggered events; the rest of a flood waits."""
         names: list[str] = []
         while len(names) < MAX_TRIGGERS and (message := self._triggers.pop()) is not None:
             names.append(str(message.data))
@@ -138,9 +139,9 @@ class SimInputs:
 
     def pass_task_reports(self, take: Callable[[TaskReport], str | None]) -> None:
         """
-        Hand over what pages have shown of tasks and drivers answered; a flood waits its turn.
+        Pass on the pages' task reports and the drivers' answers; the rest of a flood waits.
 
-        :param take: gives the reason for which it takes none, else None.
+        :param take: returns the reason for which it refuses a report, else None.
         """
         for _ in range(MAX_REPORTS):
             message = None if self._task_reports is None else self._task_reports.pop()
@@ -158,7 +159,7 @@ class SimInputs:
         for vehicle_id, slot in self._drivability.items():
             while (message := slot.pop()) is not None:
                 if from_time(message.header.stamp) < self._clock_offset_ns:
-                    # A verdict on the run before a reset.
+                    # A verdict on the run before the reset.
                     continue
                 for status in message.status:
                     values = read_status(status).values

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What sim_node tells of its planners and seats on /diagnostics."""
+"""The statuses of planners and seats that sim_node publishes on /diagnostics."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -18,22 +18,24 @@ MAX_REFUSALS_PER_REPORT = 5
 
 
 class LiveDiagnostics:
-    """Reports once a second, one subject a step, and refusals as they happen."""
+    """
+    The reports of sim_node: every second, one subject per step; refusals at once.
+    """
 
     def __init__(self, outputs: SimOutputs, simulation: Simulation, inputs: SimInputs) -> None:
         self._outputs = outputs
         self._simulation = simulation
         self._inputs = inputs
         self._refusals = 0
-        # What is still to be told of the second that has passed.
+        # Reports on the past second that are still to be published.
         self._waiting: deque[Callable[[], None]] = deque()
 
     def refusal(self, av_id: str, reason: str) -> None:
-        """Tell why a plan was refused."""
+        """Publish why a plan was refused."""
         self._refused(f'{av_id} plan refused', reason, {})
 
     def run_state(self, state: str, more: Mapping[str, object]) -> None:
-        """Tell whether the run is waiting, running, paused or ended."""
+        """Publish whether the run is waiting, running, paused or ended."""
         simulation = self._simulation
         self._outputs.publish_diagnostics(
             'run', DiagnosticStatus.OK, state,
@@ -41,17 +43,17 @@ class LiveDiagnostics:
             simulation.scheduler.stamp_ns(simulation.n))
 
     def late_traffic(self, n: int, k: int, agents_k: int) -> None:
-        """Tell that agents of an earlier tick had to do."""
+        """Publish that the agents of an earlier tick were used."""
         self._outputs.publish_diagnostics(
             'traffic', DiagnosticStatus.WARN, f'agents are {k - agents_k} scenario steps late',
             {'n': n, 'k': k, 'agents_k': agents_k}, self._simulation.scheduler.stamp_ns(n))
 
     def event_refused(self, name: str, reason: str) -> None:
-        """Tell why a trigger brought nothing about."""
+        """Publish why a trigger had no effect."""
         self._refused('event refused', reason, {'event': name[:40]})
 
     def order_refused(self, reason: str) -> None:
-        """Tell why a seat is not driven by whom somebody named."""
+        """Publish why an order about a seat was refused."""
         self._refused('seat order refused', reason, {})
 
     def _refused(self, subject: str, reason: str, values: Mapping[str, object]) -> None:
@@ -76,7 +78,7 @@ class LiveDiagnostics:
             *(partial(self._publish_seat, seat) for seat in self._inputs.seats.all)))
 
     def publish_next(self) -> bool:
-        """Return what is next of the report, if there is anything left; tell whether there was."""
+        """Publish the next part of the report; return whether one was left."""
         if not self._waiting:
             return False
         self._waiting.popleft()()
@@ -109,7 +111,7 @@ class LiveDiagnostics:
 
 
 def _tracking(av: AutonomousVehicle) -> dict[str, object]:
-    """Return how far a tracked AV is from its route's lane and its plan, now and at worst."""
+    """Return the present and largest deviations of a tracked AV from its route's lane and plan."""
     execution = av.execution
     if execution is None:
         return {}

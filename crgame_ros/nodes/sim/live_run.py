@@ -36,18 +36,18 @@ NS_PER_S = 1_000_000_000
 # How often the executor looks for service calls [Hz], and the least time left for it [ns].
 SERVICE_RATE = 20.0
 SERVICE_SLACK_NS = 1_500_000
-# The scheduler wakes a sleeper this much late at best [ns]; the rest is waited for awake.
+# The scheduler wakes a sleeping thread at least this late [ns]; the rest of the wait is busy.
 WAKE_UP_NS = 120_000
-# Reading a driver's command takes so long [ns]; where steps are long it is done before their time.
+# Time to read a driver's command [ns]; where steps are long, it is read before they are due.
 READ_NS, LONG_STEP_S = 100_000, 5e-3
 
 
 class Pacer:
     """
-    Waits for each cycle's time on the steady clock, and serves orders where there is time for it.
+    The pacer of the loop: it waits for each cycle on the steady clock and serves orders meanwhile.
 
     :param executor: runs the services.
-    :param controller: knows when cycles are due.
+    :param controller: computes when cycles are due.
     :param dt_s: nominal step [s]
     """
 
@@ -55,11 +55,11 @@ class Pacer:
                  dt_s: float) -> None:
         self._executor = executor
         self._controller = controller
-        # At high rates half a step has to do, or nobody could ever stop the run.
+        # At high rates half a step must be enough, or no service could stop the run.
         self._slack_ns = min(SERVICE_SLACK_NS, 0.5 * dt_s * NS_PER_S)
         self._every = max(1, round(1.0 / dt_s / SERVICE_RATE))
         self._awake_ns = WAKE_UP_NS + (READ_NS if dt_s >= LONG_STEP_S else 0)
-        # When the present cycle was due, and since when it was waited for, steady clock [ns].
+        # Due time of the present cycle, and the start of the wait for it, steady clock [ns].
         self.due_ns = 0
         self.idle_from_ns = 0
 
@@ -67,13 +67,13 @@ class Pacer:
         """
         Serve orders now and then, and wait until the cycle after step n is due (CRG 11).
 
-        :param watch: is told what is done.
-        :param read: is told the time [ns] shortly before, to take in what has come by then.
+        :param watch: gets the phases of the cycle.
+        :param read: called with the time [ns] shortly before, to read the messages that have come.
         """
         self.due_ns = self._controller.deadline_ns()
         self.idle_from_ns = time.monotonic_ns()
         left_ns = self.due_ns - self.idle_from_ns
-        # A loop that is late all the time must be stoppable too.
+        # A loop that is always late must be stoppable too.
         if (left_ns > self._slack_ns and n % self._every == 0) \
                 or self._controller.serves_orders_now:
             watch.mark(Phase.SERVICES)
@@ -95,7 +95,7 @@ SETTLE_NS = 200_000_000
 
 class LiveRun:
     """
-    Paces one simulation against the steady clock.
+    One simulation, paced against the steady clock.
 
     :param node: the node that owns the endpoints.
     :param executor: runs its services.
@@ -103,7 +103,7 @@ class LiveRun:
     :param setup: the run.
     :param epoch: counts resets.
     :param clock_offset_ns: simulation time of step 0 [ns]
-    :param recorded: what drives seats as in a recording; None for nothing.
+    :param recorded: recorded inputs that drive seats; None for none.
     """
 
     def __init__(self, node: Node, executor: SingleThreadedExecutor, control: SimControl,
@@ -177,7 +177,7 @@ class LiveRun:
             self._outputs.wait_until_received()
 
     def hold_after_end(self) -> Outcome:
-        """Show how the run has ended until it is begun anew, or everything is to end."""
+        """Show the end of the run until a reset or a stop."""
         control = self._control
         control.over, control.stop_wanted = True, False
         self._state.stand()
@@ -196,13 +196,15 @@ class LiveRun:
         self._watch.close()
 
     def _settle(self) -> None:
-        """Let everybody take the new documents in before the first message that needs them."""
+        """
+        Wait until subscribers have the new documents, before messages that need them.
+        """
         until_ns = time.monotonic_ns() + SETTLE_NS
         while time.monotonic_ns() < until_ns:
             self._executor.spin_once(timeout_sec=0.02)
 
     def _wait_for_companions(self, result: StepResult) -> Outcome | None:
-        """Stay at step 0 until everybody is there, or an order ends it."""
+        """Stay at step 0 until all companions are connected, or an order ends the run."""
         control = self._control
         self._state.publish('waiting')
         heard = HeardTopics(Endpoints(self._node), self.simulation.scheduler.clock_offset_ns) \
@@ -242,7 +244,7 @@ class LiveRun:
         return None
 
     def _end_on_violation(self) -> None:
-        """End the run if a human's violation says so, and record where it did."""
+        """End the run if a human's violation requires it, and record where."""
         stop = self._inputs.stop_request()
         if stop is None:
             return
@@ -257,14 +259,14 @@ class LiveRun:
         self._reason = f'drivability of {vehicle_id}'
 
     def _answers(self, av_id: str, stamp_ns: int) -> bool:
-        """Return whether a plan answers a request; others are refused, however many there are."""
+        """Return whether a plan answers a request; any number of others is refused."""
         reason = self.simulation.unasked_plan(av_id, stamp_ns)
         if reason is not None:
             self._diagnostics.refusal(av_id, reason)
         return reason is None
 
     def _accept_plan(self, av_id: str) -> bool:
-        """Offer an AV the plan that has come for it; tell whether it was accepted."""
+        """Pass an AV its new plan; return whether it was accepted."""
         try:
             perceived = self._inputs.pop_perceived(av_id)
             reason = None if perceived is None else self.simulation.request_perceived(
@@ -282,7 +284,7 @@ class LiveRun:
         return reason is None
 
     def _apply_orders(self, now_ns: int) -> None:
-        """Obey who is to drive what, and which planners are to go or stop."""
+        """Apply the orders about seats, and those that start or stop planners."""
         changed, refusals = self._inputs.seats.apply_orders(now_ns)
         if changed:
             self._publish_seats()
@@ -298,7 +300,7 @@ class LiveRun:
         self._outputs.publish_seats(self._inputs.seats.document(), self._spells.document())
 
     def _queue_triggers(self) -> None:
-        """Hand the events over that somebody triggered since the last tick."""
+        """Pass on the events triggered since the last tick."""
         for name in self._inputs.triggers():
             if (reason := self.simulation.trigger(name)) is not None:
                 self._diagnostics.event_refused(name, reason)
@@ -311,7 +313,7 @@ class LiveRun:
                 self._controller.resume(time.monotonic_ns(), self._control.real_time_factor)
                 self._watch.begin()
             self._pacer.wait(self.simulation.n, self._watch, self._inputs.seats.listen)
-            # Looked at last, so that a verdict on state n ends the run at n.
+            # Checked last, so that a verdict on state n ends the run at n.
             outcome = self._ordered_end()
             if outcome is not None:
                 return outcome
@@ -344,7 +346,7 @@ class LiveRun:
         for av in simulation.avs:
             self._accept_plan(av.setup.id)
         self._apply_orders(start_ns)
-        # A recorded human moves over the recorded intervals, whatever this machine is busy with.
+        # A recorded human moves over the recorded intervals, however busy this machine is.
         cycle = self._controller.begin_cycle(start_ns, inputs.seats.interval_s(simulation.n))
         factor = self._controller.real_time_factor
         causes, late_in = watch.explain(self._pacer.due_ns, cycle.step_error_s, factor)
@@ -376,7 +378,7 @@ class LiveRun:
                          simulation.command_rows, causes, late_in)
 
     def _at_tick(self, result: StepResult) -> None:
-        """Do what is due with the scenario's time."""
+        """Do the work of a scenario tick."""
         if result.agents_k is not None and result.agents_k < result.k:
             self._diagnostics.late_traffic(result.n, result.k, result.agents_k)
         order = self._inputs.frame_skip_order()
@@ -384,7 +386,7 @@ class LiveRun:
             self._outputs.frames_skipped = order and self._setup.game.timing.frame_skipping
 
     def _report(self, n: int) -> None:
-        """Tell how the run is, little by little, in steps that have no tick's work to do."""
+        """Publish the state of the run, part by part, in steps without a tick's work."""
         self._state.publish('running')
         if not self._diagnostics.publish_next() and n >= self._report_n:
             self._report_n = n + self._second

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What sim_node publishes: built once for a game, refilled at every step."""
+"""The messages of sim_node: built once for a game, refilled at every step."""
 
 from collections.abc import Sequence
 import json
@@ -39,12 +39,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 
-# For all acknowledgements together: a process that is stopped never gives one.
+# Time limit for all acknowledgements together: a stopped process never sends one [s].
 ACKNOWLEDGE_S = 2.0
 
 
 class VehicleOutputs:
-    """Convenience topics of one driven vehicle, filled only while somebody subscribes."""
+    """Convenience topics of one driven vehicle, filled only while there are subscribers."""
 
     def __init__(self, endpoints: Endpoints, vehicle_id: str) -> None:
         self.publishers = [endpoints.publisher(name, vehicle_id)
@@ -60,12 +60,12 @@ class VehicleOutputs:
         self._accel.header.frame_id = f'{vehicle_id}/base_link'
 
     def count_subscribers(self) -> None:
-        """Find out whether anybody listens."""
+        """Check which topics have subscribers."""
         self._listened_to = [item.get_subscription_count() > 0 for item in self.publishers]
         self.wanted = any(self._listened_to)
 
     def publish(self, state: VehicleState, stamp_ns: int) -> None:
-        """Publish the vehicle's state in the types that ROS tools expect."""
+        """Publish the vehicle's state in standard ROS types."""
         for_odom, for_joints, for_accel = self._listened_to
         if for_odom:
             odom = self._odom
@@ -102,7 +102,7 @@ class SimOutputs:
         self.publish_every = steps_between_messages(setup.game.timing.rate)
         self._clock = endpoints.publisher('/clock')
         self._state = endpoints.publisher('/vehicles/state')
-        # For those who need no more: each reader of each step costs the loop.
+        # For nodes that need ticks only: each reader of each step costs the loop time.
         self._tick_state = endpoints.publisher('/vehicles/tick_state')
         self._objects = endpoints.publisher('/traffic/objects')
         self._cycle = endpoints.publisher('/timing/cycle')
@@ -111,7 +111,7 @@ class SimOutputs:
             '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', STATE_TOPIC)}
         self._task_log = endpoints.publisher(LOG_TOPIC)
         self._diagnostics = endpoints.diagnostics
-        # Where perception stands between, it makes the plan request of the true one.
+        # With perception, its node builds the plan request from the true one.
         self._request_topics = {
             av.id: '/<av>/true_request' if av.spec.perception else '/<av>/plan_request'
             for av in setup.avs}
@@ -158,7 +158,7 @@ class SimOutputs:
             self._latched[name].publish(String(data=text))
 
     def publish_seats(self, seats: str, drivers: str) -> None:
-        """Publish who drives what now, and who has driven so far."""
+        """Publish the present drivers of the seats, and all drivers so far."""
         self._latched['/seats'].publish(String(data=seats))
         self._latched['/seats/drivers'].publish(String(data=drivers))
 
@@ -168,27 +168,27 @@ class SimOutputs:
             String(data=events_document(self._epoch, fired)))
 
     def publish_tasks(self, simulation: Simulation, result: StepResult) -> None:
-        """Publish what has happened in the game's tasks, and how they stand."""
+        """Publish the new events of the game's tasks, and their state."""
         self._latched[STATE_TOPIC].publish(String(data=state_document(
             self._epoch, simulation.tasks_running, simulation.prompts)))
         self._task_log.publish(String(data=log_document(self._epoch, result.tasks)))
 
     def shows_vehicles(self, simulation: Simulation) -> bool:
-        """Return whether anybody is to see where the vehicles have moved to, each by itself."""
+        """Return whether the vehicles' own topics are to be published at this step."""
         return not self.frames_skipped and any(item.wanted for item in self._vehicles) and (
             simulation.n % self.publish_every == 0 or simulation.scheduler.is_tick(simulation.n))
 
     def publish_vehicles(self, simulation: Simulation) -> None:
-        """Publish each vehicle by itself, before all else: drivers see in it what they did."""
+        """Publish each vehicle's own topics, before all else: drivers see their action in them."""
         stamp_ns = simulation.scheduler.stamp_ns(simulation.n)
         for vehicle, state in zip(self._vehicles, simulation.states, strict=True):
             if vehicle.wanted:
                 vehicle.publish(state, stamp_ns)
 
     def publish_step(self, simulation: Simulation, result: StepResult) -> None:
-        """Publish a step: requests first, for planners have the least time to lose."""
+        """Publish a step: requests first, because planners have the least time."""
         if result.fired:
-            # It may change the planner that the request is for.
+            # An event may change the planner that the request is for.
             self.publish_events(simulation.fired)
             for event in result.fired:
                 self._node.get_logger().info(
@@ -211,11 +211,11 @@ class SimOutputs:
 
     @property
     def listeners(self) -> int:
-        """How many have subscribed to the states."""
+        """Return the number of subscribers to the states."""
         return int(self._state.get_subscription_count())
 
     def resend_world(self, simulation: Simulation) -> None:
-        """Publish the present world again to those who may not have been there."""
+        """Publish the present world again for subscribers that may have missed it."""
         scheduler, n = simulation.scheduler, simulation.n
         self._publish_objects(simulation.objects,
                               scheduler.stamp_ns(n - n % scheduler.steps_per_tick))
@@ -228,13 +228,13 @@ class SimOutputs:
         self._objects.publish(message.stamp(stamp_ns))
 
     def publish_clock(self, stamp_ns: int) -> None:
-        """Publish the time of a step; again, if drivers may not have heard it."""
+        """Publish the time of a step; repeat it if drivers may have missed it."""
         self._diagnostics.now_ns = stamp_ns
         set_time(self._clock_message.clock, stamp_ns)
         self._clock.publish(self._clock_message)
 
     def resend(self, av_id: str, result: StepResult) -> None:
-        """Send a request again to a planner that may not have been there the first time."""
+        """Publish a request again to a planner that may have missed it."""
         self._publish_request(av_id, result.requests[av_id])
 
     def _publish_request(self, av_id: str, request: JointSeries) -> None:
@@ -281,7 +281,7 @@ class SimOutputs:
 
     def missing(self, companions: Sequence[str]) -> set[str]:
         """
-        Find the companions that are not connected to a topic of each step that they consume.
+        Find the companions that are not connected to a per-step topic that they consume.
 
         :param companions: names of nodes, `planner_node_av0`, or of their executables.
         """
@@ -301,12 +301,14 @@ class SimOutputs:
         return found
 
     def _requests_as(self, name: str) -> dict[str, Publisher]:
-        """Return the publishers of requests that go out under a name."""
+        """Return the publishers of requests on a topic."""
         return {av: publisher for av, publisher in self._requests.items()
                 if self._request_topics[av] == name}
 
     def _connected(self, publisher: Publisher, expected: set[str]) -> set[str]:
-        """Find who is connected to a topic; all or none, for the middleware tells no names."""
+        """
+        Return the companions connected to a topic: all or none, as DDS gives no names.
+        """
         names = [info.node_name for info in
                  self._node.get_subscriptions_info_by_topic(publisher.topic_name)]
         if publisher.get_subscription_count() < len(names):

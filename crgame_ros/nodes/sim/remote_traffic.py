@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Agents of traffic that traffic_node moves, as sim_node uses them."""
+"""The agents that traffic_node moves, as sim_node uses them."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -15,16 +15,16 @@ import numpy as np
 if TYPE_CHECKING:
     from crgame_ros.traffic.world_view import WorldView
 
-# Agents whose states are late go on for so long, and then brake to a stop [s], [m/s^2].
+# Agents with late states go on for this long [s], then brake to a stop [m/s^2].
 ROLLS_ON_S = 0.5
 DECELERATION = 3.0
 
 
 class RemoteTraffic:
     """
-    The states on `/traffic/agents`, and what stands in for them while they are late.
+    The states on `/traffic/agents`, and substitutes for them while they are late.
 
-    :param take: gives what has come.
+    :param take: returns the states that have come.
     :param traffic: the agents at the first tick.
     :param scheduler: the run's time grids, with its clock offset.
     """
@@ -37,17 +37,17 @@ class RemoteTraffic:
         self._scheduler = scheduler
         self._shown = traffic.make().states
         self._k = scheduler.k0
-        # The tick for which states were asked last.
+        # The tick for which states were last requested.
         self._now = self._k
         self._waiting: dict[int, ObjectStates] = {}
 
     def wants(self, stamp_ns: int) -> bool:
-        """Return whether states with such a stamp may be of use; those that are late are not."""
+        """Return whether states with this stamp can be used; late ones cannot."""
         n = self._scheduler.tick_of_stamp(stamp_ns)
         return n is not None and self._now <= self._scheduler.k(n) <= self._now + 2
 
     def states_for(self, k: int) -> tuple[ObjectStates, int]:
-        """Return the agents at tick k, and the tick of the latest states that have come."""
+        """Return the agents at tick k, and the tick of the latest received states."""
         self._now = k
         for series in self._take():
             self._keep(series, k)
@@ -66,13 +66,13 @@ class RemoteTraffic:
         return self._k + 1 in self._waiting
 
     def publish(self, view: 'WorldView') -> None:
-        """Tell nothing: traffic_node reads the published world."""
+        """Do nothing: traffic_node reads the published world."""
 
     def obey(self, order: TrafficOrder) -> None:
-        """Tell nothing: traffic_node reads the published events."""
+        """Do nothing: traffic_node reads the published events."""
 
     def _keep(self, series: JointSeries, k: int) -> None:
-        """Keep states for this tick or a later one; others are of no use any more."""
+        """Keep states for this tick or a later one; discard others."""
         n = self._scheduler.tick_of_stamp(series.stamp_ns)
         if n is None or series.names != self._names or len(series.times_ns) != 1:
             return
@@ -83,7 +83,7 @@ class RemoteTraffic:
 
 
 def _gone_on(states: ObjectStates, late: int, time_step_s: float) -> ObjectStates:
-    """Move agents one tick on that have been late for so many ticks."""
+    """Move agents one tick on; their states have been late for `late` ticks."""
     velocities = states.velocities.copy()
     if late * time_step_s > ROLLS_ON_S:
         speed = np.hypot(velocities[:, 0], velocities[:, 1])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What people are told of a run: its state, and its world while that stands still."""
+"""The published state of a run, and its world while that stands still."""
 
 from enum import auto, Enum
 import time
@@ -10,7 +10,7 @@ from crgame_ros.nodes.sim.live_diagnostics import LiveDiagnostics
 from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.simulation.engine import Simulation
 
-# It was to end with everything else.
+# The whole program was asked to end.
 SIGNAL = 'signal'
 
 
@@ -22,25 +22,25 @@ class Outcome(Enum):
     STOPPED = auto()
 
     def reason(self, by_signal: bool) -> str:
-        """Return it in a word: duration, reset, stop, or signal."""
+        """Return the reason as a word: duration, reset, stop or signal."""
         if self is Outcome.STOPPED:
             return SIGNAL if by_signal else 'stop'
         return 'duration' if self is Outcome.FINISHED else 'reset'
 
 
 NS_PER_S = 1_000_000_000
-# Discovery is not the same on both sides for up to a second or two.
+# The two sides may discover each other up to two seconds apart.
 NEWCOMERS_NS = 3 * NS_PER_S
 
 
 class RunState:
     """
-    Tells how a run stands: waiting, running, paused or ended.
+    The state of a run: waiting, running, paused or ended.
 
     :param outputs: of the run.
-    :param simulation: whose world is shown.
+    :param simulation: the source of the world shown.
     :param diagnostics: carry the state.
-    :param control: knows the factor of time, and whom the run awaits.
+    :param control: holds the real-time factor and the awaited seats.
     """
 
     def __init__(self, outputs: SimOutputs, simulation: Simulation, diagnostics: LiveDiagnostics,
@@ -56,9 +56,9 @@ class RunState:
 
     def publish(self, state: str, reason: str = '') -> None:
         """
-        Tell a new state at once, and the present one every second.
+        Publish a new state at once, and the present one every second.
 
-        :param reason: why it has ended.
+        :param reason: why the run has ended.
         """
         now_ns, news = time.monotonic_ns(), (
             state, reason, self._control.awaited, self._control.countdown_s)
@@ -71,14 +71,14 @@ class RunState:
                 'countdown_s': self._control.countdown_s})
 
     def stand(self) -> None:
-        """Begin to stand still: those who listen now have seen this world."""
+        """Note that the run stands still and that the present subscribers have seen its world."""
         self._listeners = self._outputs.listeners
 
     def show_newcomers(self) -> None:
         """
-        Send the world that stands still to who has come since it was published.
+        Publish the world that stands still again for new subscribers.
 
-        Who has just come may not hear the first message yet: it is told again for a while.
+        A new subscriber may miss the first message, so it is repeated for a while.
         """
         now_ns = time.monotonic_ns()
         listeners = self._outputs.listeners

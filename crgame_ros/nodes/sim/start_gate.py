@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Holding a run at step 0 until everybody who takes part in it is there."""
+"""Holding a run at step 0 until all of its participants are ready."""
 
 from collections.abc import Callable, Iterable, Sequence
 import math
@@ -14,31 +14,33 @@ from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.engine import Simulation, StepResult
 
 NS_PER_S = 1_000_000_000
-# A planner may be at work on the first request: it is not asked again at once [ns].
+# A planner may still be working on the first request, so it is not repeated at once [ns].
 ASK_AGAIN_NS = NS_PER_S // 2
-# A driver's node answers the clock within milliseconds, once it has heard it [ns].
+# A driver's node answers the clock within milliseconds of receiving it [ns].
 CLOCK_AGAIN_NS = NS_PER_S // 10
-# For drivers that have no device (yet) the run doesn't wait any longer [ns].
+# The run waits this long for drivers without a device [ns].
 DRIVER_PATIENCE_NS = 3 * NS_PER_S
 
 
 class StartGate:
     """
-    Publishes step 0 once all companions are connected, then waits for plans and commands.
+    The gate that publishes step 0 once all companions are connected, then awaits plans and
+    commands.
 
     Discovery is not the same on both sides: a subscription that the publisher knows may itself
-    not know the publisher yet, for up to a second. Answers prove that both do; of what companions
-    say to the recorder, it tells itself.
+    not know the publisher yet, for up to a second. Answers prove that both do. The recorder itself
+    reports which companions it has heard.
 
     :param outputs: of the run.
     :param inputs: of the run.
     :param simulation: at step 0.
     :param result: its first result.
     :param companions: nodes that must be connected, as `SimOutputs.missing` takes them.
-    :param take_plan: offers an AV the plan that has come; tells whether it was accepted.
-    :param say: tells people something in one line.
-    :param traffic_answers: tells whether the agents of the next tick have come; None without any.
-    :param heard: what the recorder has heard; None where none is waited for.
+    :param take_plan: passes an AV its new plan; returns whether it was accepted.
+    :param say: logs a line.
+    :param traffic_answers: returns whether the agents of the next tick have come; None without
+        any.
+    :param heard: the topics that the recorder has received; None without a recorder to wait for.
     """
 
     def __init__(self, outputs: SimOutputs, inputs: SimInputs, simulation: Simulation,
@@ -59,7 +61,7 @@ class StartGate:
                        if seat.recording is None
                        and {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
         self._heard = heard
-        # Topics of others that are to be in the recording from the start, by vehicle.
+        # Topics of other nodes that must be recorded from the start, with their vehicles.
         self._unrecorded: dict[str, str] = {} if heard is None else {
             **{av_id: f'/{av_id}/plan' for av_id in self._planners},
             **{seat_id: f'/{seat_id}/driver_command' for seat_id in self._seats}}
@@ -70,10 +72,10 @@ class StartGate:
 
     def is_open(self, now_ns: int, timeout_s: float) -> bool:
         """
-        Look who has come since the last call, and tell whether the run can start.
+        Check which participants have come since the last call; return whether the run can start.
 
         :param now_ns: steady clock [ns]
-        :param timeout_s: after this long it starts without those who are missing [s]
+        :param timeout_s: after this long the run starts without those that are missing [s]
         """
         self._began_ns = self._began_ns or now_ns
         if not self._connected and not self._outputs.missing(self._companions):
@@ -106,7 +108,7 @@ class StartGate:
         if now_ns - self._asked_ns > ASK_AGAIN_NS:
             self._asked_ns = now_ns
             if self._traffic_answers is not None or self._seats:
-                # Agents and policies answer what they have seen.
+                # Agents and policies answer the world, once they have received it.
                 self._outputs.resend_world(self._simulation)
             for av_id in self._planners | (self._result.requests.keys() & self._unrecorded):
                 self._outputs.resend(av_id, self._result)
@@ -120,7 +122,7 @@ class StartGate:
             self._seats.clear()
 
     def _forget(self, seat_ids: Iterable[str]) -> None:
-        """Wait for no record of commands that may never come."""
+        """Stop waiting for the recording of commands that may never come."""
         for seat_id in seat_ids:
             self._unrecorded.pop(seat_id, None)
 
@@ -142,14 +144,14 @@ class StartGate:
 
 class ReadyGate:
     """
-    Holds a run at its first step for the people who will drive it from a page.
+    The gate that holds a run at its first step for the drivers at pages.
 
-    It begins when all of them have said that they are ready, or somebody starts it for all; in
-    either case once all have their hands on the controls, and after a countdown. Who lets go
-    during it stops it. A game without such drivers does not wait here.
+    The run begins when all of them are ready, or when one client starts it for all. In either case
+    all must have their hands on the controls, and a countdown follows. A driver that lets go
+    during the countdown stops it. A game without such drivers does not wait here.
 
     :param seats: of the run.
-    :param control: orders from outside; told who is awaited, and the countdown.
+    :param control: orders from outside; gets the awaited seats and the countdown.
     """
 
     def __init__(self, seats: Seats, control: SimControl) -> None:
@@ -163,13 +165,13 @@ class ReadyGate:
         Return whether the run begins now.
 
         :param now_ns: steady clock [ns]
-        :param others_ready: whether planners, traffic and devices are.
+        :param others_ready: whether planners, traffic and devices are ready.
         """
         control = self._control
         control.awaited = self._seats.awaited(now_ns)
         self._check_readiness()
         begins = others_ready and not control.awaited and not control.stands_still
-        # A step that is ordered during a pause is one at once.
+        # A step ordered during a pause begins at once.
         if not begins or control.paused or not self._seats.cockpit_seats:
             self._began_ns, control.countdown_s = None, 0
             return begins
@@ -180,7 +182,7 @@ class ReadyGate:
         return left_s <= 0.0
 
     def _check_readiness(self) -> None:
-        """Start when all are ready, and no longer when one of them has thought better of it."""
+        """Order the start when all are ready; withdraw it when one of them is no longer ready."""
         control, seats = self._control, self._seats.cockpit_seats
         ready = bool(seats) and all(seat.ready for seat in seats)
         if ready and not control.started:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Watching the loop: where the time of each late step went."""
+"""Measuring the loop: the causes of each late step."""
 
 from collections.abc import Sequence
 import gc
@@ -35,10 +35,10 @@ ON_TIME: tuple[Causes, Phase | None] = (NO_CAUSES, None)
 
 class StepWatch:
     """
-    Reads what the kernel counts of the loop's thread whenever a phase of its cycle begins.
+    The kernel's counters of the loop's thread, read whenever a phase of its cycle begins.
 
-    It belongs to the thread that makes it, which must be the main one: signals come to it. What
-    was read is looked at only if the step turns out late.
+    It belongs to the thread that creates it, which must be the main thread, because that gets the
+    signals. The readings are evaluated only if the step turns out late.
     """
 
     def __init__(self) -> None:
@@ -51,32 +51,32 @@ class StepWatch:
         self._collected_so_far_ns = 0
         self._continued = False
         self._stolen = self._counters.stolen()
-        # Who else wants to know of the signal.
+        # The previous handler of the signal.
         self._before: Any = None
 
     def __enter__(self) -> 'StepWatch':
-        """Begin to listen to collections, and to the signal that ends a stop."""
+        """Start observing garbage collections and the signal that ends a stop."""
         gc.callbacks.append(self._on_collection)
         self._before = signal.signal(signal.SIGCONT, self._on_continued)
         self.begin()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave the process as it was."""
+        """Restore the process's handlers."""
         gc.callbacks.remove(self._on_collection)
         signal.signal(signal.SIGCONT, self._before)
 
     def close(self) -> None:
-        """Read nothing any more."""
+        """Stop reading the counters."""
         self._counters.close()
 
     @property
     def tells_waiting(self) -> bool:
-        """Whether this kernel tells how long a thread waited for a processor."""
+        """Return whether this kernel counts how long a thread waits for a processor."""
         return self._counters.tells_waiting
 
     def begin(self) -> None:
-        """Begin anew: what has been until now, such as a pause, belongs to no step."""
+        """Start afresh: the time until now, such as a pause, belongs to no step."""
         self._phases.clear()
         self._counts.clear()
         self._collected_ns.clear()
@@ -95,7 +95,7 @@ class StepWatch:
     def explain(self, due_ns: int, late_s: float, factor: float
                 ) -> tuple[Causes, Phase | None]:
         """
-        Return why a cycle is late whose first phase was marked last, and forget the one before.
+        Return why the cycle whose first phase was marked last is late, and discard the one before.
 
         :param due_ns: when it should have begun, on the monotonic clock [ns]
         :param late_s: its step error e_n, on the run's time line [s]
@@ -131,7 +131,7 @@ class StepWatch:
             if phase is Phase.WAIT:
                 lasted_ns = max(0, after.wall_ns - max(due_ns, before.wall_ns))
             elif waited_ns is not None:
-                # In one phase the kernel may be late to count, not in all of them.
+                # The kernel may count late in one phase, but not in all of them.
                 slept_ns = min(asleep_ns, max(0, lasted_ns - waited_ns - computed_ns))
                 computed_ns = lasted_ns - waited_ns - slept_ns
                 asleep_ns -= slept_ns
@@ -143,7 +143,7 @@ class StepWatch:
 
     def _asleep_ns(self, counts: Sequence[ThreadCounts]) -> int:
         """
-        Return how long the thread slept outside of its wait [ns].
+        Return how long the thread slept outside its wait [ns].
 
         Its processor time is exact when it was put on a processor: after the wait before this
         cycle, and after the wait in it, unless there was no time for one.

@@ -37,7 +37,7 @@ export class Connection {
       () => this.#ping(), PING_EVERY_MS);
   }
 
-  /** Whether the server can be reached at this moment. */
+  /** Return whether the server can be reached at this moment. */
   get open() {
     return this.#socket?.readyState === WebSocket.OPEN;
   }
@@ -152,7 +152,7 @@ export class Connection {
 }
 
 /**
- * Give the socket beside a page: the replay of a past run has an address below the cockpit's.
+ * Return the socket beside a page: the replay of a past run has an address below the cockpit's.
  *
  * @param {Location} location of the page
  */

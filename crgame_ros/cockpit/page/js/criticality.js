@@ -52,7 +52,7 @@ export class CriticalityLog {
     this.#frames = [];
   }
 
-  /** How many steps are known. */
+  /** Return how many steps are known. */
   get length() {
     return this.#frames.length;
   }
@@ -73,7 +73,7 @@ export class CriticalityLog {
   }
 
   /**
-   * Give a vehicle's values over time.
+   * Return a vehicle's values over time.
    *
    * @param {number} index of the vehicle
    * @param {MeasureName} name
@@ -87,7 +87,7 @@ export class CriticalityLog {
   }
 
   /**
-   * Give what is left to a vehicle at a time.
+   * Return what is left to a vehicle at a time.
    *
    * @param {number} t [s]
    * @param {number} index of the vehicle
@@ -101,7 +101,7 @@ export class CriticalityLog {
   }
 
   /**
-   * Give the most critical value until a time.
+   * Return the most critical value until a time.
    *
    * @param {number} t [s]
    * @param {number} index of the vehicle

@@ -66,7 +66,7 @@ export class DisplayClock {
   }
 
   /**
-   * Give the simulation time to show.
+   * Return the simulation time to show.
    *
    * @param {number} now_ms wall time of the frame, which never goes back
    * @param {number} newest_t of the newest sample [s]

@@ -13,7 +13,7 @@ export const LIGHT_BUTTONS = /** @type {const} */ ([
 const BLINKS_PER_S = 1.5;
 
 /**
- * Give the lights that shine at a moment: indicators that are on blink in simulation time.
+ * Return the lights that shine at a moment: indicators that are on blink in simulation time.
  *
  * @param {number|undefined} lights the column; no number is none
  * @param {number} t simulation time [s]

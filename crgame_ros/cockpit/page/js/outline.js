@@ -3,7 +3,7 @@
 /** Outlines of lanelets, what they hold, and boxes around points: flat lists x0, y0, … [m]. */
 
 /**
- * Give the outline of a lanelet: its left bound and back along its right one.
+ * Return the outline of a lanelet: its left bound and back along its right one.
  *
  * @param {{left: number[], right: number[]}} lanelet with flat bounds
  * @returns {number[]} flat polygon
@@ -33,7 +33,7 @@ export function boxOf(points) {
 }
 
 /**
- * Tell whether a point is within a polygon.
+ * Return whether a point is within a polygon.
  *
  * @param {number[]} ring flat polygon
  * @param {number} x [m]

@@ -71,7 +71,7 @@ export class Perceived {
   }
 
   /**
-   * Give who an AV's planner has been told of.
+   * Return who an AV's planner has been told of.
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]
@@ -84,7 +84,7 @@ export class Perceived {
   }
 
   /**
-   * Give where an AV takes itself to be: the last estimate, moved on.
+   * Return where an AV takes itself to be: the last estimate, moved on.
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]
@@ -108,7 +108,7 @@ export class Perceived {
   }
 
   /**
-   * Give the newest scan of each sensor of an AV that is not too old.
+   * Return the newest scan of each sensor of an AV that is not too old.
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]

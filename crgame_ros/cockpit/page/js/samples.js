@@ -25,7 +25,7 @@ export class SampleRing {
     this.#spacing_s = spacing_s;
   }
 
-  /** How many samples there are. */
+  /** Return how many samples there are. */
   get length() {
     return this.#length;
   }

@@ -276,7 +276,7 @@ export class Store {
   }
 
   /**
-   * Give what is to be seen in an animation frame.
+   * Return what is to be seen in an animation frame.
    *
    * Vehicles are interpolated linearly in t between the samples around t, and moved on from the
    * newest where that is late; objects stand at pose + velocity * (t - t of their step).
@@ -304,7 +304,7 @@ export class Store {
   }
 
   /**
-   * Give a vehicle's past for plots.
+   * Return a vehicle's past for plots.
    *
    * @param {number} index of the vehicle in the scene
    * @param {number} seconds how far back, at most 120 s

@@ -54,12 +54,12 @@ export class InstantReplay {
     });
   }
 
-  /** Whether it shows the past now. */
+  /** Return whether it shows the past now. */
   get isOpen() {
     return !this.#root.hidden;
   }
 
-  /** Whether there is a past to show, and no present that it would hide. */
+  /** Return whether there is a past to show, and no present that it would hide. */
   get isPossible() {
     return this.#store.samples.length > 1 && this.#store.status?.run !== 'running';
   }

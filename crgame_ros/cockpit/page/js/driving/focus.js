@@ -8,7 +8,7 @@ const EDITABLE = 'input:not([type=checkbox]):not([type=radio]):not([type=button]
   + 'select, textarea, [contenteditable=""], [contenteditable=true]';
 
 /**
- * Tell whether keys pressed at this element belong to it.
+ * Return whether keys pressed at this element belong to it.
  *
  * @param {EventTarget|null} target
  * @returns {boolean}

@@ -43,7 +43,7 @@ class Device {
     }
   }
 
-  /** Whether somebody moved something clearly since the device was connected. */
+  /** Return whether somebody moved something clearly since the device was connected. */
   get moved() {
     /** @type {(values: number[], base: number[]) => boolean} */
     const differs = (values, base) => values.some((v, i) => Math.abs(v - (base[i] ?? 0)) > MEANT);

@@ -29,7 +29,7 @@ export function sampleOf(pad) {
 }
 
 /**
- * Give the mapping that fits a device which nobody has calibrated.
+ * Return the mapping that fits a device which nobody has calibrated.
  *
  * @param {Gamepad} pad in its first state: Logitech pedals rest at +1.
  * @returns {Profile}
@@ -208,7 +208,7 @@ export function rawValue(sample, control) {
 }
 
 /**
- * Give a pedal's share of its travel.
+ * Return a pedal's share of its travel.
  *
  * @param {Sample} sample
  * @param {Control} control
@@ -220,7 +220,7 @@ export function pedalValue(sample, control) {
 }
 
 /**
- * Give the steering.
+ * Return the steering.
  *
  * @param {Sample} sample
  * @param {Control} control
@@ -245,7 +245,7 @@ function beyond(share, deadzone) {
 }
 
 /**
- * Give the gear after a button changed.
+ * Return the gear after a button changed.
  *
  * @param {GearButtons} buttons
  * @param {boolean} reverse the gear before.

@@ -50,7 +50,7 @@ export class SpeedLimits {
   }
 
   /**
-   * Give the limit of the lane that is driven on; at a crossing, of the one that leads the
+   * Return the limit of the lane that is driven on; at a crossing, of the one that leads the
    * vehicle's way.
    *
    * @param {number} x of the vehicle [m]

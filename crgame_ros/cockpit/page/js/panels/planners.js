@@ -153,7 +153,7 @@ function makeRow(av, connection) {
 }
 
 /**
- * How far a tracked AV is from its lane and its plan: now, and at worst so far.
+ * Return how far a tracked AV is from its lane and its plan: now, and at worst so far.
  *
  * @param {PlannerStatus['tracking']|undefined} tracking
  */

@@ -40,7 +40,7 @@ export class RunResult {
   }
 
   /**
-   * Give it.
+   * Return it.
    *
    * @param {Status} status
    * @param {Scene} scene
@@ -70,7 +70,7 @@ export class RunResult {
   }
 
   /**
-   * Give the score of the run, once its recording is closed and the server has told it.
+   * Return the score of the run, once its recording is closed and the server has told it.
    *
    * @param {Status} status
    * @param {Files|null} files

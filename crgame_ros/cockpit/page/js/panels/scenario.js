@@ -288,7 +288,7 @@ class ScenarioPanel {
 }
 
 /**
- * Whether several people are to say that they are ready.
+ * Return whether several people are to say that they are ready.
  *
  * @param {Store} store
  */

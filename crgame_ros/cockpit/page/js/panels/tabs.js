@@ -114,7 +114,7 @@ function addHandle(root) {
 }
 
 /**
- * Give the keys back to the car after a click: the space bar brakes, and would press a button
+ * Return the keys back to the car after a click: the space bar brakes, and would press a button
  * that kept the focus; arrows would move a choice. Whoever walks by keyboard keeps the focus.
  *
  * @param {Document} scope

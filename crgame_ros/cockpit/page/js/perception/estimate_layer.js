@@ -70,7 +70,7 @@ export class EstimateLayer {
 }
 
 /**
- * Give the ellipse of two standard deviations of a covariance.
+ * Return the ellipse of two standard deviations of a covariance.
  *
  * @param {{xx: number, xy: number, yy: number}} covariance [m^2]
  * @returns {Ellipse}

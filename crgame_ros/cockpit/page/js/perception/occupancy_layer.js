@@ -62,7 +62,7 @@ export class OccupancyLayer {
   }
 
   /**
-   * Give the finest level whose cells are large enough on the screen.
+   * Return the finest level whose cells are large enough on the screen.
    *
    * @param {number} cell_px
    * @returns {Level}

@@ -94,7 +94,7 @@ class Perception {
       .map(({ id }) => id);
   }
 
-  /** How many fans of rays are drawn. */
+  /** Return how many fans of rays are drawn. */
   get fans() {
     return this.#shows('rays') ? this.#rays.drawn : 0;
   }
@@ -104,7 +104,7 @@ class Perception {
     return this.#shows('estimate') ? this.#estimate.drawn : null;
   }
 
-  /** How many occupied cells are on the map as drawn last. */
+  /** Return how many occupied cells are on the map as drawn last. */
   get occupied() {
     return this.#shows('occupancy') ? this.#occupancy.drawn : 0;
   }

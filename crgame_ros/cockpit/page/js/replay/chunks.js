@@ -81,7 +81,7 @@ export class Chunks {
     this.#refused = refused;
   }
 
-  /** How many chunks are in memory. */
+  /** Return how many chunks are in memory. */
   get size() {
     return this.#chunks.size;
   }

@@ -89,12 +89,12 @@ export class Player {
     return this.#run.k0 + Math.floor(this.n / this.#run.steps_per_tick);
   }
 
-  /** Whether the time moves. */
+  /** Return whether the time moves. */
   get playing() {
     return this.#playing;
   }
 
-  /** Whether what is to be shown has not come yet. */
+  /** Return whether what is to be shown has not come yet. */
   get loading() {
     return this.#jumped;
   }
@@ -108,7 +108,7 @@ export class Player {
     this.#speed = Math.min(Math.max(value, SLOWEST), FASTEST);
   }
 
-  /** How many chunks are in memory. */
+  /** Return how many chunks are in memory. */
   get chunksHeld() {
     return this.#feed?.chunksHeld ?? 0;
   }

@@ -56,7 +56,7 @@ export class ReplayFeed {
     store.criticality = log;
   }
 
-  /** How many chunks are in memory. */
+  /** Return how many chunks are in memory. */
   get chunksHeld() {
     return this.#chunks.size;
   }
@@ -81,7 +81,7 @@ export class ReplayFeed {
   }
 
   /**
-   * Give the store what is to be seen at a time.
+   * Return the store what is to be seen at a time.
    *
    * @param {number} t simulation time [s]
    * @returns {number} the time that is shown: that of a state that is as good as there, else t;
@@ -105,7 +105,7 @@ export class ReplayFeed {
   }
 
   /**
-   * Give a vehicle's motion around the shown time, as `Store.history` does.
+   * Return a vehicle's motion around the shown time, as `Store.history` does.
    *
    * @param {number} index of the vehicle
    * @param {number} seconds how far back

@@ -104,7 +104,7 @@ function wheelsOf({ shape, wheelbase }, rows, at) {
 }
 
 /**
- * Tell whether a way crosses a line.
+ * Return whether a way crosses a line.
  *
  * @param {number[]} line flat
  * @param {Point} from

@@ -91,17 +91,17 @@ export class Sound {
     this.#tell();
   }
 
-  /** Whether the game lets pages sound and gamepads rumble. */
+  /** Return whether the game lets pages sound and gamepads rumble. */
   get allowed() {
     return this.#store.scene?.sound !== 'none';
   }
 
-  /** Whether there is sound as soon as there is something to be heard. */
+  /** Return whether there is sound as soon as there is something to be heard. */
   get on() {
     return this.wanted && this.allowed && this.#speaker.begun;
   }
 
-  /** Whether the gamepad that drives, or any if none does, has motors. */
+  /** Return whether the gamepad that drives, or any if none does, has motors. */
   get canRumble() {
     return this.#pads().some((pad) => actuatorOf(pad) !== null);
   }
@@ -204,7 +204,7 @@ export class Sound {
       && document.visibilityState === 'visible';
   }
 
-  /** Whether the hands of this page are on the controls of a seat. */
+  /** Return whether the hands of this page are on the controls of a seat. */
   get #drives() {
     const { driving } = window.crgame;
     return driving !== undefined && driving.seat !== null && driving.away === null;

@@ -29,7 +29,7 @@ export class Speaker {
     this.#changed = changed;
   }
 
-  /** Whether the browser has let it begin. */
+  /** Return whether the browser has let it begin. */
   get begun() {
     return this.#context !== null && (this.#context.state === 'running' || this.#idle);
   }

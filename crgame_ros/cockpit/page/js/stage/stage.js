@@ -183,7 +183,7 @@ export class Stage {
     this.#refusal = ok ? '' : text;
   }
 
-  /** Whether it is in an AV that nobody here has taken over: then its planner drives. */
+  /** Return whether it is in an AV that nobody here has taken over: then its planner drives. */
   get #rides() {
     return !this.#has && this.#isAutonomous;
   }
@@ -201,7 +201,7 @@ export class Stage {
       ({ id }) => id === this.address.seat)?.role === 'autonomous';
   }
 
-  /** Whether it still has the AV that it took over in the run before this one. */
+  /** Return whether it still has the AV that it took over in the run before this one. */
   get #staysBehind() {
     return this.#has && this.#isAutonomous && this.#store.status?.n === 0;
   }

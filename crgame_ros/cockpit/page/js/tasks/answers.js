@@ -13,7 +13,7 @@ export const ANSWER_KEY = 'Enter';
 const FRESH_MS = 200;
 
 /**
- * Tell whether a button has another meaning.
+ * Return whether a button has another meaning.
  *
  * @param {Profile} profile of its device
  * @param {number} index of the button

@@ -31,7 +31,7 @@ export class RequestTone {
     window.addEventListener('pointerdown', begin, true);
   }
 
-  /** Whether it sounds now. */
+  /** Return whether it sounds now. */
   get sounds() {
     return this.#sounding.length > 0;
   }

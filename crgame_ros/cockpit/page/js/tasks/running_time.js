@@ -7,7 +7,7 @@ export class RunningTime {
   #paused_ms = 0;
   #since_ms = NaN;
 
-  /** Whether the run stands still, as far as the page knows. */
+  /** Return whether the run stands still, as far as the page knows. */
   get stands() {
     return !Number.isNaN(this.#since_ms);
   }

@@ -15,7 +15,7 @@ const TALLEST = 95 * DEGREE;
  */
 
 /**
- * Give the angle that a picture has in height when it has one in width.
+ * Return the angle that a picture has in height when it has one in width.
  *
  * @param {number} across [rad]
  * @param {number} aspect width through height
@@ -26,7 +26,7 @@ export function heightAngle(across, aspect) {
 }
 
 /**
- * Give the angle under which the driver sees the picture on the screen, its middle in front.
+ * Return the angle under which the driver sees the picture on the screen, its middle in front.
  *
  * @param {Seat} seat
  * @param {number} share of the screen's width that the picture has

@@ -30,7 +30,7 @@ const BEAM_SEEN_M = 60;
 const SHARED_M = 20;
 
 /**
- * Tell whether people drive with their lights on.
+ * Return whether people drive with their lights on.
  *
  * @param {Environment} environment
  * @returns {boolean}

@@ -30,7 +30,7 @@ export class KeyAnswer {
   }
 
   /**
-   * Tell whether a picture may show the answer.
+   * Return whether a picture may show the answer.
    *
    * @param {number} t simulation time that it would show [s]
    * @returns {boolean} false too once there have been enough

@@ -13,7 +13,7 @@
 /** @typedef {{x: number, y: number}} Origin in the map's coordinates [m] */
 
 /**
- * Give the origin of a scene: always the same one for the same scene.
+ * Return the origin of a scene: always the same one for the same scene.
  *
  * @param {Pick<Scene, 'bounds'>} scene the scene document
  * @returns {Origin} whole metres, amid the map; local x = map x - origin x

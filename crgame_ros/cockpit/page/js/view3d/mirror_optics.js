@@ -43,7 +43,7 @@ export const MIRRORS = Object.freeze([
  */
 
 /**
- * Give the camera of a mirror.
+ * Return the camera of a mirror.
  *
  * The glass stands across the line on which the driver sees its middle. The eye at distance d has
  * its image behind the glass at 1/d' = 1/d + 2/R (the mirror equation for a far eye, f = -R/2).

@@ -119,7 +119,7 @@ export class Mirrors {
   }
 
   /**
-   * Give each mirror's camera and place on the screen.
+   * Return each mirror's camera and place on the screen.
    *
    * @returns {{name: string, camera: PerspectiveCamera, rectangle: Rectangle}[]}
    */

@@ -107,7 +107,7 @@ export class Picture {
     }
   }
 
-  /** Whether the graphics card took back what it had given. */
+  /** Return whether the graphics card took back what it had given. */
   get lost() {
     return this.#renderer.getContext().isContextLost();
   }

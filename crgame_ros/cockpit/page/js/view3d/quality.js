@@ -52,7 +52,7 @@ const SLOWEST_MS = 50;
 const SOFTWARE_NAMES = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /**
- * Tell whether a renderer is no graphics card.
+ * Return whether a renderer is no graphics card.
  *
  * @param {string} name as WEBGL_debug_renderer_info gives it
  * @returns {boolean}

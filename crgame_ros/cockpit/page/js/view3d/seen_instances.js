@@ -21,7 +21,7 @@ import { MergedMesh } from './merged_mesh.js';
  */
 
 /**
- * Give what a camera sees.
+ * Return what a camera sees.
  *
  * @param {Three} three
  * @param {Camera} camera whose matrices are those of the picture
@@ -75,7 +75,7 @@ export function isWithin(planes, x, y, z, radius) {
  */
 
 /**
- * Give the same shape as a plain one, for what costs more by its number than by its triangles.
+ * Return the same shape as a plain one, for what costs more by its number than by its triangles.
  *
  * @param {Part} part of a material that knows no colours of corners
  * @returns {Part} whose material is to be freed, too

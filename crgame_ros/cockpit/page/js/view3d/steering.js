@@ -8,7 +8,7 @@ const MOST = 0.65;
 const SLOW = 1;
 
 /**
- * Give the angle at which a single-track model would move so: tan(angle) = wheelbase * yaw rate
+ * Return the angle at which a single-track model would move so: tan(angle) = wheelbase * yaw rate
  * / speed.
  *
  * @param {number} wheelbase [m]

@@ -11,7 +11,7 @@ import { poseOf } from './traffic.js';
 /** @import { HeightAt } from './traffic.js' */
 
 /**
- * Give where a vehicle's rear axle is on the road, and how steep that is.
+ * Return where a vehicle's rear axle is on the road, and how steep that is.
  *
  * @param {Shown} shown
  * @param {number} index of the vehicle

@@ -78,7 +78,7 @@ export class View3d {
     }
   }
 
-  /** Whether it is shown in place of the map. */
+  /** Return whether it is shown in place of the map. */
   get on() {
     return this.#on;
   }

@@ -60,7 +60,7 @@ export class Camera {
     return (this.#aim.down + this.#slack.down) * this.#free;
   }
 
-  /** Whether it is still on its way. */
+  /** Return whether it is still on its way. */
   get moves() {
     const { x, y, scale, up, down } = this.#slack;
     return x !== 0 || y !== 0 || scale !== 0 || up !== 0 || down !== 0;
@@ -253,7 +253,7 @@ export class Camera {
   }
 
   /**
-   * Whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be seen.
+   * Return whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be seen.
    *
    * @param {Box} box
    */
@@ -263,7 +263,7 @@ export class Camera {
   }
 
   /**
-   * Whether something within a radius [m] of a point may be seen; false for NaN.
+   * Return whether something within a radius [m] of a point may be seen; false for NaN.
    *
    * @param {number} x
    * @param {number} y

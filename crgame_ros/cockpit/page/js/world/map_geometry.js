@@ -115,7 +115,7 @@ function addSurface(chunk, lanelet, outline) {
 }
 
 /**
- * Give the stripes of a crossing, along the traffic, which is across the way of those who walk.
+ * Return the stripes of a crossing, along the traffic, which is across the way of those who walk.
  *
  * @param {Pick<Lanelet, 'left'|'right'>} lanelet
  * @returns {number[][]} flat polygons

@@ -56,7 +56,7 @@ export function roadClass({ types, speed_limit }) {
 }
 
 /**
- * Give what is painted, or built, along a boundary.
+ * Return what is painted, or built, along a boundary.
  *
  * @param {Pick<Boundary, 'marking'|'inner'>} boundary
  * @param {Lanelet} lanelet whose boundary it is

@@ -35,7 +35,7 @@ export class Navigation {
     this.#changed = changed;
   }
 
-  /** Whether the followed vehicle drives upwards on the canvas. */
+  /** Return whether the followed vehicle drives upwards on the canvas. */
   get headingUp() {
     return this.followed !== null && (this.#begun ? this.#camera.headingUp : this.#headingUp);
   }

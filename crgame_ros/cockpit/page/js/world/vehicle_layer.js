@@ -60,7 +60,7 @@ export class VehicleLayer {
   }
 
   /**
-   * Give the pose of the centre of a driven vehicle or an object in the frame shown last.
+   * Return the pose of the centre of a driven vehicle or an object in the frame shown last.
    *
    * @param {string} id of it
    * @param {Shown} shown as Store.displayed gives it

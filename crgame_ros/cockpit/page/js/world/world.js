@@ -97,7 +97,7 @@ export class World {
     return this.#navigation.followed;
   }
 
-  /** Whether what AVs plan is drawn. */
+  /** Return whether what AVs plan is drawn. */
   get showsPlans() {
     return this.#painter.plans.on && this.insight;
   }

@@ -23,7 +23,7 @@ export class MeshBuilder {
   /** @type {boolean[]} */
   #painted = [];
 
-  /** How many triangles there are. */
+  /** Return how many triangles there are. */
   get triangles() {
     return this.#positions.length / 9;
   }
@@ -122,7 +122,7 @@ export class MeshBuilder {
   }
 
   /**
-   * Give the triangles that are painted, or all others.
+   * Return the triangles that are painted, or all others.
    *
    * @param {boolean} painted
    * @returns {{positions: Float32Array, normals: Float32Array, colors: Float32Array}} of all

@@ -243,7 +243,7 @@ function arches(mesh, { front, rear, radius }, half) {
 }
 
 /**
- * Give a vehicle its lamps, as they are when they are out: headlights and red lenses.
+ * Return a vehicle its lamps, as they are when they are out: headlights and red lenses.
  *
  * @param {Body} body
  * @returns {Body} the same

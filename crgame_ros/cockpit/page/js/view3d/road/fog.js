@@ -17,7 +17,7 @@ export function extinction(visibility) {
 }
 
 /**
- * Give the share of a contrast that is left.
+ * Return the share of a contrast that is left.
  *
  * @param {number} distance [m]
  * @param {number} visibility meteorological [m]

@@ -35,7 +35,7 @@ export class RoadIndex {
   }
 
   /**
-   * Give the lanelets whose box is not farther from a point than so much.
+   * Return the lanelets whose box is not farther from a point than so much.
    *
    * @param {number} x
    * @param {number} y
@@ -57,7 +57,7 @@ export class RoadIndex {
   }
 
   /**
-   * Tell whether a circle touches no lanelet.
+   * Return whether a circle touches no lanelet.
    *
    * @param {number} x of its centre
    * @param {number} y of its centre
@@ -73,7 +73,7 @@ export class RoadIndex {
   }
 
   /**
-   * Tell whether a point lies well within a lanelet that is neither this one nor beside it.
+   * Return whether a point lies well within a lanelet that is neither this one nor beside it.
    *
    * @param {number} x
    * @param {number} y
@@ -142,7 +142,7 @@ export class RoadIndex {
 }
 
 /**
- * Give a lanelet's height at a point: between what both bounds have beside it.
+ * Return a lanelet's height at a point: between what both bounds have beside it.
  *
  * @param {Lanelet} lanelet
  * @param {number} x

@@ -163,7 +163,7 @@ export class RoadPaint {
   }
 
   /**
-   * Give a line without what leads through lanelets other than those beside it.
+   * Return a line without what leads through lanelets other than those beside it.
    *
    * @param {number[]} line
    * @param {Lanelet} lanelet
@@ -188,7 +188,7 @@ export class RoadPaint {
 }
 
 /**
- * Tell whether a boundary parts two directions.
+ * Return whether a boundary parts two directions.
  *
  * @param {Boundary} boundary
  * @param {Lanelet} lanelet

@@ -69,7 +69,7 @@ class RoadPoints {
   }
 
   /**
-   * Tell whether every road around is on the near side of a line.
+   * Return whether every road around is on the near side of a line.
    *
    * @param {number} x of a point of the line
    * @param {number} y

@@ -50,7 +50,7 @@ export class SignAtlas {
   }
 
   /**
-   * Give the place of a face.
+   * Return the place of a face.
    *
    * @param {Face} face
    * @returns {Cell}
@@ -60,7 +60,7 @@ export class SignAtlas {
   }
 
   /**
-   * Give the place of a plate's grey back.
+   * Return the place of a plate's grey back.
    *
    * @param {PlateShape} shape
    * @returns {Cell}

@@ -117,7 +117,7 @@ const FACES = {
 };
 
 /**
- * Give the plate of a sign.
+ * Return the plate of a sign.
  *
  * @param {string} kind as commonroad-io names it
  * @param {string} value what it says besides, as in the file
