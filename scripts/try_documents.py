@@ -29,7 +29,7 @@ LASTING = re.compile(r'^(\w+=\S+ )*\./run\.sh(?!.*--help)')
 UP = re.compile(r'recording into (\S+)|replay of .* http://')
 # A recording of this size has a second of driving in it [bytes]; one that waits for a person gets
 # to no such size, and is looked at for so long [s].
-DRIVEN, WAITED_S = 300_000, 15.0
+DRIVEN, WAITED_S = 300_000, 6.0
 # The other terminal: such a command goes on while the next lasting one does.
 COMPANION = re.compile(r'.*examples/external_planner\.py')
 LOOK_S, PATIENCE_S = 1.0, 120.0

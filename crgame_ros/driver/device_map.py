@@ -34,25 +34,25 @@ class Code(Special):
     """
     The name of an evdev code.
 
-    :param prefix: with which its kind begins.
+    :param prefix: first letters of its kind.
     """
 
     def __init__(self, prefix: str) -> None:
         self._prefix = prefix
 
     def read(self, given: Any, where: str, key: str, base: Path) -> int:
-        """Look the code up."""
+        """Return the number of a named code."""
         code = ecodes.ecodes.get(given) if isinstance(given, str) else None
         if code is None or not given.startswith(self._prefix):
             raise InputError(f'"{key}" is {given!r:.80}', where, f'give {self}')
         return int(code)
 
     def json_schema(self) -> dict[str, Any]:
-        """Name all of the kind."""
+        """Return the schema: all names of the kind."""
         return {'enum': sorted(name for name in ecodes.ecodes if name.startswith(self._prefix))}
 
     def __str__(self) -> str:
-        """Return where the names come from."""
+        """Return the origin of the names."""
         return f'evdev codes ({self._prefix}...) as `evtest` prints them'
 
 
@@ -71,7 +71,7 @@ class AxisEntry:
     inverted: bool = False
 
     def check(self) -> None:
-        """Refuse a range that is none, and a rest outside of it."""
+        """Check that the range is not empty and contains the rest."""
         if self.min is not None and self.max is not None and not self.min < self.max:
             raise InputError(f'"max" is {self.max:g}', '', 'let min be less than max')
         if self.rest is not None and not (
@@ -87,12 +87,12 @@ class AxisEntry:
 @dataclass(frozen=True, kw_only=True)
 class EvdevAxis(AxisEntry):
     """
-    An axis as evdev has it.
+    An axis as read through evdev.
 
     :param axis: its code.
-    :param min: smallest raw value; without it what the device reports.
-    :param max: largest raw value; without it what the device reports.
-    :param rest: raw value when nobody touches it; without it the middle of steering, and the end
+    :param min: smallest raw value; by default as the device reports.
+    :param max: largest raw value; by default as the device reports.
+    :param rest: raw value of the untouched axis; by default the middle for steering, and the end
         from which a pedal starts.
     :param inverted: whether it falls while the command rises.
     """
@@ -103,13 +103,13 @@ class EvdevAxis(AxisEntry):
 @dataclass(frozen=True, kw_only=True)
 class JoyAxis(AxisEntry):
     """
-    An axis as a `joy` node has it.
+    An axis as read from a `joy` node.
 
     :param axis: its index.
     :param min: smallest value.
     :param max: largest value.
-    :param rest: value when nobody touches it; without it the middle of steering, and the end
-        from which a pedal starts.
+    :param rest: value of the untouched axis; by default the middle for steering, and the end from
+        which a pedal starts.
     :param inverted: whether it falls while the command rises.
     """
 
@@ -135,7 +135,7 @@ class AxisPair:
     deadzone: Annotated[float, Within(0.0, 0.5)] = 0.0
 
     def bindings(self, centred: bool) -> tuple[AxisBinding, AxisBinding]:
-        """Return it as the program has it: evdev, joy."""
+        """Return the bindings for evdev and joy."""
         return (self.evdev.binding(self.evdev.axis, centred, self.deadzone),
                 self.joy.binding(self.joy.axis, centred, self.deadzone))
 
@@ -158,7 +158,7 @@ class ButtonPair:
 @dataclass(frozen=True)
 class ButtonEntry:
     """
-    Buttons of the gear, the indicators, the horn, and of being put back.
+    Buttons of the gear, the indicators, the horn, and for putting the vehicle back.
 
     :param reverse_on: a press selects reverse.
     :param reverse_off: a press selects forward.
@@ -184,12 +184,12 @@ class ButtonEntry:
     put_back: tuple[ButtonPair, ...] = ()
 
     def gears(self, way: Literal['evdev', 'joy']) -> GearButtons:
-        """Return those of the gear as the program has them, in one way of reading the device."""
+        """Return the gear buttons for one way of reading the device."""
         return GearButtons(*(_codes(pairs, way) for pairs in (
             self.reverse_on, self.reverse_off, self.reverse_toggle, self.reverse_held)))
 
     def lights(self, way: Literal['evdev', 'joy']) -> LightButtons:
-        """Return those of indicators and horn as the program has them."""
+        """Return the buttons of indicators and horn for one way of reading the device."""
         return LightButtons(*(_codes(pairs, way) for pairs in (
             self.left_indicator, self.right_indicator, self.hazard, self.horn)))
 
@@ -201,7 +201,7 @@ def _codes(pairs: tuple[ButtonPair, ...], way: str) -> frozenset[int]:
 @dataclass(frozen=True)
 class KeyEntry:
     """
-    The keys that do the same.
+    The keys with the same functions.
 
     :param throttle: accelerate.
     :param brake: brake.
@@ -261,7 +261,7 @@ class DeviceFile:
     force_feedback: Annotated[ForceLimits | None, OnlyWith(_PEDALS)] = None
 
     def check(self) -> None:
-        """Refuse what is no regular expression."""
+        """Check that the patterns are regular expressions."""
         for pattern in self.match:
             try:
                 re.compile(pattern)
@@ -270,7 +270,7 @@ class DeviceFile:
                                  'mend it') from error
 
     def controls(self) -> tuple[ControlBindings, ControlBindings] | None:
-        """Return the controls as the program has them, in evdev and joy; None for a keyboard."""
+        """Return the control bindings for evdev and joy; None for a keyboard."""
         if self.steering is None or self.buttons is None:
             return None
         none = (None, None)
@@ -296,7 +296,7 @@ class DeviceKind(IntEnum):
 
 @dataclass(frozen=True)
 class KeyBindings:
-    """The evdev codes of the keys that do the same; see `KeyState`."""
+    """The evdev codes of the driving keys; see `KeyState`."""
 
     throttle: frozenset[int]
     brake: frozenset[int]
@@ -311,7 +311,7 @@ class KeyBindings:
 
     @property
     def codes(self) -> frozenset[int]:
-        """Every key that drives; a device without the others is a keyboard too."""
+        """Return every driving key; a device with only these is a keyboard too."""
         return self.throttle | self.brake | self.left | self.right | self.reverse
 
     @property
@@ -324,8 +324,8 @@ class KeyBindings:
         Return the driving keys held.
 
         :param pressed: codes of all pressed keys.
-        :param reverse: the gear that they have chosen.
-        :param lights: that they have switched on.
+        :param reverse: whether reverse is selected.
+        :param lights: the lights that are switched on.
         """
         return KeyState(not self.throttle.isdisjoint(pressed), not self.brake.isdisjoint(pressed),
                         not self.left.isdisjoint(pressed), not self.right.isdisjoint(pressed),
@@ -345,7 +345,7 @@ class DeviceMap:
     :param evdev: controls when read through evdev; None for a keyboard.
     :param joy: controls when read from a `joy` node; None for a keyboard.
     :param keys: key bindings of a keyboard; None otherwise.
-    :param force: the motor of a wheel; None where there is none, or it is to rest.
+    :param force: the motor of a wheel; None where there is none, or it is not to be used.
     """
 
     name: str
@@ -359,7 +359,7 @@ class DeviceMap:
 
     def fits(self, name: str, axes: frozenset[int], buttons: frozenset[int]) -> bool:
         """
-        Return whether a device is of this map: its name matches and it has every bound control.
+        Return whether a device fits this map: its name matches and it has every bound control.
 
         :param name: the device's name.
         :param axes: its evdev axis codes.

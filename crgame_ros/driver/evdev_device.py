@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A wheel, gamepad or keyboard read through evdev, which may be unplugged and come back."""
+"""A wheel, gamepad or keyboard read through evdev, which may be unplugged and plugged in again."""
 
 from collections.abc import Iterable, Iterator, Mapping
 import errno
@@ -33,12 +33,12 @@ _SET_CLOCK = 0x400445A0
 
 def stamp_by_steady_clock(descriptor: int) -> bool:
     """
-    Let a device's events be stamped by the clock of `time.monotonic`.
+    Set the clock of a device's event stamps to that of `time.monotonic`.
 
-    The kernel's own choice is the time of day, which somebody may set.
+    The kernel's default is the time of day, which may be set.
 
     :param descriptor: of an opened event device.
-    :return: whether the kernel does; Linux since 3.4.
+    :return: whether the kernel supports it; Linux does since 3.4.
     """
     try:
         fcntl.ioctl(descriptor, _SET_CLOCK, struct.pack('i', time.CLOCK_MONOTONIC))
@@ -54,7 +54,7 @@ class EventDecoder:
     """
     The raw state of a device from its events; no I/O.
 
-    :param gear: the buttons or keys that choose the gear.
+    :param gear: the buttons or keys that select the gear.
     :param reverse: whether reverse is selected to begin with.
     :param lights: the buttons or keys of indicators and horn.
     """
@@ -68,15 +68,15 @@ class EventDecoder:
         self.reverse = reverse
         self.lever = IndicatorLever(lights)
         self.stale = False
-        # Time stamp of the first event that changed something since somebody took it [s].
+        # Time stamp of the first event with a change since this was last read [s].
         self.changed_s: float | None = None
 
     def feed(self, event: InputEvent) -> bool:
         """
-        Take one event, and tell whether anything changed.
+        Process one event, and return whether anything changed.
 
         After the kernel's buffer ran over (SYN_DROPPED) the events up to the next report are
-        meaningless; then `stale` asks for `synchronise`.
+        meaningless; then `stale` requests `synchronise`.
         """
         if event.type == ecodes.EV_SYN:
             if event.code == ecodes.SYN_DROPPED:
@@ -100,7 +100,7 @@ class EventDecoder:
 
     def synchronise(self, axes: Mapping[int, float], pressed: Iterable[int]) -> None:
         """
-        Take the device's whole state; presses that were missed change no gear, no light.
+        Set the device's whole state; missed presses change neither gear nor lights.
 
         :param axes: raw value by code.
         :param pressed: codes of the keys and buttons held now.
@@ -124,14 +124,14 @@ class EventDecoder:
 
 class EvdevDevice:
     """
-    Finds, opens, reads and finds again one input device.
+    One input device, which is found, opened, read, and found again after a loss.
 
-    Nothing here raises: `connected` tells whether the device is there, `problem` why not. A
-    lost device reads as released and is looked for once a second, by its name and map.
+    No method raises: `connected` is whether the device is there, `problem` why not. A lost device
+    reads as released, and is searched for once a second, by its name and map.
 
     :param maps: device maps in order of preference.
-    :param name: part of the device's name, case ignored; empty takes the best device.
-    :param directory: where the event devices are.
+    :param name: part of the device's name, ignoring case; empty selects the best device.
+    :param directory: of the event devices.
     """
 
     def __init__(self, maps: tuple[DeviceMap, ...], name: str = '',
@@ -153,7 +153,7 @@ class EvdevDevice:
 
     @property
     def connected(self) -> bool:
-        """Whether the device is open."""
+        """Return whether the device is open."""
         return self._device is not None
 
     @property
@@ -163,7 +163,7 @@ class EvdevDevice:
 
     @property
     def raw(self) -> RawInput:
-        """Raw axes and pressed buttons; nothing while disconnected."""
+        """Return the raw axes and pressed buttons; nothing while disconnected."""
         return RawInput(self.decoder.axes, frozenset(self.decoder.pressed))
 
     @property
@@ -176,7 +176,9 @@ class EvdevDevice:
 
     @property
     def joy(self) -> JoyState:
-        """Return what the `joy` node would publish; a keyboard's driving keys as buttons."""
+        """
+        Return the device as the `joy` node would publish it; a keyboard's driving keys as buttons.
+        """
         if self.device_map is not None and self.device_map.keys is not None:
             return JoyState((), tuple(map(int, self.keys)))
         rests = {axis.code: axis.rest for axis in self.layout.ranges} if self.layout else {}
@@ -189,17 +191,17 @@ class EvdevDevice:
 
     @property
     def force_limits(self) -> ForceLimits | None:
-        """Return what may be asked of its motor; None without one, or where the map has none."""
+        """Return the limits of its motor; None without one, or where the map has none."""
         return self.device_map.force if self._can_push and self.device_map else None
 
     @property
     def force_device(self) -> Any:
-        """Return what its motor is driven through (`ForceDevice`); None without one."""
+        """Return the interface to its motor (`ForceDevice`); None without one."""
         return self._device if self._can_push else None
 
     def poll(self, now_s: float) -> bool:
         """
-        Read what is pending without blocking, or look for the lost device.
+        Read pending events without blocking, or search for the lost device.
 
         :param now_s: steady clock [s].
         :return: whether anything changed.
@@ -213,7 +215,7 @@ class EvdevDevice:
 
     def pop_input_s(self) -> float | None:
         """
-        Return when the first input since the last call changed something, by the kernel's stamp.
+        Return the kernel's stamp of the first input since the last call that changed something.
 
         :return: steady clock [s]; None without any, or where the kernel stamps by another clock.
         """
@@ -258,7 +260,7 @@ class EvdevDevice:
         try:
             self._adopt(*_find_device(self._maps, self._pattern, self._directory))
         except InputError as error:
-            # The reason of a loss stays: that the device is not there yet is no news.
+            # The reason of a loss is kept: that the device is still missing is no news.
             if self.device_map is None:
                 self.problem = error
             return False
@@ -290,7 +292,7 @@ class EvdevDevice:
 
 def open_evdev(name: str = '', directory: Path = Path('/dev/input')) -> EvdevDevice:
     """
-    Open what `evdev[:NAME]` asks for.
+    Open the device of `evdev[:NAME]`.
 
     :param name: empty for the best device; a device map (its name in `config/devices/`, or a
         YAML file); or part of a device's name.
@@ -305,7 +307,7 @@ def open_evdev(name: str = '', directory: Path = Path('/dev/input')) -> EvdevDev
 
 def _find_device(maps: tuple[DeviceMap, ...], pattern: re.Pattern[str], directory: Path,
                  ) -> 'tuple[InputDevice[str], DeviceMap]':
-    """Open the device of the first map that any fits; an InputError says why there is none."""
+    """Open the device of the first map that fits any; an InputError gives the reason for none."""
     if not directory.is_dir():
         raise InputError('this machine has no input devices', str(directory),
                          'drive with keys:FILE, joy:FILE or joy; a container must be given '
@@ -324,7 +326,7 @@ def _find_device(maps: tuple[DeviceMap, ...], pattern: re.Pattern[str], director
         fitting = [m for m in maps if pattern.search(device.name)
                    and m.fits(device.name, axes, buttons)]
         if fitting:
-            # Mice pose as keyboards too, but have no lamps; a keyboard with lamps is real.
+            # Mice also report keys, but have no LEDs; a device with LEDs is a real keyboard.
             rank = (fitting[0].kind, ecodes.EV_LED not in has, order)
             candidates.append((rank, device, fitting[0]))
         else:

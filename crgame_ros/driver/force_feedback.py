@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a driver feels in the wheel, from what the vehicle does: the motor's force in time."""
+"""Force feedback: the force of a wheel's motor over time, from the vehicle's motion."""
 
 from dataclasses import dataclass
 import math
@@ -13,18 +13,18 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from evdev import ecodes, ff
 
 FULL_LEVEL = 0x7fff
-# Of effects, in the kernel's units: a force to the left.
+# Direction of effects in the kernel's units: a force to the left.
 LEFTWARDS = 0x4000
-# The kernel ends the force by itself if it is not renewed for so long: of a process that hangs.
+# The kernel ends the force if it is not renewed for this long, as by a process that hangs.
 LENGTH_MS = 250
 RENEWAL_S = 0.05
 
 
 class ForceDevice(Protocol):
-    """What is used of an `evdev.InputDevice`; each call is one ioctl or write."""
+    """The part of `evdev.InputDevice` in use; each call is one ioctl or write."""
 
     def upload_effect(self, effect: ff.Effect) -> int:
-        """Make an effect, or change the one whose id it has; give its id."""
+        """Create an effect, or change the one with its id; return its id."""
 
     def write(self, etype: int, code: int, value: int) -> None:
         """Write one event."""
@@ -37,7 +37,7 @@ class ForceEffect:
     """
     A constant force that is uploaded once and then changed in place.
 
-    When the descriptor is closed, by whatever end of the process, the kernel removes it.
+    The kernel removes it when the descriptor is closed, however the process ends.
 
     :param device: open for writing.
     :raises OSError: if it has no room for an effect, or is gone.
@@ -50,14 +50,15 @@ class ForceEffect:
         self._effect = ff.Effect(ecodes.FF_CONSTANT, -1, LEFTWARDS, ff.Trigger(0, 0),
                                  ff.Replay(LENGTH_MS, 0), kind)
         self._renewed_s = float('-inf')
-        # The driver's own spring would add to ours; what a device does not have is passed over.
+        # Switch off the kernel driver's own spring, which would add to this force; devices without
+        # it ignore the event.
         device.write(ecodes.EV_FF, ecodes.FF_AUTOCENTER, 0)
         device.write(ecodes.EV_FF, ecodes.FF_GAIN, 0xffff)
         self._effect.id = device.upload_effect(self._effect)
 
     def set(self, level: int, now_s: float) -> None:  # noqa: A003
         """
-        Change the force and let it go on.
+        Change the force and renew it.
 
         :param level: -0x7fff to 0x7fff.
         :param now_s: steady clock [s]
@@ -79,18 +80,18 @@ class ForceEffect:
         self.device.erase_effect(self._effect.id)
 
 
-# Without a new state for so long (a pause, a lost simulation) there is no force [s].
+# Without a new state for this long (a pause, a lost simulation) there is no force [s].
 STATE_TIMEOUT_S = 0.2
-# Of the low-pass on the rate of the wheel, whose angle comes in steps [s].
+# Time constant of the low-pass on the wheel's rate, as its angle comes in steps [s].
 RATE_FILTER_S = 0.02
-# A device that refused an effect is asked again so much later [s].
+# A device that refused an effect is tried again after this time [s].
 RETRY_S = 1.0
 
 
 @dataclass(frozen=True)
 class FeltForce:
     """
-    What the motor gives.
+    The output of the motor.
 
     :param wheel_angle: positive to the left [rad]
     :param torque: after strength, cap and slew, positive to the left [N m]
@@ -102,7 +103,7 @@ class FeltForce:
 
 class ForceFeedback:
     """
-    Refreshes the force of one device; has no clock of its own.
+    The force of one device, without a clock of its own.
 
     :param device: the wheel; it may be absent, come and go.
     :param vehicle: that it steers.
@@ -123,7 +124,7 @@ class ForceFeedback:
 
     def see_motion(self, now_s: float, time_s: float, speed: float, yaw_rate: float) -> None:
         """
-        Take what the vehicle does.
+        Update the vehicle's motion.
 
         :param now_s: steady clock [s]
         :param time_s: simulation time [s]
@@ -138,7 +139,7 @@ class ForceFeedback:
         self._speed, self._yaw_rate = speed, yaw_rate
 
     def see_drivability(self, collision: bool, off_road: bool) -> None:
-        """Take whether the vehicle touches anything, and whether it has left the road."""
+        """Update whether the vehicle touches anything, and whether it has left the road."""
         if not collision:
             self._collided_s = math.inf
         elif math.isinf(self._collided_s):
@@ -147,7 +148,7 @@ class ForceFeedback:
 
     def step(self, now_s: float, driving: bool = True) -> FeltForce | None:
         """
-        Refresh the force.
+        Update the force.
 
         :param now_s: steady clock [s]
         :param driving: whether the wheel has the vehicle's controls.
@@ -184,11 +185,11 @@ class ForceFeedback:
             try:
                 self._effect.remove()
             except OSError:
-                pass  # It is gone, and its force with it.
+                pass  # The device is gone, and its force with it.
         self._effect = None
 
     def _current_effect(self, now_s: float) -> ForceEffect | None:
-        """Return the effect on the device that is there now, which may be another than before."""
+        """Return the effect on the present device, which may differ from the previous one."""
         device, limits = self._device.force_device, self._device.force_limits
         if device is None or limits is None or limits.strength == 0.0:
             self._effect = None

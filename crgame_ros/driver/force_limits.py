@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a wheel's motor may be asked for: strength, cap and slew, as its device map has them."""
+"""The limits of a wheel's motor: strength, cap and slew, from its device map."""
 
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -14,7 +14,7 @@ class ForceLimits:
     """
     The motor of a wheel.
 
-    :param max_torque: that it gives at full level [N m]
+    :param max_torque: torque at full level [N m]
     :param strength: factor on the torque of the simulated steering; 0 switches it off [-]
     :param cap: share of `max_torque` that is never exceeded [-]
     :param slew: fastest change of the torque [N m/s]
@@ -32,7 +32,7 @@ class ForceLimits:
 
 class TorqueLimiter:
     """
-    Holds a torque within cap and slew.
+    A limiter that keeps a torque within cap and slew.
 
     :param limits: of the motor.
     """
@@ -45,9 +45,9 @@ class TorqueLimiter:
         """
         Move towards a torque.
 
-        :param wanted: of the simulated steering [N m]; no number counts as none.
+        :param wanted: of the simulated steering [N m]; NaN or infinity counts as 0.
         :param dt_s: since the last step [s]
-        :return: what the motor is to give, positive to the left [N m]
+        :return: torque of the motor, positive to the left [N m]
         """
         limits = self.limits
         most = limits.cap * limits.max_torque

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from crgame_ros.vehicle.lights import HAZARD, Light
 
-# The wheel was turned into the indicated direction beyond the first, and is back below the
-# second: of a wheel of 450 degrees to either side 90 and 45 degrees, as levers of cars have it.
+# An indicator goes off after the wheel was turned its way beyond the first and is back below the
+# second. For a wheel of 450 degrees to either side these are 90 and 45 degrees, as in cars.
 TURNED = 0.2
 BACK = 0.1
 
@@ -35,9 +35,9 @@ NO_LIGHTS = LightButtons()
 
 class IndicatorLever:
     """
-    What is switched on, from presses of buttons; an indicator is off again after the turn.
+    The lights switched on by presses of buttons; an indicator goes off after the turn.
 
-    :param buttons: what does what.
+    :param buttons: of each function.
     """
 
     def __init__(self, buttons: LightButtons = NO_LIGHTS) -> None:
@@ -49,19 +49,19 @@ class IndicatorLever:
 
     @property
     def lights(self) -> int:
-        """Return what is on, as `DriverCommand.lights`."""
+        """Return the lights that are on, as `DriverCommand.lights`."""
         horn = 0 if self._buttons.horn.isdisjoint(self._pressed) else Light.HORN
         return int((HAZARD if self._hazard else self._side) | horn)
 
     def hold(self, pressed: Iterable[int]) -> None:
-        """Take which buttons are held now; each that was not held before counts as a press."""
+        """Update the held buttons; each that was not held before counts as a press."""
         held = frozenset(pressed)
         for button in sorted(held - self._pressed):
             self._press(button)
         self._pressed = held
 
     def overlook(self, pressed: Set[int]) -> None:
-        """Take which buttons are held now, where presses may have been missed: none counts."""
+        """Set the held buttons without counting presses, as some may have been missed."""
         self._pressed = frozenset(pressed)
 
     def turn(self, steering: float) -> None:

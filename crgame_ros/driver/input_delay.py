@@ -1,18 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How long it takes from an input until the first state that obeys it is known here."""
+"""The delay from an input until the first state that results from it is known here."""
 
 from collections import deque
 import statistics
 
-# Enough to tell how it is now; a median does not mind a single late step.
+# Enough for the present delay; a single late step does not affect the median.
 _KEPT = 21
-# A run that stands still obeys nothing [s].
+# Time after which a measurement ends: a run that stands still does not react [s].
 _GIVE_UP_S = 1.0
 
 
 class InputDelay:
-    """Measures with the inputs that change something, on one clock."""
+    """The delay, measured on one clock with inputs that change something."""
 
     def __init__(self) -> None:
         self._pending: tuple[float, int] | None = None
@@ -20,12 +20,12 @@ class InputDelay:
 
     @property
     def turn_ms(self) -> float | None:
-        """Median of the last measurements [ms]; None before the first."""
+        """Return the median of the last measurements [ms]; None before the first."""
         return statistics.median(self._measured_ms) if self._measured_ms else None
 
     def changed(self, now_s: float, n: int) -> None:
         """
-        Take note of an input that is passed on.
+        Note an input that is passed on.
 
         :param now_s: steady clock [s]
         :param n: newest step that is known.
@@ -34,7 +34,7 @@ class InputDelay:
             self._pending = (now_s, n)
 
     def stepped(self, now_s: float, n: int) -> None:
-        """Take note of a state that has come."""
+        """Note a state that has come."""
         if self._pending is None:
             return
         since_s, before_n = self._pending
@@ -45,7 +45,7 @@ class InputDelay:
             self._pending = None
 
     def total_ms(self, round_trip_ms: float | None) -> float | None:
-        """Return the delay from the hand to the answer at the page [ms]: with the way of both."""
+        """Return the delay from the hand to the answer at the page [ms], with the round trip."""
         if self.turn_ms is None or round_trip_ms is None:
             return None
         return self.turn_ms + round_trip_ms

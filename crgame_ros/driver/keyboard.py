@@ -19,8 +19,8 @@ class KeyState(NamedTuple):
     :param brake: a brake key is held
     :param left: a left key is held
     :param right: a right key is held
-    :param reverse: the reverse gear is asked for; a device flips it at each press of its key,
-        the vehicle obeys at standstill
+    :param reverse: the reverse gear is requested; a device toggles it at each press of its key,
+        the vehicle changes gear at standstill
     :param left_indicator: the left indicator is on; a device's lever switches it
     :param right_indicator: the right indicator is on; both together are the hazard lights
     :param horn: the horn sounds
@@ -39,7 +39,7 @@ class KeyState(NamedTuple):
 
     @property
     def lights(self) -> int:
-        """Return what is on, as `DriverCommand.lights`."""
+        """Return the lights that are on, as `DriverCommand.lights`."""
         return lights_of(self.left_indicator, self.right_indicator, self.horn)
 
 
@@ -68,7 +68,7 @@ class KeyboardParameters:
     steering_deadband: float = 1e-4
 
     def __post_init__(self) -> None:
-        """Refuse rates, caps and deadbands that make no filter."""
+        """Check that the rates, caps and deadbands are valid."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -84,7 +84,7 @@ class KeyboardFilter:
     The rate-limited integration of CRG 18-19, in simulation time.
 
     The state is a `DriverCommand` before the deadbands; `advance` commits a cycle,
-    `preview` returns what a cycle would give without committing it, and `advanced` is the
+    `preview` returns the result of a cycle without committing it, and `advanced` is the
     pure step behind both.
     """
 
@@ -96,8 +96,8 @@ class KeyboardFilter:
         """
         Return the state after one cycle: CRG 18 for the pedals, CRG 19 for the steering.
 
-        Braking takes precedence over the throttle: beta_th = b_th (1 - b_br). Both steering
-        keys together hold the steering, for b_L - b_R = 0 in the first case of CRG 19.
+        Braking takes precedence over the throttle: beta_th = b_th (1 - b_br). Both steering keys
+        together hold the steering, because b_L - b_R = 0 in the first case of CRG 19.
 
         :param state: the state at the start of the cycle, before the deadbands.
         :param keys: the keys held during the cycle.
@@ -122,8 +122,8 @@ class KeyboardFilter:
         """
         Apply the deadbands of CRG III-C1 to a state.
 
-        They act on the output alone: in the state they would hold back a filter whose step is
-        shorter than deadband / rate for ever.
+        They act on the output alone: in the state they would stop a filter for ever if its step is
+        shorter than deadband / rate.
         """
         p = self.parameters
         return DriverCommand(
@@ -133,7 +133,7 @@ class KeyboardFilter:
             state.reverse, state.lights, state.put_back)
 
     def advance(self, keys: KeyState, dt_s: float) -> DriverCommand:
-        """Commit a cycle with these keys held, and give its command."""
+        """Commit a cycle with these keys held, and return its command."""
         self.state = self.advanced(self.state, keys, dt_s)
         return self.command(self.state)
 
@@ -144,9 +144,9 @@ class KeyboardFilter:
 
 class KeyboardCycles:
     """
-    The keyboard filter cycle by cycle: the cycle under way may be computed again.
+    The keyboard filter cycle by cycle; the present cycle may be computed again.
 
-    :param parameters: of the filter; None takes the paper's.
+    :param parameters: of the filter; None means the paper's.
     """
 
     def __init__(self, parameters: KeyboardParameters | None = None) -> None:
@@ -154,7 +154,7 @@ class KeyboardCycles:
         self.reset()
 
     def reset(self) -> None:
-        """Begin before any cycle, released."""
+        """Reset to the time before the first cycle, released."""
         self._filter = KeyboardFilter(self._parameters)
         self.cycle = -1
         self._keys = KeyState()
@@ -164,12 +164,12 @@ class KeyboardCycles:
         """
         Return the command of cycle n with these keys held.
 
-        :raises ValueError: if n is less than the cycle asked for last.
+        :raises ValueError: if n is less than in the last call.
         """
         if n < self.cycle:
             raise ValueError(f'cycle {n} after cycle {self.cycle}: reset() begins a new run')
         if n > self.cycle:
-            # The ramps of CRG 18-19 are clipped lines: several cycles are one longer cycle.
+            # The ramps of CRG 18-19 are clipped lines, so several cycles equal one longer cycle.
             gap = n - self.cycle if self.cycle >= 0 else 0
             self._filter.advance(self._keys, gap * self._dt_s)
             self.cycle = n

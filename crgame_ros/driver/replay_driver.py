@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 class ReplayDriver(DriverSource):
     """
-    Repeats the commands that a recorded run consumed.
+    A driver that repeats the commands consumed in a recorded run.
 
-    After their end nobody is there: as after any loss of a driver the pedals and the steering are
-    let go at their rates, then the brake is applied gently and stays, in simulation time.
+    After their end the driver counts as lost: pedals and steering return at their rates, then the
+    brake is applied gently and stays on, in simulation time.
 
     :param commands: (cycles, 6) throttle, brake, steering, reverse, lights and put_back of cycle
-        0, 1, …; NaN where an AV followed its plan. What earlier versions kept has the first four
-        or five.
+        0, 1, …; NaN where an AV followed its plan. Recordings of earlier versions have the first
+        four or five.
     """
 
     def __init__(self, commands: NDArray[np.float64]) -> None:
@@ -29,16 +29,16 @@ class ReplayDriver(DriverSource):
         self._end = SeatWatchdog()
 
     def drives(self, n: int) -> bool:
-        """Return whether somebody drove in the recorded cycle n."""
+        """Return whether a driver drove in the recorded cycle n."""
         return n < self._recorded and not math.isnan(self._commands[n].throttle)
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Return the recorded command of cycle n; after the last one that of a seat left alone."""
+        """Return the recorded command of cycle n; after the last one, that of a lost driver."""
         if n >= len(self._commands) == self._recorded:
             last = self._commands[-1] if self._commands else RELEASED
             self._end.filter(last, 0.0, dt_s, 0.0)
         while n >= len(self._commands):
-            # At an infinite speed it never takes the brake off again.
+            # With an infinite speed the watchdog never releases the brake again.
             self._commands.append(self._end.filter(RELEASED, math.inf, dt_s, math.inf))
         return self._commands[n]
 

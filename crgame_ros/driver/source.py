@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 JOY_TIMEOUT_S = 0.5
-# Drives in the browser; its node speaks for the seat itself.
+# A driver in the browser; the cockpit node publishes the commands of the seat itself.
 COCKPIT = 'cockpit'
 
 _FORMS = {
@@ -42,7 +42,7 @@ class SourceSpec:
     A source as the game or the command line names it.
 
     :param kind: auto, cockpit, idle, evdev, keys, joy, replay or policy.
-    :param argument: device name, file or bag, or a policy's file and function; empty for `auto`,
+    :param argument: device name, file or bag, or a policy's file and function. Empty for `auto`,
         `idle`, the best evdev device and the external joy node.
     """
 
@@ -55,7 +55,7 @@ class SourceSpec:
 
     @property
     def has_timeline(self) -> bool:
-        """Whether the source is a timeline file, which the resolved game carries as text."""
+        """Return whether the source is a timeline file, which the resolved game holds as text."""
         return self.kind == 'keys' or (self.kind == 'joy' and bool(self.argument))
 
 
@@ -63,7 +63,7 @@ def parse_source(text: str) -> SourceSpec:
     """
     Read a driver source.
 
-    :raises InputError: listing the forms.
+    :raises InputError: listing the valid forms.
     """
     kind, colon, argument = text.strip().partition(':')
     argument = argument.strip()
@@ -102,24 +102,24 @@ def load_timeline(spec: SourceSpec, base: Path) -> Timeline:
 
 class DriverSource(ABC):
     """
-    Where a seat's command comes from.
+    The source of a seat's command.
 
-    Cycle n lasts from n * dt to (n + 1) * dt of simulation time. `command(n, dt)` may be asked
-    again for the same n when the input has changed; asking for a later n commits the earlier
+    Cycle n lasts from n * dt to (n + 1) * dt of simulation time. `command(n, dt)` may be called
+    again for the same n when the input has changed; a call for a later n commits the earlier
     cycles. Filters therefore run in simulation time, and a pause holds the pedals.
     """
 
     problem: InputError | None = None
-    # The device, or its map; empty where there is none.
+    # Name of the device or its map; empty where there is none.
     name = ''
-    # When the oldest input came that no command has been published for yet, steady clock [s].
+    # Time of the oldest input without a published command, steady clock [s].
     input_s: float | None = None
-    # Whether what it looks at comes between cycles, too, though it has no descriptor.
+    # Whether its observations come between cycles too, though it has no descriptor.
     is_looking = False
 
     @property
     def connected(self) -> bool:
-        """Whether there is anybody; while not, nothing should be published for the seat."""
+        """Return whether a driver is there; if not, nothing is to be published for the seat."""
         return True
 
     @abstractmethod
@@ -127,26 +127,26 @@ class DriverSource(ABC):
         """
         Return the command for cycle n.
 
-        :param n: the cycle, never less than the one asked for last (`reset` begins anew).
+        :param n: the cycle, never less than in the last call (`reset` starts again).
         :param dt_s: length of a cycle in simulation time [s].
         """
 
     def see(self, n: int, vehicle_states: 'NDArray[np.float64]',  # noqa: B027 - most are blind
             objects: 'ObjectStates | None') -> None:
         """
-        Look at the world before the command of cycle n is asked for.
+        Observe the world before the command of cycle n is requested.
 
         :param vehicle_states: (V, 8) rear-axle states of humans, then AVs.
         :param objects: states of everything else where n is a scenario step.
         """
 
     def drives(self, n: int) -> bool:
-        """Return whether an AV's seat is taken in cycle n; while not, it follows its plan."""
+        """Return whether a driver drives the AV in cycle n; otherwise the AV follows its plan."""
         return True
 
     def poll(self, now_s: float) -> bool:
         """
-        Take what is new, without blocking.
+        Read new input, without blocking.
 
         :param now_s: steady clock [s].
         :return: whether anything changed.
@@ -154,7 +154,7 @@ class DriverSource(ABC):
         return False
 
     def fileno(self) -> int | None:
-        """Return a descriptor that becomes readable when `poll` has something to take."""
+        """Return a descriptor that becomes readable when `poll` has something to read."""
         return None
 
     def joy(self) -> JoyState | None:
@@ -165,11 +165,11 @@ class DriverSource(ABC):
         """Begin a new run at cycle 0, released."""
 
     def close(self) -> None:  # noqa: B027 - most sources hold nothing
-        """Let go of the device."""
+        """Release the device."""
 
 
 class IdleDriver(DriverSource):
-    """Nobody: every pedal released."""
+    """No driver: every pedal released."""
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """Return the released command."""
@@ -178,11 +178,11 @@ class IdleDriver(DriverSource):
 
 class ScriptedDriver(DriverSource):
     """
-    Plays a timeline, in lockstep offline and live alike.
+    A driver that plays a timeline, in lockstep both offline and live.
 
     Cycle n gets the keys or axes at its start, t = n * dt; keys go through the keyboard filter
-    advanced over that cycle (CRG 18-19), axes through the normalisation (CRG 17). A driver
-    that joins at a later cycle has first gone through all earlier ones.
+    advanced over that cycle (CRG 18-19), axes through the normalisation (CRG 17). A driver that
+    joins at a later cycle first computes all earlier ones.
 
     :param timeline: of keys or of axes.
     :param parameters: of the keyboard filter; None takes the paper's.
@@ -196,7 +196,7 @@ class ScriptedDriver(DriverSource):
     @classmethod
     def from_text(cls, text: str, where: str) -> 'ScriptedDriver':
         """
-        Make a driver of a timeline's text, as the resolved game carries it.
+        Build a driver from a timeline's text, as in the resolved game.
 
         :raises InputError: if the text is no timeline.
         """
@@ -235,8 +235,8 @@ class JoyDriver(DriverSource):
     The messages of an external `joy` node, normalised by a device map (CRG 17).
 
     :param device_map: of a wheel or gamepad.
-    :param timeout_s: silence after which the node counts as gone [s]; a `joy` node repeats its
-        message at 20 Hz unless told otherwise.
+    :param timeout_s: silence after which the node counts as gone [s]; by default a `joy` node
+        repeats its message at 20 Hz.
     :raises InputError: if the map is a keyboard's.
     """
 
@@ -254,12 +254,12 @@ class JoyDriver(DriverSource):
 
     @property
     def connected(self) -> bool:
-        """Whether a message came within the timeout and holds the axes of the map."""
+        """Return whether a message came within the timeout and has the axes of the map."""
         return self.problem is None and self._now_s - self._heard_s <= self._timeout_s
 
     def receive(self, axes: Sequence[float], buttons: Sequence[int], now_s: float) -> None:
         """
-        Take a message.
+        Receive a message.
 
         :param axes: `Joy.axes`, in [-1, 1].
         :param buttons: `Joy.buttons`, 1 while pressed.
@@ -280,7 +280,7 @@ class JoyDriver(DriverSource):
         self._raw = raw
 
     def poll(self, now_s: float) -> bool:
-        """Let the time pass, and tell whether the node has fallen silent since."""
+        """Update the time, and return whether the node has fallen silent since."""
         before = self.connected
         self._now_s = max(self._now_s, now_s)
         return self.connected != before
@@ -308,11 +308,11 @@ class EvdevDriver(DriverSource):
 
     @property
     def connected(self) -> bool:
-        """Whether the device is open."""
+        """Return whether the device is open."""
         return self.device.connected
 
     def poll(self, now_s: float) -> bool:
-        """Read what is pending, or look for the lost device; keep its problem."""
+        """Read pending events, or search for the lost device; keep its problem."""
         changed = self.device.poll(now_s)
         self.name, input_s = self.device.name, self.device.pop_input_s()
         self.input_s = input_s if self.input_s is None else self.input_s
@@ -339,7 +339,7 @@ class EvdevDriver(DriverSource):
         return self.device.joy if self.device.connected else None
 
     def reset(self) -> None:
-        """Begin a new run at cycle 0, released; the gear stays as the device has it."""
+        """Begin a new run at cycle 0, released; the device's gear stays."""
         self._cycles.reset()
 
     def close(self) -> None:

@@ -12,26 +12,26 @@ from crgame_ros.vehicle.steering import Steering
 @dataclass(frozen=True)
 class TorqueParameters:
     """
-    What of the steering no vehicle file has: a typical car with power steering.
+    Steering parameters that are in no vehicle file: those of a typical car with power steering.
 
     :param contact_half_length: a, of a front tyre's contact patch [m]
     :param slip_stiffness: cornering stiffness by friction and load, C_S of CommonRoad's vehicle
         models, p_ky1 / p_dy1 [1/rad]
-    :param caster_trail: by which the kingpin leads the middle of the patch [m]
-    :param steering_ratio: of the wheel's angle to the front wheels', mechanically [-]
+    :param caster_trail: distance of the kingpin's axis ahead of the patch's middle [m]
+    :param steering_ratio: mechanical ratio of the wheel's angle to the front wheels' [-]
     :param unassisted: share of the torque that power steering leaves to the driver [-]
     :param damping: [N m s/rad]
     :param friction: of the column, at any speed [N m]
     :param scrub: of standing tyres on the road [N m]
-    :param scrub_speed: at which scrub has fallen to 1/e [m/s]
-    :param friction_rate: of the wheel, about which friction changes its sign [rad/s]
+    :param scrub_speed: speed at which scrub has fallen to 1/e [m/s]
+    :param friction_rate: rate of the wheel over which friction changes its sign [rad/s]
     :param end_stop: stiffness beyond `end_stop_from` [N m/rad]
-    :param end_stop_from: share of the wheel's way to its end [-]
+    :param end_stop_from: share of the wheel's travel to its end [-]
     :param rumble: amplitude off the road, at `rumble_speed` and beyond [N m]
     :param rumble_speed: [m/s]
     :param rumble_hz: its frequency [Hz]
     :param jolt: first amplitude after a collision [N m]
-    :param jolt_decay_s: in which it falls to 1/e [s]
+    :param jolt_decay_s: time in which it falls to 1/e [s]
     :param jolt_hz: its frequency [Hz]
     """
 
@@ -58,15 +58,15 @@ class TorqueParameters:
 @dataclass(frozen=True)
 class WheelMotion:
     """
-    What the torque depends on.
+    The inputs of the torque.
 
     :param speed: signed, of the rear axle [m/s]
     :param yaw_rate: [rad/s]
     :param wheel_angle: of the steering wheel, positive to the left [rad]
     :param wheel_rate: its rate [rad/s]
-    :param time_s: simulation time, of which the rumble is a function [s]
+    :param time_s: simulation time, on which the rumble depends [s]
     :param off_road: whether the vehicle has left the road.
-    :param since_collision_s: infinite without any [s]
+    :param since_collision_s: time since the last collision, infinite without any [s]
     """
 
     speed: float
@@ -86,15 +86,15 @@ class SteeringTorque:
     Tire and Vehicle Dynamics, section 3.2.1): with a slip s = theta alpha of the front tyres,
     theta = C_S / 3, and lambda = 1 - |s| they are F = mu F_z (1 - lambda^3) and
     M_z = mu F_z a lambda^3 (1 - lambda). The pneumatic trail of a / 3 falls off as the slip grows:
-    M_z is largest at 58 % of the grip and gone where the tyre slides; the caster trail's part is
-    left. Backwards nothing aligns.
+    M_z is largest at 58 % of the grip and zero where the tyre slides; the caster trail's part
+    remains. In reverse there is no aligning torque.
 
-    The motion models have no slip of their own. In the linear single-track model
-    alpha_f = alpha_r + delta - L (dpsi/dt) / v, of which alpha_r is that of a steady turn: it
-    bears F = m a l_r / L with a = v dpsi/dt, the brush model turned around. The rest is by how
-    much the wheel in the driver's hands is ahead of the way that the vehicle goes.
+    The motion models have no slip. In the linear single-track model
+    alpha_f = alpha_r + delta - L (dpsi/dt) / v, where alpha_r is that of a steady turn: it carries
+    F = m a l_r / L with a = v dpsi/dt, by the inverted brush model. The other terms are the angle
+    by which the driver's wheel leads the vehicle's path.
 
-    :param vehicle: whose torque it is.
+    :param vehicle: parameters of the vehicle.
     """
 
     def __init__(self, vehicle: VehicleParameters,
@@ -109,7 +109,7 @@ class SteeringTorque:
         self._end = p.end_stop_from * vehicle.max_steering_wheel_angle
 
     def slip(self, speed: float, yaw_rate: float, wheel_angle: float) -> float:
-        """Return theta alpha of the front tyres, forwards; from 1 on they slide [-]."""
+        """Return theta alpha of the front tyres in forward motion; from 1 on they slide [-]."""
         share = self._mass * speed * yaw_rate / self._grip
         steady = 1.0 - math.cbrt(1.0 - min(abs(share), 1.0))
         angle = self._steering.target_angle(wheel_angle / self._full_turn, speed)
@@ -117,7 +117,7 @@ class SteeringTorque:
         return math.copysign(steady, share) + self.parameters.slip_stiffness / 3.0 * ahead
 
     def aligning(self, speed: float, yaw_rate: float, wheel_angle: float) -> float:
-        """Return the torque by which the tyres turn the wheel back [N m]."""
+        """Return the torque with which the tyres turn the wheel back [N m]."""
         if speed <= 0.0 or self._grip == 0.0:
             return 0.0
         p = self.parameters
@@ -127,18 +127,18 @@ class SteeringTorque:
         return -math.copysign(self._grip * moment, slip) * self._share * math.tanh(speed)
 
     def resistance(self, speed: float, wheel_rate: float) -> float:
-        """Return damping and friction, the more the slower the vehicle is [N m]."""
+        """Return damping and friction, which grow as the vehicle slows down [N m]."""
         p = self.parameters
         friction = p.friction + p.scrub * math.exp(-abs(speed) / p.scrub_speed)
         return -p.damping * wheel_rate - friction * math.tanh(wheel_rate / p.friction_rate)
 
     def end_stop(self, wheel_angle: float) -> float:
-        """Return what holds the wheel back at its ends [N m]."""
+        """Return the torque of the end stops [N m]."""
         beyond = max(0.0, abs(wheel_angle) - self._end)
         return -math.copysign(self.parameters.end_stop * beyond, wheel_angle)
 
     def shaking(self, motion: WheelMotion) -> float:
-        """Return rumble and jolt [N m]."""
+        """Return the torque of rumble and jolt [N m]."""
         p = self.parameters
         torque = 0.0
         if motion.off_road:
@@ -151,7 +151,7 @@ class SteeringTorque:
         return torque
 
     def torque(self, motion: WheelMotion) -> float:
-        """Return the sum [N m]."""
+        """Return the sum of all torques [N m]."""
         return (self.aligning(motion.speed, motion.yaw_rate, motion.wheel_angle)
                 + self.resistance(motion.speed, motion.wheel_rate)
                 + self.end_stop(motion.wheel_angle) + self.shaking(motion))

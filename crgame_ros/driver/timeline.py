@@ -13,7 +13,7 @@ from crgame_ros.driver.wheel import AxisRange, ControlLayout, RawInput
 AxisName = Literal['throttle', 'brake', 'steering']
 JOY_AXES: tuple[AxisName, ...] = ('throttle', 'brake', 'steering')
 
-# The device that a joy timeline plays: its raw axes are CRG 17's ratios themselves.
+# The device of a joy timeline: its raw axes are the ratios of CRG 17 themselves.
 SCRIPTED_LAYOUT = ControlLayout(
     throttle=AxisRange(0, 0.0, 1.0, 0.0), brake=AxisRange(1, 0.0, 1.0, 0.0),
     steering=AxisRange(2, -1.0, 1.0, 0.0))
@@ -47,7 +47,7 @@ class KeyTimeline:
           - {from: 2.0, to: 2.4, hold: [left]}
           - {from: 6.0, to: 8.0, hold: [throttle, reverse]}
 
-    The keys are throttle, brake, left and right; reverse is the gear, asked for while held;
+    The keys are throttle, brake, left and right; reverse requests the gear while held;
     left_indicator, right_indicator and horn are on while held.
     """
 
@@ -56,7 +56,7 @@ class KeyTimeline:
     _states: tuple[KeyState, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Sort the changes once, so that a look-up costs no search through the intervals."""
+        """Sort the changes once, so that a look-up needs no search through the intervals."""
         edges = sorted([(i.start_ns, 1, key) for i in self.intervals for key in i.keys]
                        + [(i.end_ns, -1, key) for i in self.intervals for key in i.keys])
         holding = Counter[str]()
@@ -69,7 +69,7 @@ class KeyTimeline:
 
     @property
     def end_s(self) -> float:
-        """Time from which no key is held [s]."""
+        """Return the time from which no key is held [s]."""
         return max((i.end_ns for i in self.intervals), default=0) / 1e9
 
     def keys_at(self, t_s: float) -> KeyState:
@@ -88,9 +88,9 @@ class JoyTimeline:
     The axes that a scripted human moves: a device whose raw axes are CRG 17's ratios.
 
     Written by hand as points of simulation time [s] since the start of the run, followed by
-    the listed axes; linear between points, constant before the first and after the last. Axes
-    that are not listed rest. Reverse is the gear, asked for in its intervals; the indicators and
-    the horn are on in theirs, and in those of put_back the vehicle is to be put back:
+    the listed axes; linear between points, constant before the first and after the last. Axes that
+    are not listed rest. The reverse gear is requested in the intervals of reverse. The indicators
+    and the horn are on in theirs, and in those of put_back the vehicle is to be put back:
 
         joy:
           axes: [throttle, brake, steering]
@@ -104,8 +104,8 @@ class JoyTimeline:
 
     :param times_s: (P) times of the points, rising [s].
     :param values: (P, 3) throttle, brake in [0, 1], steering in [-1, 1], positive to the left.
-    :param held: intervals in which the reverse gear is asked for, lights are on, or the
-        vehicle is to be put back.
+    :param held: intervals in which the reverse gear is requested, lights are on, or the vehicle is
+        to be put back.
     """
 
     times_s: tuple[float, ...]
@@ -114,7 +114,7 @@ class JoyTimeline:
 
     @property
     def end_s(self) -> float:
-        """Time from which nothing changes [s]."""
+        """Return the time from which nothing changes [s]."""
         return max(self.times_s[-1], self.held.end_s)
 
     def raw_at(self, t_s: float) -> RawInput:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Timeline files as they say it: read into timelines, and written from them."""
+"""The format of timeline files: reading timelines from files, and writing them."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,7 +24,7 @@ from crgame_ros.yaml_text import parse_yaml, read_text
 import yaml
 
 MAX_TIME_S = 1e6
-# Timelines that are kept: batches of runs read them many times.
+# Number of cached timelines: batches of runs read them many times.
 _KEPT = 32
 REMEDY = 'see docs/driving.md, section "Scripted drivers"'
 _FORM = Form(REMEDY)
@@ -51,7 +51,7 @@ class Span:
     end: Annotated[Time, Called('to')]
 
     def check(self) -> None:
-        """Refuse one that ends before it starts."""
+        """Check that the interval does not end before it starts."""
         if round(self.start * 1e9) >= round(self.end * 1e9):
             raise InputError(f'ends at {self.end:g} s, not after its start at {self.start:g} s',
                              '', 'let "from" be less than "to"')
@@ -68,7 +68,7 @@ class HeldKeys(Span):
 
     :param start: first instant, since the start of the run [s]
     :param end: first instant after it [s]
-    :param hold: the keys, a list or one of them; reverse is the gear, asked for while held;
+    :param hold: the keys, a list or one of them; reverse requests the gear while held;
         indicators (both: hazard lights) and horn are on while held; put_back, after a contact,
         puts the vehicle back on its lane.
     """
@@ -84,8 +84,8 @@ class JoyEntry:
 
     :param points: time [s] and axes, throttle and brake from 0 to 1, steering from -1 to 1 and
         positive to the left; linear in between.
-    :param axes: what stands in the points behind the time; axes that are not listed rest.
-    :param reverse: intervals in which the reverse gear is asked for.
+    :param axes: the axes of the points, after the time; axes that are not listed rest.
+    :param reverse: intervals in which the reverse gear is requested.
     :param left_indicator: intervals in which the left indicator is on.
     :param right_indicator: intervals in which the right indicator is on.
     :param horn: intervals in which the horn sounds.
@@ -103,7 +103,9 @@ class JoyEntry:
     put_back: Annotated[tuple[Span, ...], LeftOut()] = ()
 
     def check(self) -> None:
-        """Refuse axes that come twice, and points that do not fit them or do not rise in time."""
+        """
+        Check that no axis is listed twice, and that the points fit the axes and rise in time.
+        """
         for axis in self.axes:
             if self.axes.count(axis) > 1:
                 raise InputError(f'"{axis}" is doubled', 'axes', 'name each axis once')
@@ -141,7 +143,7 @@ class TimelineFile:
     """
     A scripted driver.
 
-    :param content: keys that are held, or the axes of a device.
+    :param content: held keys, or the axes of a device.
     """
 
     FORM: ClassVar[Form] = _FORM
@@ -164,7 +166,7 @@ def parse_timeline(text: str, where: str) -> Timeline:
     """
     Read the text of a timeline (YAML, or JSON, which is YAML too).
 
-    :param text: what `KeyTimeline` or `JoyTimeline` describes.
+    :param text: in the format of `KeyTimeline` or `JoyTimeline`.
     :param where: the file's name, for messages.
     :raises InputError: naming the file and the entry of the timeline that is wrong.
     """
@@ -178,7 +180,7 @@ def parse_timeline(text: str, where: str) -> Timeline:
 
 @lru_cache(_KEPT)
 def timeline_text(timeline: Timeline) -> str:
-    """Return a timeline as the text of a file; `parse_timeline` reads the same again."""
+    """Return a timeline as the text of a file, from which `parse_timeline` reads the same one."""
     if isinstance(timeline, KeyTimeline):
         document = {'keys': write(tuple(
             HeldKeys(*_seconds(held), held.keys)  # type: ignore[arg-type]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a seat does while its driver is silent: let go, then brake gently to a standstill."""
+"""The command of a seat whose driver is silent: released, then gentle braking to a standstill."""
 
 from dataclasses import dataclass, fields
 import math
@@ -17,11 +17,11 @@ _RATES = KeyboardParameters()
 @dataclass(frozen=True)
 class WatchdogParameters:
     """
-    When a driver counts as lost, and how its vehicle is stopped.
+    The timeout of a driver, and the parameters of the stop after it.
 
     :param timeout_s: silence after which a driver counts as lost [s].
     :param gentle_brake: brake pedal p_br of the stop, in [0, 1].
-    :param throttle_rate: of a throttle that returns [1/s]; CRG's r_th+.
+    :param throttle_rate: of a rising throttle [1/s]; CRG's r_th+.
     :param brake_rate: of a rising brake [1/s]; CRG's r_br+.
     :param pedal_release_rate: of a falling pedal [1/s]; CRG's r_p-.
     :param steering_release_rate: of the steering in either direction [1/s]; CRG's r_s-.
@@ -37,7 +37,7 @@ class WatchdogParameters:
     standstill_speed: float = REST
 
     def __post_init__(self) -> None:
-        """Refuse values with which no vehicle would stop."""
+        """Check that the values bring a vehicle to a stop."""
         for field in fields(self):
             value = getattr(self, field.name)
             if not (math.isfinite(value) and value > 0.0):
@@ -50,14 +50,13 @@ class WatchdogParameters:
 
 class SeatWatchdog:
     """
-    Watches one seat; has no clock of its own: the age of the command is passed in.
+    The watchdog of one seat, without a clock of its own: the age of the command is passed in.
 
-    While commands come they pass unchanged, to the last bit. Once the last one is older than
-    the timeout, throttle and steering ramp to 0 at the paper's release rates; a brake that is
-    held falls to the gentle one, and otherwise the gentle one is applied after the release;
-    at standstill it is released; indicators stay on, the horn falls silent. When
-    commands return, the output moves to them at the same rates and passes them on as soon as it
-    has reached them.
+    Commands pass unchanged, to the last bit, while they come. Once the last one is older than the
+    timeout, throttle and steering ramp to 0 at the paper's release rates. A held brake falls to
+    the gentle one; otherwise the gentle one is applied after the release. At standstill it is
+    released. Indicators stay on, the horn goes off. When commands return, the output moves to them
+    at the same rates, and passes them on as soon as it has reached them.
     """
 
     def __init__(self, parameters: WatchdogParameters | None = None) -> None:
@@ -66,7 +65,7 @@ class SeatWatchdog:
         self.reset()
 
     def reset(self) -> None:
-        """Begin a run: released, nothing lost; the count of losses stays."""
+        """Reset for a new run: released and not lost; the count of losses stays."""
         self.lost = False
         self._returning = False
         self._output = RELEASED
@@ -74,11 +73,11 @@ class SeatWatchdog:
     def filter(self, last_command: DriverCommand, age_s: float, dt_s: float,  # noqa: A003
                speed: float) -> DriverCommand:
         """
-        Return the command that the vehicle is to obey in this step.
+        Return the command for the vehicle in this step.
 
-        :param last_command: the last one heard, finite; `RELEASED` if none has been.
-        :param age_s: since it was heard, or since the run began if none was, on the steady
-            clock [s].
+        :param last_command: the last one received, finite; `RELEASED` if there was none.
+        :param age_s: time since it was received, or since the start of the run if there was none,
+            steady clock [s].
         :param dt_s: length of the step in simulation time [s].
         :param speed: signed speed of the vehicle [m/s].
         """

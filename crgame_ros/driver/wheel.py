@@ -11,7 +11,7 @@ from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.driver_command import DriverCommand
 
-# From linux/input-event-codes.h: the hats, and the first button of joysticks.
+# From linux/input-event-codes.h: the hat axes, and the first joystick button.
 HATS = range(0x10, 0x18)
 BTN_JOYSTICK = 0x120
 
@@ -51,7 +51,7 @@ class AxisRange:
     :param code: evdev code, or index in `Joy.axes`.
     :param minimum: smallest raw value.
     :param maximum: largest raw value.
-    :param rest: raw value when nobody touches it: the centre, or the released pedal.
+    :param rest: raw value of the untouched axis: the centre, or the released pedal.
     :param inverted: the command falls as the raw value rises.
     :param deadzone: share of the travel around the rest that counts as rest, in [0, 1).
     """
@@ -87,7 +87,7 @@ class AxisRange:
 @dataclass(frozen=True)
 class GearButtons:
     """
-    Buttons that choose the gear, as evdev codes or indices in `Joy.buttons`.
+    Buttons that select the gear, as evdev codes or indices in `Joy.buttons`.
 
     :param on: a press selects reverse.
     :param off: a press selects forward.
@@ -120,15 +120,15 @@ class GearButtons:
 @dataclass(frozen=True)
 class ControlLayout:
     """
-    Where a device's controls are, for one way of reading it (evdev or the `joy` node).
+    The controls of a device, for one way of reading it (evdev or the `joy` node).
 
     :param steering: the wheel or stick; positive to the left after inversion.
     :param throttle: throttle pedal; None with combined pedals.
     :param brake: brake pedal; None with combined pedals.
     :param pedals: one axis for both pedals, throttle on its positive side.
     :param gear: the gear buttons.
-    :param lights: those of indicators and horn.
-    :param put_back: those that put the vehicle back on its lane.
+    :param lights: the buttons of indicators and horn.
+    :param put_back: the buttons that put the vehicle back on its lane.
     """
 
     steering: AxisRange
@@ -141,7 +141,7 @@ class ControlLayout:
 
     @property
     def ranges(self) -> tuple[AxisRange, ...]:
-        """Every axis in use."""
+        """Return every axis in use."""
         axes = (self.steering, self.throttle, self.brake, self.pedals)
         return tuple(axis for axis in axes if axis is not None)
 
@@ -149,10 +149,10 @@ class ControlLayout:
 @dataclass(frozen=True)
 class AxisBinding:
     """
-    One axis as a device map states it, for evdev or for the `joy` node.
+    One axis as given in a device map, for evdev or for the `joy` node.
 
     :param code: evdev code, or index in `Joy.axes`.
-    :param minimum: smallest raw value; None takes what the device reports.
+    :param minimum: smallest raw value; None means as the device reports.
     :param maximum: largest raw value; None likewise.
     :param rest: raw value at rest; None is the middle for steering and combined pedals, and
         the minimum (inverted: the maximum) for a pedal.
@@ -171,11 +171,11 @@ class AxisBinding:
 
     def range(self, reported: tuple[float, float] | None = None) -> AxisRange:  # noqa: A003
         """
-        Complete the range with what the device reports.
+        Complete the range with the values that the device reports.
 
-        :param reported: the device's own minimum and maximum, if it tells them.
-        :raises InputError: if the map does not fit this device: neither tells a limit, or the
-            map covers less than half of the reported range or leaves it.
+        :param reported: the device's own minimum and maximum, if it reports them.
+        :raises InputError: if the map does not fit this device: neither gives a limit, or the map
+            covers less than half of the reported range or exceeds it.
         """
         lower, upper = reported or (self.minimum, self.maximum)
         minimum = lower if self.minimum is None else self.minimum
@@ -202,7 +202,7 @@ class AxisBinding:
 
 @dataclass(frozen=True)
 class ControlBindings:
-    """The controls of a wheel or gamepad for one way of reading it; None where it has none."""
+    """The controls of a wheel or gamepad for one way of reading it; None for a missing control."""
 
     steering: AxisBinding
     throttle: AxisBinding | None
@@ -216,7 +216,7 @@ class ControlBindings:
         """
         Return the calibrated layout.
 
-        :param reported: minimum and maximum by axis code, as the device tells them.
+        :param reported: minimum and maximum by axis code, as the device reports them.
         :raises InputError: if the map does not fit the device.
         """
         known = reported or {}
@@ -232,7 +232,7 @@ class ControlBindings:
 def reported(axes: Mapping[int, float], layout: ControlLayout,
              known: Container[int] = ()) -> dict[int, float]:
     """
-    Keep the axes that the device has really reported.
+    Return only the axes that the device has really reported.
 
     Drivers show exactly 0 until an axis first moves, which on a pedal that rests elsewhere
     would be half or full throttle; such an axis is left out and so counts as at rest.
@@ -249,10 +249,10 @@ def reported(axes: Mapping[int, float], layout: ControlLayout,
 def joy_state(axes: Mapping[int, float], pressed: Iterable[int],
               limits: Mapping[int, tuple[float, float]], buttons: Iterable[int]) -> JoyState:
     """
-    Return what the `joy` node would publish for a device, without its deadzone.
+    Return the message that the `joy` node would publish for a device, without its deadzone.
 
-    Axes stand in the order of their codes without the hats, turned so that left and up are
-    positive; buttons in the order of their codes, those from BTN_JOYSTICK on first.
+    Axes are in the order of their codes without the hats, with left and up positive. Buttons are
+    in the order of their codes, those from BTN_JOYSTICK on first.
 
     :param axes: raw value by code; an absent axis counts as in the middle.
     :param pressed: codes of the pressed buttons.
@@ -274,10 +274,10 @@ def normalize(raw: RawInput, layout: ControlLayout, reverse: bool = False,
     """
     Map raw values linearly to (p_th, p_br, s), without further conditioning (CRG 17).
 
-    :param raw: what the device reports.
+    :param raw: the device's reported values.
     :param layout: the device's calibrated axes.
-    :param reverse: the gear that its buttons have chosen (`GearButtons.after`).
-    :param lights: that they have switched on (`IndicatorLever`).
+    :param reverse: the gear that its buttons have selected (`GearButtons.after`).
+    :param lights: the lights that they have switched on (`IndicatorLever`).
     """
     if layout.pedals is not None:
         both = layout.pedals.deflection(raw)

@@ -22,8 +22,7 @@ from crgame_ros.game.driven_vehicle import (
     read_human,
     VEHICLE_ID,
 )
-from crgame_ros.game.event_file import parse_document_entries
-from crgame_ros.game.events import EventSpec, FiredBy, FiredEvent
+from crgame_ros.game.events import EventList, EventSpec, FiredBy, FiredEvent
 from crgame_ros.game.game import DrivabilitySpec, EnvironmentSpec, MAX_VEHICLES, TimingSpec
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
@@ -31,6 +30,7 @@ from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.schema.reading import read
+from crgame_ros.schema.writing import write
 
 GAME_TOPIC = '/scenario/game'
 OBJECTS_TOPIC = '/scenario/objects'
@@ -41,6 +41,8 @@ SEATS_TOPIC = '/seats'
 LARGEST_NUMBER = 2**31 * 10**9
 # The errors of reading an untrusted text, including those of huge numbers and deep nesting.
 MALFORMED = (AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError)
+# Keys of every event; the others are parameters of its kind.
+_COMMON = ('name', 'label', 'kind', 'when')
 
 
 @dataclass(frozen=True)
@@ -242,3 +244,26 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
     except MALFORMED as error:
         raise InputError(f'is no list of events ({type(error).__name__}: {error})',
                          EVENTS_TOPIC) from error
+
+
+def document_entry(event: EventSpec) -> dict[str, Any]:
+    """Return an event's entry of `/scenario/game`: name, label, kind, when and its parameters."""
+    entry = write(event)
+    parameters = entry.pop(event.kind)
+    return {'name': None, 'label': None, 'kind': event.kind, 'when': None} | entry | parameters
+
+
+def parse_document_entries(entries: Any, where: str) -> tuple[EventSpec, ...]:
+    """
+    Read the entries that `document_entry` writes.
+
+    :raises InputError: if they are malformed.
+    """
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise InputError('"events" is no list of events', where)
+    events: tuple[EventSpec, ...] = read(EventList, [
+        {key: entry[key] for key in _COMMON if key in entry and key != 'kind'}
+        | {str(entry.get('kind')): {key: value for key, value in entry.items()
+                                    if key not in _COMMON}}
+        for entry in entries], where)
+    return events

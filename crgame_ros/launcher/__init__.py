@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Starting, watching and ending the whole graph: what `run.sh` and `crgame run` do."""
+"""Starting, watching and ending the whole graph, for `run.sh` and `crgame run`."""

@@ -43,31 +43,31 @@ module:Class, file.py:Class or policy:FILE.py:load."""
 @dataclass(frozen=True)
 class RunRequest:
     """
-    What the user asked for on the command line.
+    The user's request on the command line.
 
     :param game: game file, if any.
     :param scenario: CommonRoad file instead of the game's.
     :param driver: driver source of the first human.
     :param planners: planners of the AVs in their order; a single one serves all.
-    :param problems: planning problems that become AVs, where the game names none; all of them
-        where empty, of those that start on one spot the first.
+    :param problems: planning problems that become AVs, where the game names none. If empty, all of
+        them do; of several that start on one spot, only the first.
     :param duration_s: simulated time [s]
     :param rate_hz: simulation rate [Hz]
     :param headless: without the cockpit.
     :param port: of the cockpit's page; the next free one when it is taken.
     :param listen: address on which the page is served beyond this machine, with a token.
     :param token: ask for a token on this machine too.
-    :param open_cockpit: let people in by links alone, which let one browser in each, over TLS.
-    :param certificate: PEM file for TLS, instead of one that is made.
+    :param open_cockpit: admit people only by links, each for one browser, over TLS.
+    :param certificate: PEM file for TLS, instead of a generated one.
     :param key: of the certificate.
     :param replay: recording to show in the page; nothing is simulated then.
     :param realtime_priority: SCHED_FIFO for the simulation.
     :param namespace: of all nodes, topics and services.
-    :param no_report: without the report, one HTML file, at the end of each run.
+    :param no_report: write no report (one HTML file) at the end of each run.
     :param drivers: driver sources of humans by their ids.
-    :param countdown_s: from when all drivers at pages are ready to the start [s]
-    :param start_paused: whether every game waits for an order to start.
-    :param framed_by: origin of the one page that may show the cockpit's within it; empty for none.
+    :param countdown_s: time from the readiness of all drivers at pages to the start [s]
+    :param start_paused: whether every game waits for a start order.
+    :param framed_by: origin of the only page that may embed the cockpit's page; empty for none.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
@@ -104,7 +104,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def build_parser(program: str) -> argparse.ArgumentParser:
-    """Build the parser; its help teaches."""
+    """Build the parser and its help text."""
     parser = _Parser(prog=program, description=DESCRIPTION, epilog=EPILOG,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
@@ -188,7 +188,7 @@ def cockpit_host(request: RunRequest) -> str:
 
 def read_drivers(values: Sequence[str]) -> tuple[str | None, tuple[tuple[str, str], ...]]:
     """
-    Read what `--driver` says, each time that it is given.
+    Read the values of `--driver`, which may be given several times.
 
     :param values: SOURCE, or hvN=SOURCE.
     :return: the source of the first human, and those of humans by their ids.

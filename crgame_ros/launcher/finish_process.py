@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Finishing a run beside a graph that goes on.
+A process that finishes a run beside a graph that goes on.
 
 `python -m crgame_ros.launcher.finish_process FOLDER [--no-report]`
 """
@@ -13,7 +13,7 @@ import sys
 from crgame_ros.launcher.run_report import write_run_report
 from crgame_ros.recording.finish import finish_run, FinishedRecording
 
-# The run that goes on comes first.
+# The run that goes on has priority.
 _NICE = 10
 NO_REPORT = '--no-report'
 
@@ -22,7 +22,7 @@ def main() -> int:
     """Finish the run in the folder that the command line names."""
     os.nice(_NICE)
     finished: list[FinishedRecording] = []
-    # What it says is read when it has ended.
+    # The output is read after the end of this process.
     code = finish_run(Path(sys.argv[1]), _print, progress=False, finished=finished.append)
     if NO_REPORT not in sys.argv[2:]:
         for each in finished:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finishing the recordings of runs that are over, while the graph stays for another one."""
+"""Finishing the recordings of ended runs, while the graph stays for the next one."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,11 +22,11 @@ LOOK_S = 0.5
 
 class Finisher:
     """
-    Finishes what is over, the latest first and one at a time, while no run goes on.
+    The finisher of ended runs: the latest first, one at a time, while no run goes on.
 
-    It would cost a run that goes on its time: after a reset it waits for the next end.
+    It would slow down a run in progress, so after a reset it waits for the next end.
 
-    :param session: folder of the session, which is that of its first run.
+    :param session: folder of the session, the same as that of its first run.
     :param say: prints one line.
     :param reports: whether each run gets a report, once its other files are written.
     """
@@ -42,7 +42,7 @@ class Finisher:
         self._looked_s = 0.0
 
     def poll(self) -> None:
-        """Report what has been finished, and begin with the next where no run goes on."""
+        """Report finished runs, and start the next one while no run goes on."""
         now_s = time.monotonic()
         if now_s - self._looked_s < LOOK_S:
             return
@@ -57,9 +57,9 @@ class Finisher:
 
     def finish_all(self, asked_to_end: bool = False) -> int:
         """
-        Finish, now that the graph has ended, what is left.
+        Finish the remaining runs after the end of the graph.
 
-        :param asked_to_end: whether somebody ended it: then it need not have begun.
+        :param asked_to_end: whether the user ended the graph: then a run need not have begun.
         :return: 0, or 1 if something could not be written, or nothing was recorded at all.
         """
         # It takes a second to import.
@@ -75,11 +75,11 @@ class Finisher:
                     finished=self._finished.append if self._reports else lambda _: None)
             (folder / FINISHED_MARK).unlink(missing_ok=True)
         codes = set(self._codes.values())
-        # A first game that nobody drove, before they chose another one, is no failure.
+        # A first game without a driver, before another one was chosen, is no failure.
         return 0 if codes <= {OK, EMPTY} and (OK in codes or asked_to_end) else 1
 
     def write_reports(self) -> None:
-        """Write the reports of what `finish_all` has finished; a second signal leaves them out."""
+        """Write the reports of runs that `finish_all` finished; a second signal skips them."""
         if not self._finished:
             return
         try:
@@ -91,7 +91,7 @@ class Finisher:
 
     def _start(self, folder: Path) -> None:
         self._folder = folder
-        # Ctrl-C is for the launcher, which then finishes all by itself.
+        # Ctrl-C is for the launcher, which then finishes all runs itself.
         self._process = subprocess.Popen(
             [sys.executable, '-m', 'crgame_ros.launcher.finish_process', str(folder),
              *([] if self._reports else ['--no-report'])],

@@ -3,10 +3,10 @@
 """
 Turning a fork of the launcher into a node.
 
-What nodes need takes each of them one to three seconds to load, the agents' compiled code and
-planners the longest. The launcher loads it once. Its forks share it and begin at once, and so do
-those that take the place of a node that has died. The launcher never speaks DDS and has no threads
-of its own, which a fork could not take along.
+The imports of a node take one to three seconds, the agents' compiled code and planners the
+longest. The launcher loads them once. Its forks share them and start at once, and so do
+replacements of a node that has died. The launcher never uses DDS and has no threads of its own,
+which a fork could not copy.
 """
 
 from collections.abc import Sequence
@@ -26,13 +26,13 @@ from crgame_ros.ros.node_main import (
     PARENT_VARIABLE,
 )
 
-# No process has more open files.
+# Upper limit of a process's open files.
 MAX_FILES = 1 << 20
 
 
 def load(names: Sequence[str]) -> None:
     """
-    Import what nodes import, before the first fork.
+    Import the nodes' modules before the first fork.
 
     :param names: modules, or functions of theirs to be called, as `module:function`.
     """
@@ -41,12 +41,12 @@ def load(names: Sequence[str]) -> None:
         try:
             found = import_module(module)
         except Exception:
-            # The node that needs it fails as well, and says how.
+            # The node that needs it fails as well, and reports the error.
             continue
         if function:
             getattr(found, function)()
     gc.collect()
-    # Pages that no collection touches stay shared.
+    # Memory pages that no collection touches stay shared.
     gc.freeze()
 
 
@@ -54,16 +54,16 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
     """
     Start a node in a process group of its own.
 
-    :param module: in which it is; its `main` is called.
-    :param arguments: of its command line.
-    :param nice: how far it steps back behind the simulation.
+    :param module: of the node; its `main` is called.
+    :param arguments: its command line.
+    :param nice: its niceness, to give the simulation priority.
     :return: process id, and a descriptor from which its output is read.
     """
     reading, writing = os.pipe()
     parent = os.getpid()
     sys.stdout.flush()
     sys.stderr.flush()
-    # A signal that comes before the fork has let go of the launcher's handlers waits until then.
+    # Signals are blocked until the fork has removed the launcher's handlers.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     pid = os.fork()
     if pid:
@@ -88,9 +88,9 @@ def fork_node(module: str, arguments: Sequence[str], nice: int) -> tuple[int, in
 
 
 def _detach(output: int) -> None:
-    """Give up what is the launcher's: its group, signals, files and terminal."""
+    """Release the launcher's process group, signal handlers, files and terminal."""
     os.setpgid(0, 0)
-    # What the terminal sent to all of the group until now was meant for the launcher.
+    # Signals that the terminal sent to the group until now were meant for the launcher.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     for number in ENDING:
@@ -107,7 +107,7 @@ def _detach(output: int) -> None:
 
 
 def _run(name: str, arguments: Sequence[str]) -> int:
-    """Run a node to its end, and give its exit code."""
+    """Run a node to its end, and return its exit code."""
     module = import_module(name)
     sys.argv[:] = [str(module.__file__), *arguments]
     try:

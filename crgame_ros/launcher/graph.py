@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The whole graph: nodes started, watched, restarted where that is safe, and ended in order."""
+"""The whole graph: its nodes are started, watched, restarted where safe, and ended in order."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,24 +14,24 @@ from crgame_ros.launcher.interruption import ENDING
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
 from crgame_ros.launcher.node_specs import Roster
 
-# The time that a node gets to end in good order, on a machine that others keep busy [s].
+# Time for a node to end in good order, even on a busy machine [s].
 GRACE_S = 10.0
-# It then gets so long to say what it is at [s].
+# Time that it then gets to print its stacks [s].
 WORD_S = 0.3
-# The recorder takes in what the others said last [s].
+# Time for the recorder to record the last messages of the others [s].
 DRAIN_S = 0.3
 MAX_RESTARTS = 5
-# Within such a time [s].
+# Period in which restarts are counted [s].
 RESTARTS_S = 60.0
 
 
 class Graph:
     """
-    Runs the nodes until the simulation ends or a signal comes.
+    The nodes of a graph, which run until the simulation ends or a signal comes.
 
-    :param specs: the nodes; the first is the one whose end ends the run.
+    :param specs: the nodes; the end of the first one ends the run.
     :param say: prints one line.
-    :param roster: tells of further vehicles, which get their nodes.
+    :param roster: lists further vehicles, which get their nodes.
     :param finisher: finishes the recordings of runs that are over.
     :param namespace: of all nodes.
     """
@@ -79,7 +79,7 @@ class Graph:
 
     @property
     def was_asked_to_end(self) -> bool:
-        """Whether a signal ended it, such as that of Ctrl-C."""
+        """Return whether a signal, such as that of Ctrl-C, ended the graph."""
         return self._signal is not None
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
@@ -95,7 +95,7 @@ class Graph:
         """Pass the nodes' output on, each line with the node's name."""
         for key, _ in self._selector.select(timeout_s):
             node: NodeProcess = key.data
-            # Asked first: what a node says last is then read before its pipe is given up.
+            # Checked first, so that a node's last output is read before its pipe is closed.
             ended = node.exit_code() is not None
             self._pass_on(node)
             if ended:
@@ -106,14 +106,14 @@ class Graph:
             self._say(f'[{node.spec.name:{self._width}}] {line}')
 
     def _restart_dead(self, first: str) -> None:
-        """Name a node that died, and start it again where that is safe."""
+        """Report a node that died, and start it again where that is safe."""
         for name, node in list(self._nodes.items()):
             code = node.exit_code()
             if name == first or code is None or self._restarts.get(name, 0) < 0:
                 continue
             cause = cause_of_death(code)
             count = self._restarts.get(name, 0) + 1
-            # Bad input stays bad: exit code 2 is not tried again.
+            # Bad input stays bad, so a node that exits with code 2 is not started again.
             now_s = time.monotonic()
             died_s = [at for at in self._died_s.get(name, []) if now_s - at < RESTARTS_S] + [now_s]
             self._died_s[name] = died_s
@@ -139,7 +139,7 @@ class Graph:
         node.close()
 
     def _end(self, first: str) -> int:
-        """End the simulation, let the recorder take the last messages in, end the others."""
+        """End the simulation, wait for the recorder to write the last messages, end the others."""
         simulation = self._nodes[first]
         died = simulation.exit_code()
         if died:
@@ -158,7 +158,7 @@ class Graph:
                 node.interrupt()
             self._wait_for(group)
         code = simulation.exit_code()
-        # One that was still loading has no handler yet.
+        # A node that was still loading has no handler yet.
         if self._signal is not None and died is None and code == -signal.SIGTERM:
             return 0
         return 0 if code == 0 else (code if code is not None and code > 0 else 1)
@@ -177,7 +177,7 @@ class Graph:
 
 
 def cause_of_death(code: int) -> str:
-    """Return how a process ended, from its exit code."""
+    """Return a description of a process's end from its exit code."""
     return f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What ends a run from outside: Ctrl-C, a signal, a closed terminal, a pipe that breaks."""
+"""Interruptions of a run: Ctrl-C, another signal, a closed terminal, a broken pipe."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ import signal
 import sys
 from types import FrameType
 
-# A closed terminal is a wish to end like any other.
+# A closed terminal ends a run like Ctrl-C.
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -17,7 +17,7 @@ def print_now(text: str) -> None:
     """
     Print one line at once.
 
-    Where nobody reads it any more the run is asked to end, in good order and silently.
+    If the output has no reader any more, ask the run to end, in good order and silently.
     """
     try:
         print(text, flush=True)
@@ -34,10 +34,10 @@ _RECOVERED = 'still writing the files; once more leaves that to `crgame recover`
 @contextmanager
 def writing(tell: Callable[[str], None], warning: str = _RECOVERED) -> Iterator[None]:
     """
-    Let the files of a run be written whatever signal comes; a second one is meant.
+    Protect the writing of a run's files from the first signal; a second one ends it.
 
     :param tell: prints one line.
-    :param warning: what it prints at the first signal.
+    :param warning: printed at the first signal.
     """
     heard = 0
 

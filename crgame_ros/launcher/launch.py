@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A live run from the command line: check, run, and turn the recording into a scenario."""
+"""A live run from the command line: check it, run it, and convert the recording to a scenario."""
 
 from collections.abc import Sequence
 import os
@@ -31,7 +31,7 @@ def launch(arguments: Sequence[str] | None = None) -> int:
     """
     Run a game from the command line.
 
-    :return: exit code, as `main` gives it.
+    :return: exit code, as of `main`.
     """
     began = False
     try:
@@ -77,7 +77,7 @@ def launch(arguments: Sequence[str] | None = None) -> int:
 
 
 def announce(plan: RunPlan) -> None:
-    """Say what is going to happen, and settle the DDS domain."""
+    """Print the plan of the run, and set the DDS domain."""
     prepare_environment()
     os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
     setup = plan.setup

@@ -13,7 +13,7 @@ class LaunchArgument(NamedTuple):
     One argument.
 
     :param option: the launcher's option, '' for the game; given once for each value of a list.
-    :param what: what it means.
+    :param what: its meaning.
     :param default: as text; an empty value is none.
     :param flag: whether it is true or false.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command behind `run.sh`: loads what runs a game, and can be ended at any moment of that."""
+"""The command behind `run.sh`; it can be interrupted at any moment, even while it loads."""
 
 from collections.abc import Sequence
 import os
@@ -19,14 +19,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal left files unwritten.
     """
     before = signal.getsignal(signal.SIGINT)
-    # Who starts it in the background may have it ignored.
+    # A shell that starts this in the background may have set SIGINT to be ignored.
     if before is signal.default_int_handler:
         signal.signal(signal.SIGINT, _leave)
-    # run.sh holds it back while Python itself starts.
+    # run.sh blocks it while Python itself starts.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     words = sys.argv[1:] if arguments is None else arguments
     if {'--help', '-h'} & set(words):
-        # Answers in an environment that has no packages yet.
+        # Imported first, so that help and errors work in an environment without packages.
         from crgame_ros.launcher.arguments import parse_arguments
         parse_arguments(['--help'])
     from crgame_ros.launcher.launch import launch
@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _leave(_number: int, _frame: FrameType | None) -> None:
-    """End at once: nothing has been made yet, and an import may not be broken off in order."""
+    """End at once: nothing has been created yet, and an import cannot be interrupted cleanly."""
     print(ENDED_EARLY, flush=True)
     os._exit(0)
 

@@ -15,12 +15,12 @@ MAX_LINE = 10_000
 @dataclass(frozen=True)
 class NodeSpec:
     """
-    How to start a node.
+    The specification of a node's process.
 
     :param executable: sim_node, planner_node, …
     :param name: node name in the graph; the prefix of its output.
     :param parameters: ROS parameters.
-    :param nice: how far it steps back behind the simulation.
+    :param nice: its niceness, to give the simulation priority.
     :param restart: whether it may be started again when it dies.
     """
 
@@ -32,7 +32,7 @@ class NodeSpec:
 
     @property
     def module(self) -> str:
-        """Name of the Python module that is run."""
+        """Return the name of the Python module that is run."""
         return f'crgame_ros.nodes.{self.executable}'
 
     def arguments(self, namespace: str = '/') -> list[str]:
@@ -48,12 +48,11 @@ class NodeProcess:
     A running node whose output is read line by line.
 
     :ivar pid: process id.
-    :ivar output: what it prints.
+    :ivar output: of the node.
 
-    It gets a process group of its own, so that Ctrl-C reaches the launcher only, which ends the
-    nodes in good order; should the launcher be killed, the kernel ends the node
-    (`die_with_parent`), and wakes it for that where it was stopped, for its group has lost its
-    session's parent.
+    It has its own process group, so that Ctrl-C reaches the launcher only, which ends the nodes in
+    good order. If the launcher is killed, the kernel ends the node (`die_with_parent`). A stopped
+    node is woken for that, because its process group is orphaned.
     """
 
     def __init__(self, spec: NodeSpec, namespace: str = '/') -> None:
@@ -90,11 +89,11 @@ class NodeProcess:
     def interrupt(self) -> None:
         """Ask the node to end."""
         if self.exit_code() is None:
-            # To a process that is still loading, SIGINT would mean a traceback.
+            # In a process that is still loading, SIGINT would cause a traceback.
             os.kill(self.pid, signal.SIGTERM)
 
     def print_stacks(self) -> None:
-        """Have the node print what each of its threads is at."""
+        """Signal the node to print the stack of each of its threads."""
         if self.exit_code() is None:
             os.kill(self.pid, TELL_WHERE)
 

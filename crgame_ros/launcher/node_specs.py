@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which nodes a run has, and which ones a game that is chosen later adds."""
+"""The nodes of a run, and those that a game chosen later adds."""
 
 from collections.abc import Sequence
 import json
@@ -15,12 +15,12 @@ from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.simulation.roster import Participants
 
 COMPANION_NICE = 5
-# Pictures for people, and what is measured beside the run, give way to everybody.
+# Viewers and nodes that measure beside the run have the lowest priority.
 VIEWER_NICE = 10
 
 
 def node_specs(plan: RunPlan) -> list[NodeSpec]:
-    """List the nodes of a run: sim_node first, which waits for its companions, viewers last."""
+    """Return the nodes of a run: sim_node first, which waits for its companions; viewers last."""
     setup, request = plan.setup, plan.request
     companions = [
         *participant_specs(Participants.from_setup(setup), plan.roster),
@@ -30,12 +30,12 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
         NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True),
         NodeSpec('criticality_node', 'criticality_node', nice=VIEWER_NICE, restart=True)]
     viewers = _viewer_specs(plan)
-    # With a driver in the browser the run begins when somebody has taken the seat, and step 0
-    # must reach the page.
+    # With a driver in the browser, the run begins when the seat is taken, and step 0 must reach
+    # the page.
     waits = any(human.driver == COCKPIT for human in setup.humans)
     drivers = [spec for spec in viewers if waits and spec.executable == 'cockpit_node']
     waiting = ', '.join(f'"{spec.name}"' for spec in (*companions, *drivers))
-    # Later games may come from the page, and from where the first one was.
+    # Later games may come from the page, and from the folder of the first one.
     folders = [plan.cockpit / 'games']
     if request.game is not None:
         folders.append(request.game.resolve().parent)
@@ -52,7 +52,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
 
 
 def shared_modules(specs: Sequence[NodeSpec], plan: RunPlan) -> list[str]:
-    """List what the nodes of a run load; the package's own alone: users' code is theirs."""
+    """Return the modules that a run's nodes load: this package's own, no users' code."""
     modules = {spec.module: None for spec in specs}
     for av in plan.setup.avs:
         if av.spec.planner in BUILT_IN:
@@ -63,7 +63,7 @@ def shared_modules(specs: Sequence[NodeSpec], plan: RunPlan) -> list[str]:
 
 
 def at_end(request: RunRequest) -> str:
-    """Return what follows the end of a run: who can begin another one wants to see how it went."""
+    """Return the action at a run's end: it stays visible if another run can be started."""
     if request.headless:
         return EXIT
     return STAY if request.duration_s is None else STAY_IF_CHOSEN
@@ -71,7 +71,7 @@ def at_end(request: RunRequest) -> str:
 
 def participant_specs(who: Participants, roster: Path) -> list[NodeSpec]:
     """
-    List the nodes that a game's vehicles, perception, traffic and map need.
+    Return the nodes that a game's vehicles, perception, traffic and map need.
 
     :param roster: file in which sim_node names the code that they may run.
     """
@@ -95,7 +95,7 @@ def participant_specs(who: Participants, roster: Path) -> list[NodeSpec]:
 
 
 def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
-    """List the nodes that come and go as they like."""
+    """Return the nodes that may come and go during a run."""
     request = plan.request
     viewers = [NodeSpec('marker_node', 'marker_node', nice=VIEWER_NICE, restart=True)]
     if not request.headless:
@@ -109,7 +109,7 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
             'private': f'"{plan.private}"', 'seats': f'[{seats}]',
             'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
             'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"',
-            # What lies beside a folder that somebody named is theirs.
+            # The files beside a folder that the user named are not shown.
             'archive': f'"{plan.folder.parent if request.out is None else ""}"'},
             nice=COMPANION_NICE, restart=True))
     return viewers
@@ -121,9 +121,9 @@ def _path(path: Path | None) -> str:
 
 class Roster:
     """
-    The vehicles of the game that runs now, as sim_node writes them into a file.
+    The vehicles of the present game, as sim_node writes them into a file.
 
-    A game chosen in the cockpit may have other vehicles than the one that was started.
+    A game chosen in the cockpit may have other vehicles than the first one.
 
     :param path: of the file.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a request to a checked plan of the run: game, vehicles and folder."""
+"""Building a checked plan of a run from a request: game, vehicles and folder."""
 
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
@@ -43,9 +43,9 @@ class RunPlan:
     """
     A run that can be started.
 
-    :param request: what the user asked for.
+    :param request: of the user.
     :param setup: the run, loaded and checked.
-    :param folder: where its files go; exists.
+    :param folder: of its files; exists.
     """
 
     request: RunRequest
@@ -54,38 +54,38 @@ class RunPlan:
 
     @property
     def claim(self) -> Path:
-        """Name the file that says, while the run goes on, that the folder is its own."""
+        """Return the file that reserves the folder while the run goes on."""
         return self.folder / CLAIM
 
     @property
     def game_file(self) -> Path:
-        """Name the game as it is run, in the run's folder."""
+        """Return the file of the resolved game, in the run's folder."""
         return self.folder / 'game.yaml'
 
     @property
     def cockpit(self) -> Path:
-        """Name the folder of what people upload and choose in the cockpit."""
+        """Return the folder of the cockpit's uploads and choices."""
         return self.folder / 'cockpit'
 
     @property
     def roster(self) -> Path:
-        """Name the file of the vehicles of the game that runs now, while it runs."""
+        """Return the file of the present game's vehicles, which exists while the game runs."""
         return self.folder / '.roster.json'
 
     @property
     def private(self) -> Path:
-        """Name the folder of links and certificate, for its owner alone, while the run goes on."""
+        """Return the folder of links and certificate: private, and only during the run."""
         return self.folder / '.private'
 
     @property
     def bag(self) -> Path:
-        """Name the recording."""
+        """Return the path of the recording."""
         return self.folder / 'bag'
 
 
 def effective_game(request: RunRequest, game: Game | None = None) -> Game:
     """
-    Combine the game file with what the command line says.
+    Combine the game file with the command line.
 
     :param game: instead of the game file's.
     :raises InputError: if a file or name cannot be used.
@@ -95,7 +95,7 @@ def effective_game(request: RunRequest, game: Game | None = None) -> Game:
     elif request.game is not None:
         game = load_game(request.game)
     elif request.scenario is not None:
-        # The human of an exported run is a recording in it: the same cast drives again.
+        # The human of an exported run is a recording in it, so the same drivers take part again.
         alone = request.driver is None and not request.drivers \
             and plays_its_humans(request.scenario)
         game = Game(request.scenario, humans=() if alone else (HumanSpec('hv0'),))
@@ -119,7 +119,7 @@ def effective_game(request: RunRequest, game: Game | None = None) -> Game:
 
 
 def _with_drivers(game: Game, drivers: Mapping[str, str]) -> Game:
-    """Take over who drives whom."""
+    """Return the game with these drivers of its humans."""
     known = {human.id for human in game.humans}
     unknown = sorted(drivers.keys() - known)
     if unknown:
@@ -131,7 +131,7 @@ def _with_drivers(game: Game, drivers: Mapping[str, str]) -> Game:
 
 
 def _with_limits(game: Game, request: RunRequest) -> Game:
-    """Take over how long and how finely to simulate."""
+    """Return the game with the request's duration and rate."""
     if request.duration_s is not None:
         game = replace(game, duration=request.duration_s)
     if request.rate_hz is not None:
@@ -142,11 +142,11 @@ def _with_limits(game: Game, request: RunRequest) -> Game:
 
 def effective_setup(request: RunRequest, game: Game | None = None) -> Setup:
     """
-    Load and place what a request asks for, with its planners and whatever it repeats.
+    Load and set up the requested run, with its planners and the recordings that it repeats.
 
-    With `--driver replay:BAG` and no game it is the game of the recording.
+    With `--driver replay:BAG` and no game, use the game of the recording.
 
-    :param game: instead of the one that the request names.
+    :param game: used instead of the one that the request names.
     :raises InputError: if a file or name cannot be used, or game and recording don't belong
         together.
     """
@@ -166,7 +166,7 @@ def effective_setup(request: RunRequest, game: Game | None = None) -> Setup:
 
 @contextlib.contextmanager
 def naming(request: RunRequest) -> Iterator[None]:
-    """Let refusals that name no file name the one in which the game stands."""
+    """Add the game's file to errors that name no file."""
     file = _own_recording(request) or request.game
     try:
         yield
@@ -179,7 +179,7 @@ def naming(request: RunRequest) -> Iterator[None]:
 
 
 def _own_recording(request: RunRequest) -> Path | None:
-    """Return the recording whose own game is asked for, None if there is another game."""
+    """Return the recording whose own game is requested, None if there is another game."""
     if request.driver is None or request.game is not None or request.scenario is not None:
         return None
     source = parse_source(request.driver)
@@ -187,7 +187,7 @@ def _own_recording(request: RunRequest) -> Path | None:
 
 
 def _from_here(driver: str) -> str:
-    """Resolve a file named on the command line against the present directory."""
+    """Resolve a file named on the command line against the working directory."""
     kind, colon, argument = driver.partition(':')
     if not colon or kind == 'evdev':
         return driver
@@ -196,7 +196,7 @@ def _from_here(driver: str) -> str:
 
 def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) -> RunPlan:
     """
-    Load and check everything before any process starts, and make the run's folder.
+    Load and check everything before any process starts, and create the run's folder.
 
     :param now: wall clock for the folder's name.
     :raises InputError: if anything cannot be used.
@@ -211,7 +211,7 @@ def plan_run(request: RunRequest, now: Callable[[], datetime] = datetime.now) ->
     except OSError as error:
         with contextlib.suppress(OSError):
             (folder / CLAIM).unlink()
-            # Empty, unless it was there before.
+            # This succeeds only if the folder is empty.
             folder.rmdir()
         raise InputError(f'cannot be written to ({error.strerror})', str(folder),
                          'free some space, or choose another folder with --out') from error
@@ -234,14 +234,14 @@ def _check_run(request: RunRequest, setup: Setup) -> None:
 
 
 def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
-    """Write what the nodes read into the folder of the run."""
+    """Write the files that the nodes read into the run's folder."""
     if _own_recording(request) is not None:
         # The nodes read files: this run's folder gets the scenario that the recording carries.
         scenario = folder / 'scenario.xml'
         scenario.write_bytes(guard.encode(setup.loaded.xml_text))
         setup = replace(setup, game=replace(setup.game, scenario=scenario))
     plan = RunPlan(request, setup, folder)
-    # Of a launcher that was killed; its links hold no longer.
+    # Left by a killed launcher; its links are no longer valid.
     shutil.rmtree(plan.private, ignore_errors=True)
     plan.private.mkdir(mode=0o700)
     plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
@@ -257,7 +257,7 @@ def _check_planner(spec: AvSpec) -> None:
 
 
 def _check_swaps(setup: Setup) -> None:
-    """Make every planner that an event brings in, as its node will."""
+    """Create every planner that an event brings in, as its node will."""
     specs = [av.spec for av in setup.avs]
     for event in setup.game.events:
         if isinstance(event.action, PlannerSwap):
@@ -266,7 +266,7 @@ def _check_swaps(setup: Setup) -> None:
 
 
 def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
-    """Write the AVs into the game as they were found, with the planners asked for."""
+    """Return the setup with its resolved AVs in the game, with the requested planners."""
     if len(planners) > 1 and len(planners) != len(setup.avs):
         raise InputError(f'{len(planners)} planners for {len(setup.avs)} AVs', '--planner',
                          'give one for all, or one for each')
@@ -283,7 +283,7 @@ def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
 
 
 def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
-    """Make a folder of its own for the run: what is there already stays as it is."""
+    """Create a separate folder for the run; existing files stay as they are."""
     wanted = out if out is not None else Path('runs') / f'{now:%Y%m%d-%H%M%S}_{benchmark_id}'
     folder = wanted
     try:
@@ -295,7 +295,8 @@ def _make_folder(out: Path | None, benchmark_id: str, now: datetime) -> Path:
                 raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR))
             with contextlib.suppress(FileExistsError):
                 if not (folder / 'bag').exists():
-                    # Whoever makes this file has the folder: several may start at once.
+                    # Several launchers may start at once: the one that creates this file has the
+                    # folder.
                     (folder / CLAIM).touch(exist_ok=False)
                     break
     except OSError as error:

@@ -18,10 +18,10 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
     """
     Write the report of a run beside its recording.
 
-    Nothing that goes wrong here is worth the run: it is said, and that is all.
+    A failure is only reported, because it must not harm the run.
 
-    :param say: takes one line for people.
-    :param progress: whether to say how far it is, where it takes long.
+    :param say: prints one line.
+    :param progress: whether to report progress where it takes long.
     """
     folder = finished.bag.parent
     path = folder / f'report{finished.suffix}.html'

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where things are in a serialised message, to read some of them without decoding it whole.
+The layout of a serialised message, to read some of its fields without decoding all.
 
-The layout is that of CDR (OMG DDS-XTypes 7.4.3): everything aligned to its size behind a header
-of four bytes, which says the order of bytes.
+The layout is that of CDR (OMG DDS-XTypes 7.4.3): every value is aligned to its size, after a
+header of four bytes that gives the byte order.
 """
 
 import struct
@@ -29,20 +29,21 @@ def header_stamp_ns(data: bytes) -> int:
 
 
 def stamp_of(message: Any) -> int:
-    """Return the stamp of a message that has been decoded, by whichever library [ns]."""
+    """Return the stamp of a message [ns]; any library may have decoded it."""
     return int(message.header.stamp.sec) * _NS_PER_S + int(message.header.stamp.nanosec)
 
 
 def aligned(place: int, size: int) -> int:
-    """Return the next place in a serialised message that CDR aligns to so many bytes."""
+    """Return the next position in a serialised message that is aligned to a size in bytes."""
     return place + (HEADER_BYTES - place) % size
 
 
 class Reader:
     """
-    Walks over the bytes of a message.
+    A reader of the bytes of a message, field by field.
 
-    :raises ValueError: if it is no little-endian CDR; as everything here, and struct.error.
+    :raises ValueError: if it is no little-endian CDR. Every method raises ValueError or
+        struct.error.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -70,7 +71,7 @@ class Reader:
         return text.decode()
 
     def skip_text(self) -> None:
-        """Pass over a string."""
+        """Skip a string."""
         length = self.number()
         self._at += length
 
@@ -97,7 +98,7 @@ def message_header(data: bytes, where: str) -> tuple[int, str]:
     :raises InputError: if there is none.
     """
     try:
-        # Of a long message no more than that is looked at.
+        # The header is within these bytes of a long message.
         reader = Reader(data[:512])
         return reader.stamp_ns(), reader.text()
     except (ValueError, struct.error) as error:

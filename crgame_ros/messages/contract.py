@@ -34,12 +34,12 @@ class Topic:
     :param type_name: package/msg/Type.
     :param producers: nodes that publish it.
     :param consumers: nodes that subscribe to it; `external` stands for others.
-    :param record: whether the recorder takes it.
-    :param rate: nominal rate [Hz], or words.
+    :param record: whether the recorder records it.
+    :param rate: nominal rate [Hz], or a description.
     :param fields: meaning and unit of each field that is used.
     :param max_bytes: of a serialised message; longer ones are refused.
     :param points: fewest and most points of a trajectory.
-    :param finite: whether positions and velocities of a trajectory are all there.
+    :param finite: whether all positions and velocities of a trajectory are finite.
     :param optional: whether it is left out where its type's package is not installed.
     """
 
@@ -58,7 +58,7 @@ class Topic:
 
     @property
     def available(self) -> bool:
-        """Return whether it is there: only an optional one may not be."""
+        """Return whether the topic is available; only an optional one may not be."""
         return not self.optional or find_spec(self.type_name.partition('/')[0]) is not None
 
     @property
@@ -85,7 +85,7 @@ class Service:
     """
     One service of the contract, offered by sim_node.
 
-    :param name: with a placeholder <av> for an AV's id, if there is one of each.
+    :param name: with a placeholder <av> for an AV's id, if each AV has one.
     """
 
     name: str
@@ -108,7 +108,7 @@ class Contract:
     parameters: Mapping[str, Mapping[str, Mapping[str, str]]]
 
     def topic(self, name: str) -> Topic:
-        """Look a topic up by its name in the contract."""
+        """Return a topic by its name in the contract."""
         return self.topics[name]
 
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What `trajectory_msgs/JointTrajectory` messages say, whichever library has decoded them.
+Reading `trajectory_msgs/JointTrajectory` messages, whichever library has decoded them.
 
-Those of a live run and those of a recording have the same attributes.
+Messages of a live run and of a recording have the same attributes.
 """
 
 from collections.abc import Sequence
@@ -23,10 +23,10 @@ FloatArray = NDArray[np.float64]
 
 def from_joint_trajectory(message: Any, where: str) -> JointSeries:
     """
-    Read a message from anyone as a joint series; accelerations may be left out (NaN).
+    Read a message from any sender as a joint series; accelerations may be left out (NaN).
 
     :param where: topic name for messages.
-    :raises InputError: if a point doesn't give every joint, or a frame other than map is named.
+    :raises InputError: if a point lacks a joint, or a frame other than map is named.
     """
     if message.header.frame_id not in (MAP, ''):
         raise InputError(f'frame "{message.header.frame_id}" is not {MAP}', where)
@@ -55,11 +55,11 @@ def _rows(rows: Sequence[Sequence[float]], joints: int, name: str,
 
 class JointReader:
     """
-    Reads the only point of messages that name the same joints in whatever order.
+    A reader of single-point messages that name the same joints in any order.
 
     The messages are those of `trajectory_msgs/JointTrajectory`, live or out of a recording.
 
-    :param wanted: names of the joints, in the order in which they are given back.
+    :param wanted: names of the joints, in the order of the result.
     :param where: topic, for messages.
     """
 
@@ -72,7 +72,7 @@ class JointReader:
         """
         Return (3, joints) positions, velocities and accelerations.
 
-        :raises InputError: if a joint is missing, or one of somebody else is there.
+        :raises InputError: if a joint is missing, or one of another object is present.
         """
         names = message.joint_names
         rows = [] if not message.points else [
@@ -86,7 +86,7 @@ class JointReader:
 
     def order(self, names: Sequence[str]) -> list[int]:
         """
-        Return where the joints are among those of a message.
+        Return the indices of the joints in a message.
 
         :raises InputError: as `read`.
         """
@@ -101,6 +101,7 @@ class JointReader:
                 other = next(name for name in key if name not in self._wanted)
                 raise InputError(f'names the joint {other[:60]} of a vehicle that is not in '
                                  'the game', self._where)
-            # What runs send never differs; others may send what they like.
+            # Runs always send the same names; other senders may send any, so only one order is
+            # kept.
             self._orders = {key: [place[name] for name in self._wanted]}
         return self._orders[key]

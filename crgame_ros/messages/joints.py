@@ -3,9 +3,9 @@
 """
 Trajectories as flat joint arrays: the core's image of trajectory_msgs/JointTrajectory.
 
-Both runners pass requests and plans through these functions, so that a planner sees the same
-bits in process and over DDS. A driven vehicle is the joints x, y, yaw and steering of its rear
-axle, any other object x, y and yaw of its centre; absence is NaN (`msg_defs/interfaces.yaml`).
+Both runners pass requests and plans through these functions, so that a planner gets the same bits
+in process and over DDS. A driven vehicle is the joints x, y, yaw and steering of its rear axle,
+any other object x, y and yaw of its centre; absence is NaN (`msg_defs/interfaces.yaml`).
 """
 
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ class JointSeries:
 
 def without_absent(series: JointSeries, vehicles: int) -> JointSeries:
     """
-    Leave out the objects that are at none of the points: of many that may appear few are there.
+    Return the series without objects that are absent at all points, usually most of them.
 
-    :param series: of driven vehicles, which all stay, and of objects behind them.
+    :param series: of driven vehicles, which are all kept, followed by objects.
     :param vehicles: number of driven vehicles.
     """
     width = len(VEHICLE_JOINTS) * vehicles
@@ -62,12 +62,12 @@ def without_absent(series: JointSeries, vehicles: int) -> JointSeries:
 
 
 def vehicle_joint_names(vehicle_id: str) -> tuple[str, ...]:
-    """Name the joints of a driven vehicle."""
+    """Return the names of a driven vehicle's joints."""
     return tuple(f'{vehicle_id}/{joint}' for joint in VEHICLE_JOINTS)
 
 
 def object_joint_names(object_id: str) -> tuple[str, ...]:
-    """Name the joints of an object that is no driven vehicle."""
+    """Return the names of the joints of an object that is no driven vehicle."""
     return tuple(f'{object_id}/{joint}' for joint in OBJECT_JOINTS)
 
 
@@ -77,7 +77,7 @@ def vehicle_to_joints(
     """
     Return a vehicle's joint positions, velocities and accelerations (4 each).
 
-    The angular accelerations are no part of the model and stay NaN.
+    The angular accelerations are not part of the model and stay NaN.
     """
     cos, sin = math.cos(state.yaw), math.sin(state.yaw)
     return (
@@ -135,7 +135,7 @@ def plan_to_joints(plan: Plan, vehicle_id: str, time_step_ns: int) -> JointSerie
 
 def plan_from_joints(series: JointSeries, vehicle_id: str, time_step_ns: int) -> Plan:
     """
-    Read a plan from joints, whoever sent them; accelerations may be left out (NaN).
+    Read a plan from joints of any sender; accelerations may be left out (NaN).
 
     :param vehicle_id: the AV that the plan must be for.
     :param time_step_ns: Delta t_c [ns], the grid that the points must be on.
@@ -154,6 +154,6 @@ def plan_from_joints(series: JointSeries, vehicle_id: str, time_step_ns: int) ->
     states = vehicles_from_joints(series.positions, series.velocities, series.accelerations)
     column = states[:, StateColumn.ACCELERATION]
     if np.isnan(series.accelerations).all() and len(states) > 1:
-        # Accelerations may be left out: they follow from the speeds.
+        # Missing accelerations follow from the speeds.
         column[:] = np.gradient(states[:, StateColumn.SPEED], time_step_ns * 1e-9)
     return Plan(series.stamp_ns, states)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What is asked of a motion planner, and what it answers.
+The request to a motion planner and its answer, the plan.
 
 Poses of the ego are rear-axle poses, those of obstacles are centre poses, all in the CommonRoad
 scenario frame.
@@ -22,15 +22,15 @@ class PlanRequest:
     """
     One atomic snapshot at scenario time step k, with predictions over P - 1 further steps.
 
-    :param stamp_ns: simulation time of the snapshot [ns]; the plan carries it back.
+    :param stamp_ns: simulation time of the snapshot [ns]; the plan repeats it.
     :param k: scenario time step.
     :param time_step_s: scenario step Delta t_c [s].
     :param ego: state of the planner's own vehicle (rear axle).
     :param obstacle_ids: (M) names; keys of `PlannerContext.objects`.
     :param obstacle_poses: (P, M, 3) centre x, y, yaw at k, k + 1, …; NaN where absent.
     :param obstacle_velocities: (P, M, 3) derivatives of the poses; NaN where absent.
-    :param lights: what other driven vehicles show and sound now, by their ids; those that are
-        seen, for a planner that wants them (`Planner.wants_lights`), else empty.
+    :param lights: present lights and horn of other driven vehicles that are seen, by their ids.
+        Empty unless the planner wants them (`Planner.wants_lights`).
     """
 
     stamp_ns: int
@@ -59,7 +59,7 @@ class Plan:
     fallback: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse an array that is no list of states."""
+        """Check that the array is a list of states."""
         if self.states.ndim != 2 or self.states.shape[1] != STATE_WIDTH or not len(self.states):
             raise InputError(f'a plan has shape {self.states.shape}', 'plan',
                              f'give at least one row of {STATE_WIDTH} columns: '

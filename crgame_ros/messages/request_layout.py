@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which joints of a plan request belong to whom."""
+"""The assignment of a plan request's joints to vehicles and objects."""
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,9 +28,9 @@ JOINTS = len(VEHICLE_JOINTS)
 @dataclass(frozen=True)
 class RequestLayout:
     """
-    The columns of those that an AV is told of; its own are the first four.
+    The columns of the others in an AV's request; its own are the first four.
 
-    :param ids: (T) who they are
+    :param ids: (T) of the others
     :param columns: (T, 3) their joints x, y and yaw
     :param where: the topic, for messages
     """
@@ -44,9 +44,9 @@ class RequestLayout:
         """
         Read joint names.
 
-        :param av: whose request it has to be.
+        :param av: the AV whose request it must be.
         :param where: the topic, for messages.
-        :raises InputError: if it is another vehicle's, or somebody lacks a joint.
+        :raises InputError: if it is another vehicle's, or one of the others lacks a joint.
         """
         where = where or f'/{av}/plan_request'
         own = vehicle_joint_names(av)
@@ -65,9 +65,9 @@ class RequestLayout:
 
     def indices(self, index: Mapping[str, int]) -> Index:
         """
-        Return everybody's index (T).
+        Return the index of each of the others (T).
 
-        :raises InputError: if somebody has none.
+        :raises InputError: if one of them has none.
         """
         for object_id in self.ids:
             if object_id not in index:
@@ -76,7 +76,7 @@ class RequestLayout:
         return np.array([index[object_id] for object_id in self.ids], dtype=np.intp)
 
     def among(self, known: Container[str]) -> 'RequestLayout':
-        """Leave out whoever is not known."""
+        """Return the layout of the known ones only."""
         kept = [number for number, object_id in enumerate(self.ids) if object_id in known]
         return RequestLayout(tuple(self.ids[number] for number in kept), self.columns[kept],
                              self.where)
@@ -84,7 +84,7 @@ class RequestLayout:
 
 def with_lights(series: JointSeries, lights: Mapping[str, float]) -> JointSeries:
     """
-    Add what vehicles show now: nobody's future lights are known, which is NaN.
+    Add the present lights of vehicles; future lights are unknown, which is NaN.
 
     :param series: a request without lights.
     :param lights: bits of `Light` by vehicle; NaN where they are not seen.
@@ -100,7 +100,7 @@ def with_lights(series: JointSeries, lights: Mapping[str, float]) -> JointSeries
 
 
 def without_lights(series: JointSeries) -> tuple[JointSeries, dict[str, float]]:
-    """Take a request apart: what `with_lights` was given."""
+    """Split a request into the arguments of `with_lights`."""
     columns = light_columns(series.names)
     if not columns:
         return series, {}
@@ -119,7 +119,7 @@ def light_columns(names: tuple[str, ...]) -> dict[str, int]:
 
 
 def light_of(value: float) -> Light | None:
-    """Read a position of such a joint, whoever sent it; None if it tells nothing."""
+    """Read the position of a lights joint of any sender; None if it has no meaning."""
     return Light(int(value) & ALL_LIGHTS) if math.isfinite(value) else None
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The values of a status, which ROS's diagnostics carry as text: written and read in one way."""
+"""Writing and reading the values of a status, which ROS's diagnostics carry as text."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -9,14 +9,14 @@ import numpy as np
 
 
 def status_text(value: object) -> str:
-    """Write a value: yes and no as `true` and `false`, as ROS's own tools do."""
+    """Return a value as text; booleans as `true` and `false`, as in ROS's own tools."""
     if isinstance(value, bool | np.bool_):
         return 'true' if value else 'false'
     return str(value)
 
 
 def status_truth(values: Mapping[str, str], key: str, default: bool = False) -> bool:
-    """Read a yes or no; recordings of earlier versions have `True`."""
+    """Return a boolean value; recordings of earlier versions have `True`."""
     return values[key].lower() == 'true' if key in values else default
 
 
@@ -30,7 +30,7 @@ class Status(NamedTuple):
 
 
 def read_status(message: Any) -> Status:
-    """Read a status, whichever library has decoded it."""
+    """Read a status; any library may have decoded it."""
     level = message.level
     return Status(str(message.name), level[0] if isinstance(level, bytes) else int(level),
                   str(message.message),

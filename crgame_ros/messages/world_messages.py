@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The world in messages: where all vehicles and objects are, whoever reads it from wherever."""
+"""Reading the states of all vehicles and objects from live or recorded messages."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -25,14 +25,14 @@ FloatArray = NDArray[np.float64]
 
 
 def joints_of(topic: str, ids: Iterable[str]) -> list[str]:
-    """Name the joints of vehicles or objects, by the topic that holds them."""
+    """Return the joint names of vehicles or objects, by the topic that holds them."""
     names = object_joint_names if topic == OBJECT_STATES_TOPIC else vehicle_joint_names
     return [name for item in ids for name in names(item)]
 
 
 class WorldMessages:
     """
-    Reads where the vehicles and objects of one run are.
+    A reader of the states of one run's vehicles and objects.
 
     :param descriptions: of the run.
     :ivar vehicles: ids of the V driven vehicles, in order.

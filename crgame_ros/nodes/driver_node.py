@@ -136,9 +136,7 @@ class DriverNode(Node):
                 '/<hv>/joy', self._on_joy, self._vehicle_id)
 
     def _policy_world(self) -> 'PolicyWorld':
-        """
-        Return the world of a policy; subscribe to it once, and only where a policy drives.
-        """
+        """Return the world of a policy; subscribe to it once, only where a policy drives."""
         if self._world is None:
             from crgame_ros.ros.live_policy import PolicyWorld
             self._world = PolicyWorld(self._endpoints)

@@ -142,9 +142,7 @@ class MarkerNode(Node):
         self._known = present
 
     def _receive_states(self, scene: SceneMarkers, documents: ScenarioSet) -> bool:
-        """
-        Read the newest messages of moving things; return whether there are new states.
-        """
+        """Read the newest messages of moving things; return whether there are new states."""
         offset_ns = documents.game.scheduler.clock_offset_ns
         if (signals := self._signals.latest()) is not None:
             self._read_signals(signals.data)

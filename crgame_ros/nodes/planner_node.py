@@ -36,9 +36,7 @@ COLLECT_EVERY = 10
 
 
 class PlannerNode(Node):
-    """
-    The node that answers one AV's plan requests; a new scenario or game prepares it again.
-    """
+    """The node that answers one AV's plan requests; a new game or scenario resets it."""
 
     def __init__(self) -> None:
         super().__init__('planner_node')

@@ -106,9 +106,7 @@ class SimNode(Node):
                    for human in setup.humans if human.driver == COCKPIT)
 
     def _next_setup(self, present: Setup) -> Setup:
-        """
-        Load the game that the parameters name; keep the present one if it is unusable.
-        """
+        """Load the game that the parameters name; keep the present one if it is unusable."""
         try:
             return self._announce(build_setup(self._control.next_game(present.game)))
         except CrgameError as error:
@@ -134,9 +132,7 @@ class SimNode(Node):
         return recorded_inputs(setup)
 
     def _write_roster(self, setup: Setup) -> None:
-        """
-        Write the participants for the launcher: a chosen game may have other vehicles.
-        """
+        """Write the participants for the launcher: a chosen game may have other vehicles."""
         path = self._control.roster
         if path is None:
             return

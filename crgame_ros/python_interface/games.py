@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads games from files, or passes them through."""
 
+from collections.abc import Iterator
+import contextlib
 from os import fspath, PathLike
 from pathlib import Path
 from typing import TypeAlias
@@ -12,6 +14,21 @@ from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import default_game
+
+_NAMES = {'--planner': 'planner', '--driver': 'driver', '--problem': 'problems',
+          '--rate': 'rate_hz', '--duration': 'duration_s'}
+
+
+@contextlib.contextmanager
+def argument_names() -> Iterator[None]:
+    """Rewrite errors to name the argument instead of the option."""
+    try:
+        yield
+    except InputError as error:
+        if error.where not in _NAMES:
+            raise
+        raise InputError(error.what, _NAMES[error.where], error.remedy) from error
+
 
 FileName: TypeAlias = str | PathLike[str]
 

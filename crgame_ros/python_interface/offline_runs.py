@@ -15,9 +15,8 @@ from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, with_planners
 from crgame_ros.planner.registry import PLANNERS
-from crgame_ros.python_interface.argument_names import argument_names
 from crgame_ros.python_interface.finished_run import Run
-from crgame_ros.python_interface.games import as_game, FileName
+from crgame_ros.python_interface.games import argument_names, as_game, FileName
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.recording.export import scenario_path, write_scenario
 from crgame_ros.recording.offline_outcome import offline_outcome

@@ -9,9 +9,8 @@ from typing import Literal, TYPE_CHECKING
 from crgame_ros.analysis.counterfactual import Alternative, drive_against
 from crgame_ros.errors import InputError
 from crgame_ros.planner.registry import PLANNERS
-from crgame_ros.python_interface.argument_names import argument_names
 from crgame_ros.python_interface.finished_run import Run
-from crgame_ros.python_interface.games import FileName
+from crgame_ros.python_interface.games import argument_names, FileName
 from crgame_ros.python_interface.offline_runs import OfflineRun
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.python_interface.recorded_runs import as_run

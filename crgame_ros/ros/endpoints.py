@@ -30,16 +30,14 @@ def qos_profile(qos: Qos) -> QoSProfile:
 
 # Unusable messages, and those for other nodes, are skipped: at most this many per read.
 MAX_PASSED_OVER = 100
-# Others' messages would fill a slot for one message; so with a filter, this many wait.
+# Depth of a queue whose messages are filtered here: others' would fill a single slot.
 SHARED_DEPTH = 200
 # One entry for each node of this process.
 _TOLD: WeakKeyDictionary[Node, tuple[Diagnostics, Refusals]] = WeakKeyDictionary()
 
 
 class PolledGroup(CallbackGroup):
-    """
-    A callback group outside every executor: the owner of its subscriptions reads them itself.
-    """
+    """A callback group outside every executor: the owner reads its subscriptions itself."""
 
     def can_execute(self, entity: Any) -> bool:
         """Return False, so that no executor waits for or runs the entity."""
@@ -63,9 +61,10 @@ class PolledSubscription:
     :param subscription: to serialised messages.
     :param name: of the topic.
     :param read: converts a serialised message for the owner, or raises InputError.
-    :param refuse: called with each unusable message, which is then skipped; without it such a
-        message raises InputError. :ivar wanted: decides by stamp [ns] and frame whether a message
-        is for the owner; others are skipped before they are converted. None accepts every message.
+    :param refuse: called with each unusable message, which is then skipped; without it such
+        a message raises InputError.
+    :ivar wanted: decides by stamp [ns] and frame whether a message is for the owner; others are
+        skipped before they are converted. None accepts every message.
     """
 
     def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], Any],
@@ -77,9 +76,7 @@ class PolledSubscription:
         self._refuse = refuse
 
     def pop(self) -> Any | None:
-        """
-        Remove and return the oldest waiting message (its bytes if raw), None if there is none.
-        """
+        """Remove and return the oldest message (or its bytes, if raw); None without any."""
         taken = self.pop_timed()
         return None if taken is None else taken[0]
 

@@ -175,7 +175,7 @@ class Refusals:
     """
     The counts of a node's refusals by topic, published on /diagnostics.
 
-    :param node: whose.
+    :param node: that refuses.
     :param diagnostics: of the node; used once a second at most.
     """
 

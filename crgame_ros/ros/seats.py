@@ -150,9 +150,7 @@ class Seats:
 
     @property
     def cockpit_seats(self) -> list[Seat]:
-        """
-        Return the seats that the game leaves to people at pages and that no other source has.
-        """
+        """Return the seats for people at pages that no other source drives."""
         return [seat for seat in self.humans if seat.home == seat.source == COCKPIT]
 
     def document(self) -> str:

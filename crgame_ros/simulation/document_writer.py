@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any
 
-from crgame_ros.game.event_file import document_entry
+from crgame_ros.game.documents import document_entry
 from crgame_ros.game.file import dump_game
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.schema.writing import write

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of `/timing/cycle`: what each cycle measured and consumed."""
+"""The rows of `/timing/cycle`: each cycle's measurements and consumed commands."""
 
 from array import array
 from collections.abc import Sequence
@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 TIMING_COLUMNS = (
     'epoch', 'n', 'k', 'ideal_s', 'actual_s', 'step_error_s', 'cumulative_error_s', 'busy_s',
     'sleep_s', 'dt_eff_s', 'resets', 'dropped_s')
-# Why the cycle was late [s], and in which phase; earlier versions did not tell.
+# Causes of the cycle's lateness [s], and its phase; earlier versions lack them.
 LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
 # Earlier versions had the first four, then no `put_back`.
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
-# Where in a row they begin.
+# Their first columns in a row.
 _LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
 
 
 def lights_alone(lights: int) -> tuple[float, ...]:
-    """Return the row of an AV that follows its plan: nobody drives, but others see its lights."""
+    """Return the row of an AV that follows its plan: no command, but visible lights."""
     return tuple(float(lights) if name == 'lights' else math.nan for name in COMMAND_COLUMNS)
 
 
@@ -32,8 +32,9 @@ class CycleRows:
     """
     A fixed buffer of rows, filled cycle by cycle and emptied together.
 
-    :param vehicle_ids: whose consumed commands follow the timing columns: humans, then AVs.
-    :param capacity: rows held before they have to be taken.
+    :param vehicle_ids: vehicles whose consumed commands follow the timing columns: humans, then
+        AVs.
+    :param capacity: number of rows held before they have to be taken.
     """
 
     def __init__(self, vehicle_ids: Sequence[str], capacity: int) -> None:
@@ -46,7 +47,7 @@ class CycleRows:
 
     @property
     def full(self) -> bool:
-        """Return whether the rows have to be taken before another is added."""
+        """Return whether the rows must be taken before another one is added."""
         return self.count == self.capacity
 
     def add(self, epoch: int, k: int, cycle: Cycle, busy_s: float, sleep_s: float,
@@ -73,7 +74,7 @@ class CycleRows:
         self.count += 1
 
     def taken(self) -> 'array[float]':
-        """Empty the buffer and give its rows, flattened."""
+        """Empty the buffer and return its rows, flattened."""
         used = self._data[:self.count * len(self.columns)]
         self.count = 0
         return used
@@ -81,10 +82,10 @@ class CycleRows:
 
 class CycleTable:
     """
-    Rows of `/timing/cycle`, read.
+    Rows read from `/timing/cycle`.
 
     :param columns: names of the columns.
-    :param rows: (R, columns) one row a cycle.
+    :param rows: (R, columns) one row per cycle.
     """
 
     def __init__(self, columns: Sequence[str], rows: NDArray[np.float64]) -> None:
@@ -99,7 +100,7 @@ class CycleTable:
 
         :param label: of the second dimension: the columns, separated by commas.
         :param data: the flattened rows.
-        :raises InputError: if columns that everybody needs are missing, or rows are not whole.
+        :raises InputError: if required columns are missing, or rows are incomplete.
         """
         columns = label.split(',')
         missing = [name for name in TIMING_COLUMNS if name not in columns]
@@ -110,7 +111,7 @@ class CycleTable:
 
     @property
     def epoch(self) -> int:
-        """Epoch of the rows."""
+        """Return the epoch of the rows."""
         return int(self.column('epoch')[0])
 
     def column(self, name: str) -> NDArray[np.float64]:
@@ -123,7 +124,7 @@ class CycleTable:
                              ('ideal_s', 'actual_s', 'busy_s', 'dropped_s')]]
 
     def late_rows(self) -> NDArray[np.float64] | None:
-        """Return (R, 9) causes of lateness and phase of each row; None where none are told."""
+        """Return (R, 9) causes of lateness and phase of each row; None where they are missing."""
         if any(name not in self._place for name in LATE_COLUMNS):
             return None
         return self.rows[:, [self._place[name] for name in LATE_COLUMNS]]
@@ -132,8 +133,8 @@ class CycleTable:
         """
         Return (R, 6) consumed throttle, brake, steering, reverse, lights, put_back of a vehicle.
 
-        Rows are NaN but for the lights where nobody drove it: those of an AV that followed its
-        plan. What earlier versions did not record was off.
+        Where no driver drove it, as for an AV that followed its plan, rows are NaN except for the
+        lights. Values that earlier versions did not record count as off.
 
         :raises InputError: if the vehicle took no part.
         """
@@ -147,7 +148,7 @@ class CycleTable:
         return np.column_stack((found, *[off] * (len(names) - len(recorded))))
 
     def commands_of(self, vehicle_ids: Sequence[str]) -> NDArray[np.float64]:
-        """Return (R, V, 6) what was consumed of several; NaN of those that took no part."""
+        """Return (R, V, 6) consumed commands of vehicles; NaN for those not in the run."""
         values = np.full((len(self.rows), len(vehicle_ids), len(COMMAND_COLUMNS)), np.nan)
         for place, vehicle in enumerate(vehicle_ids):
             if f'{vehicle}/{COMMAND_COLUMNS[0]}' in self._place:

@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""When frames for people are skipped, so that a late loop can catch up (CRG III-A2a)."""
+"""Skipping of frames for viewers, so that a late loop can catch up (CRG III-A2a)."""
 
 from crgame_ros.game.game import TimingSpec
 
-# Frames come back once the lag has stayed below half the threshold for so long [s].
+# Frames resume once the lag has stayed below half the threshold for this long [s].
 CALM_S = 0.5
 
 
 class FrameSkipping:
     """
-    Turns the loop's lag into orders, with hysteresis.
+    The order to skip frames, derived from the loop's lag with hysteresis.
 
     :param spec: threshold and switch.
     """
@@ -23,7 +23,7 @@ class FrameSkipping:
 
     def update(self, lag_s: float, now_s: float) -> bool:
         """
-        Take the present lag; tell whether the order has changed.
+        Update the order from the present lag; return whether it has changed.
 
         :param lag_s: cumulative error E_n [s]
         :param now_s: steady clock [s]

@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Why a step was late: its lateness split by cause, from what its thread went through."""
+"""The causes of a late step: its lateness, split by the thread's measured times."""
 
 from collections.abc import Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-# A step is late if its error e_n is greater [s]: what its 99th percentile should not exceed.
+# A step is late if its error e_n is greater [s]; the 99th percentile should not exceed it.
 LATE_S = 0.5e-3
 
 
 class Phase(IntEnum):
-    """What the loop does from the start of one cycle to that of the next."""
+    """The phases of the loop from the start of one cycle to that of the next."""
 
     INPUTS = 1
     STEP = 2
@@ -20,7 +20,7 @@ class Phase(IntEnum):
     WAIT = 5
 
 
-# What a phase is called in a sentence that begins with "while".
+# Names of the phases in a sentence, after "while".
 PHASE_WORDS = {Phase.INPUTS: 'taking inputs', Phase.STEP: 'stepping',
                Phase.PUBLISH: 'publishing', Phase.SERVICES: 'serving orders',
                Phase.WAIT: 'waiting for its time'}
@@ -30,14 +30,14 @@ class Causes(NamedTuple):
     """
     Time by cause, in one unit throughout; `docs/timing.md` defines each of them.
 
-    :param processor: ready, and not run: others had the processor.
-    :param host: the machine did not run: stolen by its host, or woken late by its timer.
+    :param processor: ready but not running: other processes had the processor.
+    :param host: the machine did not run: its host stole the time, or its timer woke it late.
     :param stopped: by a signal (SIGSTOP).
-    :param page_faults: memory that had to be fetched or made.
+    :param page_faults: memory that had to be loaded or allocated.
     :param gc: Python's garbage collection.
     :param services: orders and parameters that the loop served.
     :param blocked: asleep within a call that should not have slept, such as for a lock.
-    :param work: our own computing.
+    :param work: the loop's own computation.
     """
 
     processor: float = 0.0
@@ -51,26 +51,27 @@ class Causes(NamedTuple):
 
 
 NO_CAUSES = Causes()
-# What nothing else accounts for.
+# Time without a known cause.
 UNEXPLAINED = 'unexplained'
 CAUSE_WORDS = {'processor': 'waiting for the processor', 'host': 'the host did not run it',
                'stopped': 'stopped by a signal', 'page_faults': 'page faults',
                'gc': 'garbage collection', 'services': 'services',
                'blocked': 'blocked in a call', 'work': 'own work', UNEXPLAINED: UNEXPLAINED}
-# What comes from outside this program; the rest is ours.
+# Causes outside this program.
 FROM_OUTSIDE = ('processor', 'host', 'stopped')
-# A step has time for its work. What fits into it is taken off the likeliest part of it first.
+# A step has time for its work. The time that fits is subtracted from the causes in this order, the
+# likeliest first.
 _FITS_FIRST = ('work', 'services', 'page_faults', 'gc', 'blocked', 'processor', 'host', 'stopped')
 
 
 class PhaseUse(NamedTuple):
     """
-    What a thread went through in one phase.
+    The measured times and faults of a thread in one phase.
 
     :param phase: which.
-    :param lasted_ns: on the wall clock; of a wait for what it went on after its end was due [ns]
+    :param lasted_ns: wall time; of a wait, the time by which it exceeded its due end [ns]
     :param computed_ns: processor time [ns]
-    :param waited_ns: ready, but without a processor; None where the kernel does not tell [ns]
+    :param waited_ns: ready, but without a processor; None where the kernel does not count it [ns]
     :param collected_ns: in garbage collections [ns]
     :param minor_faults: page faults served from memory.
     :param major_faults: page faults that waited for a disk.
@@ -87,11 +88,11 @@ class PhaseUse(NamedTuple):
 
 class StepConditions(NamedTuple):
     """
-    What is known of a step's time besides.
+    Further conditions of a step.
 
-    :param stolen_ns: what the host certainly took of a processor meanwhile [ns]
-    :param stopped: whether a signal let the process go on.
-    :param fault_ns: what a minor page fault takes on this machine [ns]
+    :param stolen_ns: the least time that the host took from a processor meanwhile [ns]
+    :param stopped: whether the process was continued by a signal.
+    :param fault_ns: duration of a minor page fault on this machine [ns]
     """
 
     stolen_ns: float = 0.0
@@ -103,11 +104,11 @@ def causes_of(uses: Sequence[PhaseUse], late_ns: float, around: StepConditions) 
     """
     Split the lateness of a step by cause.
 
-    What the step had time for is left out, so that all causes together give the lateness, or less:
-    the rest has no explanation.
+    The time that a step has for its work is left out. So the causes add up to the lateness, or to
+    less: the rest is unexplained.
 
     :param uses: the phases since the step before.
-    :param late_ns: by how much longer they took than a step [ns]
+    :param late_ns: the time by which they exceed a step [ns]
     """
     spent = dict.fromkeys(Causes._fields, 0.0)
     for use in uses:
@@ -115,7 +116,7 @@ def causes_of(uses: Sequence[PhaseUse], late_ns: float, around: StepConditions) 
         for cause, time_ns in found.items():
             spent[cause] += time_ns
     stolen_ns = around.stolen_ns
-    # Neither the kernel's queue nor its processor times tell that a processor stood still.
+    # Neither the kernel's queue nor its processor times show that a processor stood still.
     for cause in ('processor', 'work', 'services'):
         moved = min(stolen_ns, spent[cause])
         spent[cause] -= moved
@@ -130,7 +131,7 @@ def causes_of(uses: Sequence[PhaseUse], late_ns: float, around: StepConditions) 
 
 
 def _waiting(use: PhaseUse, around: StepConditions) -> dict[str, float]:
-    """Split what a thread overslept: it had asked to be woken before."""
+    """Split the time by which a thread was woken late."""
     if use.waited_ns is None:
         return {'stopped': use.lasted_ns} if around.stopped else {}
     waited = min(use.lasted_ns, use.waited_ns)
@@ -138,7 +139,7 @@ def _waiting(use: PhaseUse, around: StepConditions) -> dict[str, float]:
 
 
 def _working(use: PhaseUse, around: StepConditions) -> dict[str, float]:
-    """Split a phase that should compute throughout."""
+    """Split the time of a phase that should compute throughout."""
     collected = min(use.collected_ns, use.computed_ns)
     faults = min(use.minor_faults * around.fault_ns, use.computed_ns - collected)
     found = {'gc': collected, 'page_faults': faults}

@@ -20,11 +20,11 @@ from crgame_ros.timing.late_step import (
 )
 import numpy as np
 
-# So many of the worst are kept. A cause below this share of one is not worth a word.
+# Number of worst steps kept. A cause below this share of a step's lateness is not mentioned.
 WORST = 10
 _WORTH_A_WORD = 0.02
 _MS = 1e3
-# Of `late_steps` in `timing.json`.
+# Keys of `late_steps` in `timing.json`.
 LATE_KEYS = frozenset(('threshold_ms', 'count', 'late_ms', 'by_cause', 'resets_from_outside',
                        'resets_of_ours', 'worst'))
 _PHASES = frozenset(map(int, Phase))
@@ -36,10 +36,10 @@ class LateStep:
     A step that began late.
 
     :param n: simulation step.
-    :param at_s: when it began, on the run's time line [s]
+    :param at_s: its start, on the run's time line [s]
     :param late_s: its step error e_n [s]
-    :param causes: what that is made of [s]
-    :param during: phase in which most time was lost; None where nobody knows.
+    :param causes: the error split by cause [s]
+    :param during: phase in which most time was lost; None where it is unknown.
     :param reset: whether it moved the schedule.
     """
 
@@ -52,24 +52,24 @@ class LateStep:
 
     @property
     def split_s(self) -> Mapping[str, float]:
-        """Return the time by cause, and unexplained; together they are the lateness [s]."""
+        """Return the time by cause, and the unexplained time; their sum is the lateness [s]."""
         return {**self.causes._asdict(), UNEXPLAINED: max(0.0, self.late_s - sum(self.causes))}
 
     @property
     def main_cause(self) -> str:
-        """Name the greatest cause."""
+        """Return the greatest cause."""
         split = self.split_s
         return max(split, key=lambda cause: split[cause])
 
     @property
     def why(self) -> str:
-        """Return in words what it is made of, the greatest first."""
+        """Return the causes in words, the greatest first."""
         parts = sorted(self.split_s.items(), key=lambda item: -item[1])
         return ', '.join(f'{_MS * time_s:.1f} ms {CAUSE_WORDS[cause]}' for cause, time_s in parts
                          if time_s > _WORTH_A_WORD * self.late_s)
 
     def __str__(self) -> str:
-        """Tell of it in a line."""
+        """Return a description in one line."""
         during = '' if self.during is None else f' while {PHASE_WORDS[self.during]}'
         moved = '; the schedule was moved' if self.reset else ''
         return (f'{_MS * self.late_s:.1f} ms late at {self.at_s:.2f} s (n = {self.n}){during}: '
@@ -86,7 +86,7 @@ class LateStep:
 
 
 class LateSteps:
-    """Gathers the late steps of one run in constant memory, from its cycles as they come."""
+    """The late steps of one run, collected in constant memory from its cycles as they come."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -96,21 +96,21 @@ class LateSteps:
         self._resets_by_cause: Counter[str] = Counter()
         self._resets: float | None = None
         self._told = True
-        # Those of equal lateness in the order in which they came.
+        # Steps of equal lateness keep the order in which they came.
         self._worst: list[tuple[float, int, LateStep]] = []
 
     @property
     def explains_every_cycle(self) -> bool:
-        """Whether every cycle told why it was late; earlier versions did not."""
+        """Return whether every cycle has its causes; earlier versions did not record them."""
         return self._told
 
     @property
     def worst(self) -> list[LateStep]:
-        """Return the worst of them, the latest first."""
+        """Return the worst steps, the greatest lateness first."""
         return [step for _, _, step in sorted(self._worst, reverse=True)]
 
     def add_table(self, table: CycleTable) -> None:
-        """Take cycles, in the order of time."""
+        """Add cycles, in the order of time."""
         late_rows = table.late_rows()
         if late_rows is None or not len(table.rows):
             self._told &= late_rows is not None
@@ -119,7 +119,7 @@ class LateSteps:
         moved = np.diff(resets, prepend=resets[0] if self._resets is None else self._resets) > 0
         self._resets = float(resets[-1])
         starts = table.column('actual_s')
-        # What anybody sent may be no number.
+        # Messages of other senders may hold values that are no numbers.
         told = np.isfinite(errors) & np.isfinite(starts) & np.isfinite(late_rows).all(axis=1)
         for row in np.flatnonzero(told & (errors > LATE_S)).tolist():
             *causes, phase = late_rows[row].tolist()
@@ -140,7 +140,7 @@ class LateSteps:
             heapq.heappop(self._worst)
 
     def as_dict(self) -> dict[str, Any] | None:
-        """Return `late_steps` of `timing.json`; None where the cycles do not tell."""
+        """Return `late_steps` of `timing.json`; None where the cycles have no causes."""
         if not self._told:
             return None
         resets = self._resets_by_cause

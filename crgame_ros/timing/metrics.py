@@ -4,7 +4,7 @@
 Every metric of CRG table I, computed cycle by cycle; `docs/timing.md` defines each of them.
 
 The table of the paper contradicts itself, so the definitions are the project's own. All errors
-refer to the original anchor t_0: what a drift reset forgave is added back.
+refer to the original anchor t_0: the time dropped by drift resets is added back.
 """
 
 from bisect import bisect_left, bisect_right
@@ -24,15 +24,15 @@ BINS_PER_DECADE = 100
 
 class LogHistogram:
     """
-    Count durations in bins of equal ratio, 100 to the decade from 10 ns to 1000 s.
+    Counts of durations in bins of equal ratio, 100 per decade from 10 ns to 1000 s.
 
-    A quantile is off by at most half a bin, 1.2 %; what is shorter or longer than the bins
-    counts in the first or last one. The extremes are kept exactly.
+    A quantile is off by at most half a bin, 1.2 %; shorter or longer durations count in the first
+    or last bin. The extremes are kept exactly.
     """
 
     _decades = round(math.log10(HIGHEST_S / LOWEST_S))
     _edges = np.geomspace(LOWEST_S, HIGHEST_S, _decades * BINS_PER_DECADE + 1)
-    # The search for a single value runs on a list: on an array it takes ten times as long.
+    # A single value is searched in a list: in an array that takes ten times as long.
     _edge_list: list[float] = _edges.tolist()
 
     def __init__(self) -> None:
@@ -101,7 +101,7 @@ class RealTimeRatio:
 @dataclass(frozen=True)
 class TimingSummary:
     """
-    The metrics of CRG table I and what explains them; symbols as in `docs/timing.md`.
+    The metrics of CRG table I and further ones that explain them; symbols as in `docs/timing.md`.
 
     :param final_error_ms: E_f [ms]
     :param mean_step_error_ms: mean of |e_n| [ms]
@@ -151,7 +151,7 @@ class TimingSummary:
 
 class TimingMetrics:
     """
-    Accumulate the metrics of one run (one epoch) in constant memory.
+    The metrics of one run (one epoch), accumulated in constant memory.
 
     All times of a cycle, `busy_s` among them, are seconds on the run's own time line: it starts
     with the run, leaves pauses out and is scaled by the real-time factor.
@@ -182,15 +182,15 @@ class TimingMetrics:
 
     @property
     def cycles(self) -> int:
-        """Count the cycles seen so far."""
+        """Return the number of cycles so far."""
         return self._cycles
 
     def add(self, ideal_s: float, actual_s: float, busy_s: float, dropped_s: float) -> None:
         """
-        Take one cycle, in O(1).
+        Add one cycle, in O(1).
 
-        :param ideal_s: tau*_n, start by the schedule in force, after all resets so far [s]
-        :param actual_s: tau_n, start as it happened [s]
+        :param ideal_s: tau*_n, scheduled start, after all resets so far [s]
+        :param actual_s: tau_n, actual start [s]
         :param busy_s: computing time of the cycle, without waiting in the executor [s]
         :param dropped_s: D_n, time by which all resets so far moved the schedule [s]
         :raises InputError: if a value is no number or time runs backwards.
@@ -234,7 +234,7 @@ class TimingMetrics:
 
     def add_rows(self, rows: NDArray[np.float64]) -> None:
         """
-        Take many cycles at once, with the result that `add` would give one by one.
+        Add many cycles at once, with the same result as single calls of `add`.
 
         :param rows: (R, 4) columns as in `ROW_COLUMNS` [s], in the order of time.
         :raises InputError: as `add`, and for an array of another shape.
@@ -321,6 +321,6 @@ class TimingMetrics:
 
 
 def _running_sum(start: float, values: NDArray[np.float64]) -> float:
-    # Added one after the other: numpy's own sum groups them, and its last bits then differ
-    # from those of single additions.
+    # Summed in order: numpy's own sum groups the values, and its last bits then differ from those
+    # of single additions.
     return float(np.cumsum(np.concatenate(([start], values)))[-1])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where on its plan an AV is between two replannings (CRG III-A2c, equations 15-16)."""
+"""The progress of an AV along its plan between two replannings (CRG III-A2c, equations 15-16)."""
 
 from typing import Literal
 
@@ -9,8 +9,8 @@ from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
-# Further apart than this, the plan's state for now and the vehicle are not the same motion (an
-# overdue plan met a vehicle that had meanwhile braked): the plan is entered at the nearest point.
+# If the plan's present state and the vehicle are further apart than this [m], an overdue plan has
+# met a vehicle that braked meanwhile. The plan is then entered at the nearest point.
 REALIGN_DISTANCE = 0.5
 
 
@@ -19,7 +19,8 @@ class ProgressTracker:
     The progress sigma along a plan whose states are Delta t_c apart.
 
     By default sigma follows time, sigma = (n - n_request) / N from integers, and states are
-    interpolated. As printed (`nearest`, `floor`) an AV that replans every tick never moves.
+    interpolated. With the paper's version (`nearest`, `floor`) an AV that replans every tick never
+    moves.
 
     :param steps_per_tick: N
     :param realign: `time`, or `nearest` for CRG 16.
@@ -41,7 +42,7 @@ class ProgressTracker:
         self, states: NDArray[np.float64], request_n: int, n: int, vehicle: VehicleState,
     ) -> bool:
         """
-        Replace the plan and align sigma.
+        Adopt a new plan and align sigma.
 
         :param states: (S, 8) planned states in simulation coordinates
         :param request_n: simulation step of the request that the plan answers
@@ -92,7 +93,7 @@ class ProgressTracker:
 
 
 def _nearest_progress(states: NDArray[np.float64], vehicle: VehicleState) -> float:
-    """Project the vehicle onto the plan's polyline; the index with its fraction."""
+    """Return the vehicle's projection onto the plan's polyline, as an index with its fraction."""
     if len(states) == 1:
         return 0.0
     points = states[:, :2]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What Linux counts of a thread: processor time, waiting for it, page faults; stolen time."""
+"""Linux's counters of a thread: processor time, waiting for it, page faults; stolen time."""
 
 from contextlib import suppress
 import mmap
@@ -10,24 +10,24 @@ import threading
 import time
 from typing import NamedTuple
 
-# The first line of the one file, and those of the processors, which come first in the other.
+# Bytes to read: the first line of schedstat, and the processors' lines at the start of /proc/stat.
 _LINE, _STAT = 128, 16384
 _TICK_NS = 1_000_000_000 // os.sysconf('SC_CLK_TCK')
-# Place of the stolen ticks behind a processor's name in /proc/stat.
+# Index of the stolen ticks in a processor's line of /proc/stat.
 _STOLEN = 8
 _PAGES = 64
 
 
 class ThreadCounts(NamedTuple):
     """
-    What a thread has used and gone through so far.
+    The counters of a thread so far.
 
     :param wall_ns: the monotonic clock [ns]
-    :param computed_ns: processor time [ns]; that until it was last put on a processor or a timer's
-        tick came, where the kernel tells `waited_ns`
-    :param waited_ns: time for which it was ready and not run [ns]; None where the kernel does not
-        tell
-    :param runs: how often it was put on a processor.
+    :param computed_ns: processor time [ns]; where the kernel counts `waited_ns`, only until the
+        thread was last scheduled or a timer tick came
+    :param waited_ns: time for which it was ready but not running [ns]; None where the kernel does
+        not count it
+    :param runs: number of times that it was scheduled on a processor.
     :param minor_faults: page faults served from memory.
     :param major_faults: page faults that waited for a disk.
     """
@@ -40,17 +40,17 @@ class ThreadCounts(NamedTuple):
     major_faults: int
 
 
-# As read, to be made `ThreadCounts` of: the clock, `schedstat`, processor time, and `getrusage`.
+# The raw readings for `ThreadCounts`: the clock, `schedstat`, processor time, and `getrusage`.
 RawCounts = tuple[int, bytes, int, struct_rusage]
 
 
 class ThreadCounters:
     """
-    Reads the counts of the thread that makes it, in 1.5 µs; files are opened once.
+    A reader of the counters of the thread that creates it, in 1.5 µs; files are opened once.
 
-    See proc(5) for `/proc/PID/task/TID/schedstat`. The thread's own clock is left alone wherever
-    that file tells: asking for it lets the kernel see that a short time slice is used up, and give
-    the processor to others.
+    See proc(5) for `/proc/PID/task/TID/schedstat`. The thread's own clock is not read where that
+    file exists: reading it lets the kernel notice that a short time slice is used up and give the
+    processor to other threads.
     """
 
     def __init__(self) -> None:
@@ -62,14 +62,14 @@ class ThreadCounters:
         self.tells_waiting = self._schedule is not None
 
     def read(self) -> RawCounts:
-        """Read everything that a step needs; `counts_of` says what it means."""
+        """Read all counters that a step needs, for `counts_of`."""
         if self._schedule is None:
             return (time.monotonic_ns(), b'', time.thread_time_ns(), getrusage(RUSAGE_THREAD))
         schedule = os.pread(self._schedule, _LINE, 0)
         return time.monotonic_ns(), schedule, 0, getrusage(RUSAGE_THREAD)
 
     def stolen(self) -> bytes:
-        """Read what `stolen_between` compares, in 3 µs and 1 µs for each further processor."""
+        """Read the text for `stolen_between`, in 3 µs plus 1 µs for each further processor."""
         return b'' if self._stat is None else os.pread(self._stat, _STAT, 0)
 
     def close(self) -> None:
@@ -81,7 +81,7 @@ class ThreadCounters:
 
 
 def counts_of(raw: RawCounts) -> ThreadCounts:
-    """Read what a thread has gone through."""
+    """Return the counters from raw readings."""
     wall_ns, schedule, computed_ns, usage = raw
     fields = [int(field) for field in schedule.split()]
     computed_ns, waited_ns, runs = fields[:3] if fields else (computed_ns, None, 0)
@@ -89,7 +89,7 @@ def counts_of(raw: RawCounts) -> ThreadCounts:
 
 
 def _opened(path: str) -> int | None:
-    """Open a file for reading; None where this kernel has none."""
+    """Open a file for reading; return None where this kernel lacks it."""
     with suppress(OSError):
         return os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     return None
@@ -97,7 +97,7 @@ def _opened(path: str) -> int | None:
 
 def stolen_between(before: bytes, after: bytes) -> int:
     """
-    Return what a machine's host certainly took of any one processor between two looks [ns].
+    Return the least time that the host took from any one processor between two readings [ns].
 
     It is counted in ticks of 10 ms, of which one may have been due before.
 
@@ -118,7 +118,7 @@ def _stolen_ticks(text: bytes) -> dict[bytes, int]:
 
 
 def fault_time_ns() -> float:
-    """Measure what a page fault that memory can serve takes on this machine [ns]."""
+    """Measure the duration of a page fault served from memory on this machine [ns]."""
     with mmap.mmap(-1, _PAGES * mmap.PAGESIZE) as fresh:
         began_ns = time.thread_time_ns()
         for page in range(_PAGES):

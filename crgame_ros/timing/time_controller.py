@@ -14,7 +14,7 @@ NS = 1e-9
 @dataclass(frozen=True, slots=True)
 class Cycle:
     """
-    What the controller measured at the start of one cycle; all times on the run's own time line.
+    The controller's measurements at the start of one cycle; all times on the run's own time line.
 
     The time line starts with the run, leaves pauses out and is scaled by the real-time factor.
 
@@ -40,7 +40,7 @@ class Cycle:
 
 class TimeController:
     """
-    Schedules cycles on the wall clock and measures what became of the schedule (CRG 11-13).
+    The schedule of cycles on the wall clock, and the errors measured against it (CRG 11-13).
 
     The clock is passed in: every method takes the present time of a monotonic clock [ns].
 
@@ -68,12 +68,12 @@ class TimeController:
 
     @property
     def serves_orders_now(self) -> bool:
-        """Return whether so many steps in a row were late that orders must not wait longer."""
+        """Return whether too many steps in a row were late for orders to wait longer."""
         late = self._late_in_a_row
         return late > 0 and late % self._spec.max_catch_up_steps == 0
 
     def start(self, now_ns: int) -> None:
-        """Anchor the schedule: t0 is now and step 0 has begun."""
+        """Start the schedule: t0 is now, and step 0 has begun."""
         self._anchor_ns = float(now_ns)
         self._start_ns = now_ns
 
@@ -81,7 +81,7 @@ class TimeController:
         """
         Continue after a pause, or at another rate; the wall time in between doesn't count.
 
-        The cycle n is taken to have begun now, with the lag it had.
+        Cycle n counts as begun now, with its previous lag.
 
         :raises InputError: if the real-time factor is out of its bounds.
         """
@@ -99,16 +99,16 @@ class TimeController:
         """Return the wall time at which the next cycle is due (CRG 11) [ns]."""
         step_ns = self._dt_s / self._factor / NS
         if not self._spec.pacing:
-            # The naive loop waits for its step to pass, whatever the schedule says.
+            # The naive loop waits for the length of a step and ignores the schedule.
             return int(self._start_ns + step_ns)
         return int(self._anchor_ns + (self.n + 1) * step_ns)
 
     def begin_cycle(self, now_ns: int, interval_s: float | None = None) -> Cycle:
         """
-        Begin the next cycle: measure its interval and decide on what it integrates.
+        Begin the next cycle: measure its interval and determine the interval to integrate.
 
-        :param interval_s: integrate this instead, as a recorded run did [s]; what it differs by
-            is carried like what the clip cuts off, until intervals are measured again.
+        :param interval_s: integrate this instead, as a recorded run did [s]. The difference is
+            carried over like the clipped time, until intervals are measured again.
         """
         self.n += 1
         measured_s = (now_ns - self._start_ns) * NS * self._factor
@@ -123,7 +123,7 @@ class TimeController:
                      self.dropped_s)
 
     def _reset_if_due(self) -> float:
-        """Re-anchor after too large a lag, the only reason; return the time dropped [s]."""
+        """Move the anchor only if the lag is too large; return the time dropped [s]."""
         spec = self._spec
         if not (spec.drift_reset and abs(self._error_s) > spec.reset_threshold
                 and self.n > spec.warm_up_steps):
@@ -136,12 +136,12 @@ class TimeController:
         return dropped
 
     def _effective(self, measured_s: float, given_s: float | None) -> float:
-        """Clip the measured interval (CRG 13); what is cut off comes back in later steps."""
+        """Return the clipped interval (CRG 13); the clipped time is added back in later steps."""
         spec = self._spec
         if not spec.measured_interval:
             return self._dt_s if given_s is None else given_s
         wanted = measured_s + self._carry_s
-        # A bound that excludes the nominal step itself would never let the sum return to n dt.
+        # With a bound above the nominal step, the sum could never return to n dt.
         shortest = min(spec.dt_min, 0.5 * self._dt_s)
         effective = min(max(spec.dt_max, 2.0 * self._dt_s), max(shortest, wanted)) \
             if given_s is None else given_s

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Asking Linux for a short time slice: whoever has one is served first when it wakes.
+A request to Linux for a short time slice: a thread with one runs first when it wakes.
 
-Since Linux 6.12 `sched_setattr` takes one for ordinary tasks too, without any privilege: a task
-that wakes with a shorter slice than the running one takes its place at once, instead of waiting
-for up to 3 ms. Beside busy companions that makes the wake-ups of the 100 Hz loop three times as
-punctual. Older kernels take the call and go on as before.
+Since Linux 6.12 `sched_setattr` accepts one for ordinary tasks too, without any privilege. A task
+that wakes with a shorter slice than the running one preempts it at once, instead of waiting for up
+to 3 ms. With busy companions that makes the wake-ups of the 100 Hz loop three times as punctual.
+Older kernels accept the call and ignore it.
 """
 
 import ctypes
@@ -14,15 +14,15 @@ import os
 import platform
 import struct
 
-# Of sys/mman.h: what is there, what will be, each from its first use on.
+# From sys/mman.h: present pages, future pages, each locked at its first use.
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 
 
 def lock_memory() -> bool:
     """
-    Ask for the pages of this process, as it comes to use them, to stay in memory.
+    Lock the pages of this process in memory from their first use.
 
-    :return: whether the system does; it asks for CAP_IPC_LOCK, or for a limit `memlock` in
+    :return: whether the system allows it; it requires CAP_IPC_LOCK, or a limit `memlock` in
         /etc/security/limits.d above the whole address space.
     """
     return bool(ctypes.CDLL(None).mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0)
@@ -37,10 +37,10 @@ SHORTEST_NS = 100_000
 
 def shorten_time_slice(slice_ns: int = SHORTEST_NS) -> bool:
     """
-    Ask for a time slice for this thread; its policy and niceness stay.
+    Request a time slice for this thread; its policy and niceness stay.
 
     :param slice_ns: at least 0.1 ms, the kernel's least [ns]
-    :return: whether the kernel took the call.
+    :return: whether the kernel accepted the call.
     """
     numbers = _CALLS.get(platform.machine())
     if numbers is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
@@ -51,7 +51,7 @@ def shorten_time_slice(slice_ns: int = SHORTEST_NS) -> bool:
 
 
 def time_slice_ns() -> int | None:
-    """Read this thread's slice [ns]; None where the kernel tells none of ordinary tasks."""
+    """Read this thread's slice [ns]; None where the kernel has none for ordinary tasks."""
     numbers = _CALLS.get(platform.machine())
     if numbers is None:
         return None

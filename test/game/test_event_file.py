@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.event_file import document_entry, parse_document_entries
+from crgame_ros.game.documents import document_entry, parse_document_entries
 from crgame_ros.game.events import (
     ACTIONS,
     AtStep,

@@ -34,8 +34,6 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Who is farther away is not near [m].
-
 
 class Measure(NamedTuple):
     """

@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One HTML file that tells of a run, or of several."""
+"""The report: one HTML file on one or several runs."""

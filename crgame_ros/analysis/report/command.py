@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame report`: one HTML file that tells of a run, or of several side by side."""
+"""`crgame report`: write one HTML file on a run, or on several side by side."""
 
 import argparse
 from dataclasses import replace
@@ -54,6 +54,6 @@ def report(values: argparse.Namespace) -> int:
 
 
 def _place(path: Path) -> Path:
-    """Choose the file of a run's report: in its folder, or beside a recording alone."""
+    """Return the path of a run's report: in its folder, or beside a single recording."""
     folder = path if (path / 'bag').is_dir() else path.parent
     return folder / REPORT_FILE

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Several runs side by side: a table, and what they have in common in one plot each."""
+"""The comparison of several runs: a table, and one plot for each common measure."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -16,17 +16,17 @@ from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
 from crgame_ros.vehicle.state import StateColumn
 
-# Lines of runs are told apart by these colours, and those of their vehicles by dashes.
+# Colours distinguish runs, dashes the vehicles of a run.
 _COLOURS = ('human-0', 'av-0', 'av-2', 'human-2', 'human-1', 'av-1')
 _DASHES: tuple[Dash, ...] = ('solid', 'dash', 'dot')
-# More lines in one plot nobody reads.
+# More lines in one plot are unreadable.
 _MOST_LINES = 18
 _COMPARED = {'ttc': 'least TTC [s]', 'thw': 'least THW [s]', 'gap': 'least gap [m]',
              'drac': 'greatest DRAC [m/s²]', 'min_distance': 'least distance [m]'}
 
 
 def comparison_section(runs: Sequence[ReportRun]) -> Section:
-    """Compare runs: the letters stand for them in plots."""
+    """Return the section that compares runs; letters identify them in plots."""
     head = ('', *(f'{letter(i)}: {free(run.name)}' for i, run in enumerate(runs)))
     rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
     return Section('comparison', 'Comparison', table(
@@ -67,7 +67,7 @@ def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
 
 
 def worst_of_all(run: ReportRun, name: str) -> str:
-    """Write the worst value of a measure of all vehicles of a run, leading to its moment."""
+    """Return the worst value of a measure over all vehicles of a run, linked to its moment."""
     found = [each.worst[name] for each in run.criticality.report() if name in each.worst]
     if not found:
         return NOTHING
@@ -78,7 +78,7 @@ def worst_of_all(run: ReportRun, name: str) -> str:
 
 
 def accepted(run: ReportRun) -> str:
-    """Write how many plans of all AVs were accepted."""
+    """Return the text on how many plans of all AVs were accepted."""
     entries = () if run.outcome is None else run.outcome['planners'].values()
     asked, taken = (sum(entry[key] or 0 for entry in entries) for key in ('requests', 'accepted'))
     return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING

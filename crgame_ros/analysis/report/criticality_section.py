@@ -16,14 +16,14 @@ from crgame_ros.analysis.report.text import note, number, plain, table
 import numpy as np
 from numpy.typing import NDArray
 
-# Longer times say nothing: plots begin without them. [s]
+# Longer times are not meaningful: plots initially leave them out [s].
 _SHOWN_S = 10.0
-# Of decelerations nobody can reach more [m/s^2].
+# Greater decelerations are physically impossible [m/s^2].
 _SHOWN_DRAC = 12.0
 
 
 def criticality_section(run: ReportRun) -> Section:
-    """Show what was critical."""
+    """Return the section on criticality."""
     limits = run.criticality.thresholds
     measured = run.criticality.report()
     html = note('Each row is the most critical value of the whole run, with which other, when; '
@@ -55,7 +55,7 @@ def is_critical(name: str, value: float, limits: Thresholds) -> bool:
 
 
 def marked(text: str, critical: bool) -> str:
-    """Mark what is critical: not by its colour alone."""
+    """Return a text as HTML, marked if it is critical: not by colour alone."""
     return f'<strong class="critical">{text}<span class="sign"> ‼</span></strong>' \
         if critical else text
 
@@ -98,7 +98,7 @@ def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:
 
 def _bounds(name: str, unit: str, values: NDArray[np.float64],
             limits: Thresholds) -> tuple[float, float] | None:
-    """Choose what a plot shows at first, where its extremes would hide the rest."""
+    """Return a plot's initial bounds, if its extremes would hide the rest; None for all."""
     finite = values[np.isfinite(values)]
     most = float(finite.max())
     if unit == 's':

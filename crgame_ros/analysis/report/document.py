@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The document around a page: its style and its scripts are in it, and nothing else may run."""
+"""The HTML document of a page: it contains its style and scripts, and permits no others."""
 
 import base64
 from collections.abc import Sequence
@@ -12,19 +12,19 @@ from crgame_ros.analysis.report.text import plain
 from crgame_ros.page_libraries import plotly_script
 
 PAGE = Path(__file__).resolve().parent / 'page'
-# Plotly makes an empty `<style>` whose rules it then adds by script.
+# Plotly creates an empty `<style>`, and then adds rules to it by script.
 _EMPTY = ''
-# Of maps, which no report has, it adds a style as soon as it is loaded, unless somebody has.
+# On loading, it also adds a style for maps, which reports do not have, unless it exists already.
 _STYLE_OF_MAPS = re.compile(r'getElementById\("([0-9a-f]{64})"\)')
 
 
 def plotted_document(title: str, body: str, data: str) -> str:
     """
-    Make the document of a page with plots.
+    Return the document of a page with plots.
 
-    :param title: text, as tabs show it.
+    :param title: text, shown in the browser's tab.
     :param body: HTML.
-    :param data: of the plots, JSON that may stand in a script.
+    :param data: data of the plots, JSON that is safe in a script.
     :raises CrgameError: if Plotly has not been fetched.
     """
     script = (PAGE / 'report.js').read_text(encoding='utf-8')
@@ -38,11 +38,11 @@ def plotted_document(title: str, body: str, data: str) -> str:
 
 def plain_document(title: str, body: str, style: str) -> str:
     """
-    Make the document of a page without scripts.
+    Return the document of a page without scripts.
 
-    :param title: text, as tabs show it.
+    :param title: text, shown in the browser's tab.
     :param body: HTML.
-    :param style: its own rules, beside those of all reports.
+    :param style: style rules in addition to those of all reports.
     """
     return _document(title, (f'{page_style()}\n{style}',), '', body, ())
 

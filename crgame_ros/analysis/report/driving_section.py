@@ -15,7 +15,7 @@ from crgame_ros.analysis.report.section import Plot, PlotLine, Section
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, note, number, plain, table
 
-# Longer times to the edge of a lane say nothing [s].
+# Longer times to lane crossing are not meaningful [s].
 _SHOWN_S = 10.0
 _WORDS = {
     'speed_mean': 'Speed, mean', 'speed_sd': 'Speed, standard deviation',
@@ -28,7 +28,7 @@ _WORDS = {
 
 
 def driving_section(run: ReportRun) -> Section | None:
-    """Show how those were driven whom somebody drove; None where nobody drove."""
+    """Return the section on the vehicles that humans drove; None without any."""
     found = [each for each in run.behaviour if each.human or each.take_overs]
     if not found:
         return None
@@ -95,7 +95,7 @@ def _take_over_rows(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterato
 
 
 def task_section(run: ReportRun) -> Section | None:
-    """Show answers to lights, requests and what else lasted; None of a game without tasks."""
+    """Return the section on answers, requests and other tasks; None without tasks."""
     events = task_events(run.record)
     if not events:
         return None

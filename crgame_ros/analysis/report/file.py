@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The file of a report: written whole or not at all."""
+"""Writes the file of a report, completely or not at all."""
 
 import base64
 from collections.abc import Callable, Iterator, Sequence
@@ -34,14 +34,14 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# A wide plot has about so many columns of pixels; each keeps its smallest and greatest value.
+# Approximate number of pixel columns in a wide plot; each keeps its smallest and greatest value.
 MOST_COLUMNS = 900
 FEWEST_COLUMNS = 60
-# Points of all plots of a report together: 16 characters each, so some 5 MB.
+# Greatest number of points of all plots of a report: 16 characters each, some 5 MB.
 ALL_POINTS = 300_000
-# Of a column: its smallest and greatest value, and a place without any.
+# Points of a column: its smallest and greatest value, and one without a value.
 _A_COLUMN = 3
-# The parts of a run's report, in their order: whoever has more to tell adds one.
+# The sections of a run's report, in order; a new section is added here.
 SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
     story_section, criticality_section, outcome_section, driving_section, task_section,
     planners_section, input_section, motion_section, plan_section, timing_section, run_section)
@@ -49,10 +49,10 @@ SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
 
 def thinned(xs: FloatArray, ys: FloatArray, columns: int) -> tuple[FloatArray, FloatArray]:
     """
-    Leave out points of a line that no plot of so many columns could show.
+    Return a line without points that a plot of so many columns cannot show.
 
-    The smallest and the greatest value of each column stay as they are, at their own places, and
-    so do the ends; where a line is broken (NaN) it stays broken.
+    The smallest and the greatest value of each column are kept at their own places, as are the
+    ends. A line that is broken (NaN) stays broken.
 
     :param xs: (N) rising.
     :param ys: (N)
@@ -78,17 +78,17 @@ def thinned(xs: FloatArray, ys: FloatArray, columns: int) -> tuple[FloatArray, F
 
 
 def _first(places: NDArray[np.intp], group: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Of places in rising order, give the first of each group."""
+    """Return the first of each group, for places in rising order."""
     return places[np.unique(group[places], return_index=True)[1]]
 
 
 def columns_for(lines: int) -> int:
-    """Return into how many columns each of so many lines may be divided."""
+    """Return the number of columns for each line, given the number of lines."""
     return max(FEWEST_COLUMNS, min(MOST_COLUMNS, ALL_POINTS // max(_A_COLUMN * lines, 1)))
 
 
 def encoded(plot: Plot, columns: int) -> dict[str, Any]:
-    """Return a plot as the page reads it, its lines divided into so many columns."""
+    """Return a plot in the page's format, with its lines thinned to so many columns."""
     return {
         'unit': plot.unit, 'plane': plot.plane,
         'bounds': plot.bounds,
@@ -107,7 +107,7 @@ def _line(line: PlotLine, columns: int, plane: bool) -> dict[str, Any]:
     else:
         xs, ys = thinned(xs, ys, columns)
     return {'name': line.name, 'colour': line.colour, 'dash': line.dash,
-            # Values as they are; that times have seven digits nobody sees.
+            # Values keep full precision; for times, seven digits are enough.
             'x': _packed(xs, '<f4'), 'y': _packed(ys, '<f8')}
 
 
@@ -116,17 +116,17 @@ def _packed(values: FloatArray, kind: str) -> str:
 
 
 def script_json(content: object) -> str:
-    """Write JSON that can stand in a `<script>`: nothing in it ends the element."""
+    """Return JSON that is safe in a `<script>`: no text in it ends the element."""
     text = json.dumps(content, allow_nan=False, separators=(',', ':'), sort_keys=True)
     return text.replace('<', '\\u003c').replace('>', '\\u003e').replace('&', '\\u0026')
 
 
 def report_html(runs: Sequence[ReportRun], software: str = '') -> str:
     """
-    Write the page.
+    Return the page.
 
-    :param runs: one or more, each with a key of its own.
-    :param software: what wrote it, HTML.
+    :param runs: one or more, each with a unique key.
+    :param software: HTML on the software that wrote the report.
     :raises CrgameError: if Plotly is not installed.
     """
     parts = [(run, [section for make in SECTIONS if (section := make(run)) is not None])
@@ -216,7 +216,7 @@ def _plot(address: str, plot: Plot) -> str:
             f'aria-label="Plot of {plot.title}"></div></figure>')
 
 
-# More lines nobody tells apart.
+# Lines of more runs are hard to distinguish.
 MOST_RUNS = 12
 
 
@@ -224,9 +224,9 @@ def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = Fals
     """
     Write the report of one or more runs.
 
-    :param runs: each with a key of its own.
-    :param path: of the file.
-    :param driven_here: whether this software has just driven them, too, on this machine.
+    :param runs: each with a unique key.
+    :param path: path of the file.
+    :param driven_here: whether this software, on this machine, has just driven the runs.
     :raises InputError: if the file cannot be written.
     :raises CrgameError: if Plotly is not installed.
     """
@@ -235,9 +235,9 @@ def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = Fals
 
 def check_report_path(path: Path) -> None:
     """
-    See, before the work, that a report may be written to a file.
+    Check, before the work, that a report can be written to a file.
 
-    :raises InputError: if its name is none of an HTML file, or its folder is missing.
+    :raises InputError: if its name is not that of an HTML file, or its folder is missing.
     """
     if path.suffix.lower() not in ('.html', '.htm'):
         raise InputError('is no name of an HTML file', str(path), 'give FILE.html')
@@ -246,6 +246,6 @@ def check_report_path(path: Path) -> None:
 
 
 def check_report_runs(count: int) -> None:
-    """Refuse more runs than anybody could compare, by their number."""
+    """Refuse a number of runs that is too large to compare."""
     if count > MOST_RUNS:
         raise InputError(f'{count} runs', 'report', f'give {MOST_RUNS} at most')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How everybody moved, and what drivers did."""
+"""The sections on motion and on drivers' inputs."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 _REVERSE = COMMAND_COLUMNS.index('reverse')
-# What is plotted of states: title, unit, column.
+# The plotted columns of states: title, unit, column.
 _PROFILES = (
     ('speed', 'Speed', 'm/s', StateColumn.SPEED),
     ('acceleration', 'Acceleration along the heading', 'm/s²', StateColumn.ACCELERATION),
@@ -26,12 +26,12 @@ _PROFILES = (
 _INPUTS = (('throttle', 'Throttle', '0 to 1', (-0.05, 1.05)),
            ('brake', 'Brake', '0 to 1', (-0.05, 1.05)),
            ('steering', 'Steering, positive to the left', '−1 to 1', (-1.1, 1.1)))
-# Of all others' ways together, and of one.
+# Numbers of points: of all others' paths together, and the least for one path.
 _WAY_POINTS, _WAY_LEAST = 6000, 20
 
 
 def motion_section(run: ReportRun) -> Section:
-    """Show speeds, headings and positions of the driven vehicles."""
+    """Return the section on speeds, headings and positions of the driven vehicles."""
     rows = []
     states, distances = run.log.vehicle_states, run.record.ways()
     for i, item in enumerate(run.log.vehicles):
@@ -60,7 +60,7 @@ def motion_section(run: ReportRun) -> Section:
 
 
 def dash_of(role: Role) -> Dash:
-    """Choose how lines of a role are drawn, for those who see no colours."""
+    """Return the dash of a role's lines, for readers who cannot distinguish colours."""
     return 'solid' if role is Role.HUMAN else 'dash'
 
 
@@ -75,13 +75,13 @@ def _others_ways(run: ReportRun) -> Iterator[PlotLine]:
     most = max(_WAY_LEAST, _WAY_POINTS // poses.shape[1])
     rows = np.unique(np.linspace(0, len(poses) - 1, min(most, len(poses))).astype(int))
     ways = poses[rows][:, :, :2].swapaxes(0, 1)
-    # A line after the other, with a break between them.
+    # All lines in one, with breaks (NaN) between them.
     broken = np.concatenate((ways, np.full((len(ways), 1, 2), np.nan)), axis=1).reshape(-1, 2)
     yield PlotLine('others', broken[:, 0], broken[:, 1], 'others')
 
 
 def input_section(run: ReportRun) -> Section | None:
-    """Show what the drivers did; None where it was not recorded."""
+    """Return the section on drivers' inputs; None where they were not recorded."""
     record = run.record
     if not len(record.ns):
         return None
@@ -115,7 +115,7 @@ def _spans(run: ReportRun, i: int, vehicle: str, role: Role) -> Iterator[PlotSpa
 
 
 def stretches(holds: NDArray[np.bool_], times_s: FloatArray) -> list[tuple[float, float]]:
-    """Return from when to when something holds."""
+    """Return the intervals in which something holds [s]."""
     edges = np.diff(np.concatenate(([False], holds, [False])).astype(int))
     return [(float(times_s[first]), float(times_s[end - 1])) for first, end in zip(
         np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True)]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What happened in a run: events, contacts, violations."""
+"""The section on a run's events, contacts and violations."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -13,13 +13,13 @@ from crgame_ros.analysis.report.text import free, note, NOTHING, number, table
 
 
 def outcome_section(run: ReportRun) -> Section:
-    """Return who touched whom, who broke what, and which events took effect."""
+    """Return the section on contacts, violations and events that took effect."""
     html = _contacts(run) + _violations(run) + _events(run)
     return Section('outcome', 'Contacts, violations, events', html)
 
 
 def contacts_of_report(run: ReportRun) -> Sequence[Mapping[str, Any]] | None:
-    """Return the contacts as `timing.json` has them; None where nobody knows."""
+    """Return the contacts as in `timing.json`; None if unknown."""
     return None if run.outcome is None else run.outcome['contacts']
 
 

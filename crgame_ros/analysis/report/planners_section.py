@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How planners drove: scores of the AVs, beside those of humans, and of several runs."""
+"""The section on planners: scores of AVs and humans, of one run or of several."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, 
 from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 
-# Words of a measure and the digits of its values; costs are from hundredths to millions.
+# Label of a measure and number of digits; costs range from hundredths to millions.
 _NUPLAN = {
     'nuplan_score': 'nuPlan score, of 1', 'no_collision_at_fault': '× no collision at fault',
     'drivable_area': '× on the road', 'driving_direction': '× in the driving direction',
@@ -31,14 +31,14 @@ _LEFT_OUT = (" CommonRoad's costs, checks and feasibility, and how near the goal
 
 
 class _Driver(NamedTuple):
-    """Whose scores stand in a column, and what the column is called (HTML)."""
+    """A column of scores: the vehicle, and the column's heading (HTML)."""
 
     head: str
     scores: VehicleScores
 
 
 def planners_section(run: ReportRun) -> Section | None:
-    """Show how well planners drove, humans beside them; None without planners."""
+    """Return the section on the scores of planners and humans; None without planners."""
     if not run.log.game.avs:
         return None
     if not run.scores.vehicles:
@@ -56,9 +56,9 @@ def planners_section(run: ReportRun) -> Section | None:
 
 def planners_compared(runs: Sequence[ReportRun], letters: Sequence[str]) -> str:
     """
-    Put the planners of several runs side by side, as HTML; empty without any.
+    Return HTML that compares the planners of several runs; empty without any.
 
-    :param letters: that stand for the runs.
+    :param letters: letters that identify the runs.
     """
     drivers = [_Driver(f'{letter}: {_who(run, each)}', each)
                for run, letter in zip(runs, letters, strict=True) for each in run.scores.vehicles
@@ -101,7 +101,7 @@ def _cell(name: str, value: float | None) -> str:
 
 
 def _remarks(run: ReportRun, scores: VehicleScores) -> Iterator[str]:
-    """Yield what its scores rest on, and what it fails."""
+    """Yield remarks on a vehicle's scores, and its failures."""
     who = named(run, scores.vehicle_id)
     if scores.nuplan is not None:
         yield (f'{who}: progress {number(scores.nuplan.own_progress, 0)} m, '

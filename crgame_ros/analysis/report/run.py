@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run, and everything that its report tells of it."""
+"""A run with everything that its report contains."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Of the vehicles with their roles in this order, as the page's style has them.
+# Colours of vehicles by role, in order; the page's style declares them.
 COLOURS = {Role.HUMAN: ('human-0', 'human-1', 'human-2'),
            Role.AUTONOMOUS: ('av-0', 'av-1', 'av-2')}
-# What is plotted over time.
+# Measures that are plotted over time.
 PLOTTED = ('gap', 'ttc', 'thw', 'drac', 'min_distance')
-# Reading and measuring take about so much of the time that a report takes.
+# Approximate shares of reading and measuring in a report's time.
 _READ_SHARE, _MEASURE_SHARE = 0.2, 0.6
 
 
@@ -42,18 +42,18 @@ class ReportRun:
     """
     A run to report.
 
-    :param key: tells it from others of a report, as part of an address in the page.
-    :param name: of its folder, as somebody wrote it.
+    :param key: unique key within a report, part of addresses in the page.
+    :param name: name of its folder, unescaped.
     :param record: what happened.
-    :param criticality: of it.
+    :param criticality: its criticality.
     :param course: (V, len(PLOTTED), K) the most critical value of each plotted measure at each
         scenario step; NaN where there was nothing to measure.
-    :param moments: of which there are pictures, in the order of time.
-    :param timing: the content of `timing.json`; None where the recording does not tell.
-    :param began_ns: log time of its first message, since 1970 [ns]; None of an offline run.
-    :param notices: what is wrong with the recording.
-    :param scores: how well everybody drove.
-    :param offline: of an offline run what `offline_outcome` gives; None otherwise.
+    :param moments: moments shown in pictures, in order of time.
+    :param timing: content of `timing.json`; None where it cannot be computed.
+    :param began_ns: log time of its first message, since 1970 [ns]; None for an offline run.
+    :param notices: faults of the recording.
+    :param scores: scores of all driven vehicles.
+    :param offline: result of `offline_outcome` for an offline run; None otherwise.
     """
 
     key: str
@@ -75,12 +75,12 @@ class ReportRun:
 
     @cached_property
     def behaviour(self) -> tuple[DriverBehaviour, ...]:
-        """Measure how each vehicle was driven, in the order of the log's."""
+        """Measure how each vehicle was driven, in the log's order."""
         return measure_behaviour(self.record)
 
     @property
     def log(self) -> RunTrajectories:
-        """Return the run on its scenario's grid."""
+        """Return the run at its scenario's time steps."""
         return self.record.log
 
     @property
@@ -91,7 +91,7 @@ class ReportRun:
 
     @property
     def colours(self) -> dict[str, str]:
-        """Name each driven vehicle's colour."""
+        """Return the name of each driven vehicle's colour."""
         found: dict[str, str] = {}
         for role, names in COLOURS.items():
             of_role = [item.id for item in self.log.vehicles if item.role is role]
@@ -127,9 +127,9 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
     Measure a run that has been read.
 
     :param bag: its recording, if there is one.
-    :param timing: as `timing_report` gives it.
-    :param offline: of an offline run what `offline_outcome` gives.
-    :param drives_only: score without CommonRoad's tools, which take longest.
+    :param timing: result of `timing_report`.
+    :param offline: result of `offline_outcome` for an offline run.
+    :param drives_only: whether to score without CommonRoad's tools, which take longest.
     """
     log = record.log
     course = np.full((len(log.vehicles), len(PLOTTED), len(log.ks)), np.nan)
@@ -157,7 +157,7 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
 
 
 def _most_critical(values: FloatArray) -> FloatArray:
-    """Of the measures of a vehicle against all near it (P, measures), give the worst of each."""
+    """Return the worst of each measure, from a vehicle's measures (P, measures) to all near."""
     worst = np.full(len(PLOTTED), np.nan)
     for place, name in enumerate(PLOTTED):
         measure, column = MEASURES[name], values[:, COLUMN[name]]

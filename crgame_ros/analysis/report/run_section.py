@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What was run: game, scenario, who took part, and the settings."""
+"""The section on the run itself: game, scenario, participants and settings."""
 
 from collections.abc import Iterator
 from datetime import datetime, UTC
@@ -11,12 +11,12 @@ from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, 
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import Role
 
-# Of the text of a game file that is shown.
+# Greatest length of a game file's text that is shown.
 _LONGEST_FILE = 20_000
 
 
 def run_section(run: ReportRun) -> Section:
-    """Return what was run."""
+    """Return the section on the run itself."""
     game = run.log.game
     html = table('The run', (), [(label, value) for label, value in _facts(run)], 'facts')
     html += table('Who was driven', ('vehicle', 'driven by', 'type', 'length × width [m]',
@@ -30,14 +30,14 @@ def run_section(run: ReportRun) -> Section:
         html += f'<div class="notices"><p>Of the recording:</p><ul>{items}</ul></div>'
     if game.file:
         text = game.file if len(game.file) <= _LONGEST_FILE else game.file[:_LONGEST_FILE] + ' …'
-        # Line by line: what cannot be seen is named, line ends stay.
+        # Line by line: invisible characters are named, line ends stay.
         lines = '\n'.join(map(plain, text.splitlines()))
         html += f'<details class="file"><summary>Game file</summary><pre>{lines}</pre></details>'
     return Section('run', 'What was run', html)
 
 
 def title_of(run: ReportRun) -> str:
-    """Return a run's title for people, as it was written: not escaped."""
+    """Return a run's title, unescaped."""
     return run.log.game.title or run.log.game.benchmark_id or run.name
 
 
@@ -74,7 +74,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
 
 
 def _sound(run: ReportRun) -> Iterator[str]:
-    """Yield what people in the cockpit's seats had on; nothing of recordings that do not tell."""
+    """Yield the sound settings in the cockpit's seats; nothing if they were not recorded."""
     for seat, told in ((run.timing or {}).get('sound') or {}).items():
         words = 'off' if told['volume'] is None else \
             f'on for {_percent(told["on_share"])} of the time, volume {_percent(told["volume"])}'
@@ -82,7 +82,7 @@ def _sound(run: ReportRun) -> Iterator[str]:
 
 
 def _view(run: ReportRun) -> Iterator[str]:
-    """Yield what people in the cockpit's seats saw, from when to when."""
+    """Yield the views in the cockpit's seats, with their intervals."""
     for seat, periods in ((run.timing or {}).get('view') or {}).items():
         for period in periods:
             words = [f'{plain(period["shown"])} from {number(period["from_s"], 1)} to '
@@ -139,7 +139,7 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
 
 
 def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
-    """Yield who was in the seats of cockpits, and whose device at the machine drove."""
+    """Yield the people in cockpit seats, and the local devices that drove."""
     last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
     for spell, delay_ms, _ in run.record.drivers:
         person = spell.person
@@ -155,7 +155,7 @@ def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
 
 
 def named(run: ReportRun, vehicle: str) -> str:
-    """Write the id of somebody, with the colour of its lines if it is driven."""
+    """Return an id as HTML, with the colour of its lines if it is driven."""
     colour = run.colours.get(vehicle)
     mark = '' if colour is None else f'<span class="mark {colour}" aria-hidden="true"></span>'
     return mark + free(vehicle)
@@ -163,10 +163,10 @@ def named(run: ReportRun, vehicle: str) -> str:
 
 def software_note(lines: tuple[tuple[str, str], ...], here: bool) -> str:
     """
-    Return which software on which machine wrote the report.
+    Return HTML on the software and the machine that wrote the report.
 
     :param lines: what, and which.
-    :param here: whether the run was driven there and then, too.
+    :param here: whether the run was driven on that machine just before.
     """
     of = 'Run and report are of' if here else 'The report is of'
     return note(f'{of} ' + ', '.join(f'{plain(what)} {plain(which)}' for what, which in lines)

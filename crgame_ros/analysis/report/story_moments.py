@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which moments of a run its report shows, and how other parts of it lead there."""
+"""Selects the moments of a run that its report shows, and finds them for links."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,26 +19,26 @@ from crgame_ros.analysis.pictures.critical_moments import (
 )
 from crgame_ros.recording.run_record import RunRecord
 
-# Pictures of a run at most, its start and its end among them.
+# Greatest number of pictures of a run, start and end included.
 MOST_FRAMES = 14
-# Longer times come of speeds that are almost equal [s].
+# Longer times result from speeds that are almost equal [s].
 TOLD_S = 100.0
 WORDS = {
     'gap': 'Gap to the leader', 'thw': 'Time headway (THW)', 'ttc': 'Time to collision (TTC)',
     'ttc_a': 'TTC with accelerations', 'drac': 'Deceleration to avoid a crash (DRAC)',
     'a_req': 'Required acceleration', 'ttc_2d': 'TTC in the plane', 'min_distance': 'Distance'}
-# The same number as the time headway.
+# This measure has the same value as the time headway.
 TWICE = 'time_gap'
 
 
 def story_moments(record: RunRecord, criticality: Criticality,
                   contacts: Sequence[Mapping[str, Any]]) -> tuple[Moment, ...]:
     """
-    Choose the moments that tell a run, in the order of time.
+    Return the moments of a run to show, in order of time.
 
-    Start and end, the most critical ones, and those to which worst values lead.
+    These are start and end, the most critical ones, and those to which worst values are linked.
 
-    :param contacts: as `timing.json` has them.
+    :param contacts: contacts as in `timing.json`.
     """
     log = record.log
     scheduler = log.game.scheduler
@@ -64,12 +64,12 @@ def story_moments(record: RunRecord, criticality: Criticality,
 
 
 def is_told(measure: Measure, worst: Worst) -> bool:
-    """Return whether a worst value says anything."""
+    """Return whether a worst value is meaningful."""
     return measure.unit != 's' or worst.value < TOLD_S
 
 
 def nearest_moment(moments: Sequence[Moment], time_s: float) -> int | None:
-    """Return the number of the moment that shows a time; None if there is none near it."""
+    """Return the index of the moment that shows a time; None if there is none near it."""
     near = min(range(len(moments)), key=lambda i: abs(moments[i].time_s - time_s), default=None)
     if near is None or abs(moments[near].time_s - time_s) > TOGETHER_S + 1e-6:
         return None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The story of a run in frames: the scene at the moments that count."""
+"""The section that shows a run in frames, at its important moments."""
 
 from collections.abc import Sequence
 from urllib.parse import quote
@@ -15,20 +15,20 @@ from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.story_moments import nearest_moment
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain
 
-# Of a picture [px].
+# Width of a picture [px].
 _WIDTH = 560
-# What may stand in an address of data in quotes, beside letters and digits.
+# Characters that are allowed in a quoted data URL, besides letters and digits.
 _SAFE = " =:;/,.-+()!*?@$'"
 
 
 def moment_image(scene: FrameScene, moment: Moment, driven: Sequence[str]) -> str:
     """
-    Draw the scene from above, around those whom a moment is about, as an element `img`.
+    Return an element `img` with the scene from above, around the vehicles of a moment.
 
-    :param driven: ids of the driven vehicles, which are named.
+    :param driven: ids of the driven vehicles, which are labelled.
     """
     k = scene.k_at(moment.time_s)
-    # Each for itself: what it is about is in the middle.
+    # Each picture has its own window, centred on the vehicles of its moment.
     window = scene.windows([scene.row(k)], moment.vehicles)[0]
     svg = frame_svg(scene.at(k, window, {*driven, *moment.vehicles}), _WIDTH)
     words = f'{moment.time_s:.1f} s: {moment.why}'
@@ -37,7 +37,7 @@ def moment_image(scene: FrameScene, moment: Moment, driven: Sequence[str]) -> st
 
 
 def story_section(run: ReportRun) -> Section | None:
-    """Show the scene at each moment of the story; None where nobody drives."""
+    """Return the section with the scene at each moment; None without a driven vehicle."""
     if not run.log.vehicles:
         return None
     scene = FrameScene(run.log)
@@ -62,7 +62,7 @@ def frame_address(run: ReportRun, place: int) -> str:
 
 
 def moment(run: ReportRun, time_s: float | None) -> str:
-    """Write a time that leads to the frame that shows it."""
+    """Return a time as HTML, linked to the frame that shows it."""
     if time_s is None:
         return NOTHING
     place = nearest_moment(run.moments, time_s)

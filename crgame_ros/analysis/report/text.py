@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Text and numbers as HTML: whatever a recording says comes out as text."""
+"""Text and numbers as HTML; text from a recording is always escaped."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -8,18 +8,18 @@ import math
 import re
 
 NOTHING = '–'
-# What hides or reorders the text around it: control characters, half a pair of UTF-16, and the
-# marks of direction. Joiners stay, for they hold emoji together.
+# Characters that hide or reorder the text around them: control characters, lone surrogates of
+# UTF-16, and direction marks. Joiners stay, because emoji need them.
 _UNSEEN = re.compile('[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff'
                      '\ufdd0-\ufdef\ufffe\uffff]')
 _TAGS = re.compile('<[^>]*>')
 _SPACES = '\t\n\r'
-# Of one text in a table: a scenario may say megabytes.
+# Greatest length of a text in a table: a scenario may contain megabytes.
 _LONGEST = 2000
 
 
 def plain(value: object) -> str:
-    """Escape text for a place where no markup may stand, such as `<title>`."""
+    """Escape text for a place where no markup is allowed, such as `<title>`."""
     text = str(value)
     if len(text) > _LONGEST:
         text = f'{text[:_LONGEST]} … ({len(text)} characters)'
@@ -27,7 +27,7 @@ def plain(value: object) -> str:
 
 
 def free(value: object) -> str:
-    """Escape text that somebody wrote, in whatever direction it runs."""
+    """Escape text from a user, and isolate its writing direction."""
     return f'<bdi>{plain(value)}</bdi>'
 
 
@@ -36,7 +36,7 @@ def _named(found: re.Match[str]) -> str:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """Write a number with a true minus; a dash for what is not known."""
+    """Return a number as text with a true minus sign; a dash for an unknown one."""
     if value is None or math.isnan(value):
         return NOTHING
     if math.isinf(value):
@@ -46,7 +46,7 @@ def number(value: float | None, digits: int = 2) -> str:
 
 
 def share(part: float | None, whole: float | None) -> str:
-    """Write how much of a whole something is."""
+    """Return the share of a part in a whole as text."""
     if not whole or part is None:
         return NOTHING
     return f'{100.0 * part / whole:.1f} %'
@@ -55,11 +55,11 @@ def share(part: float | None, whole: float | None) -> str:
 def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]],
           kind: str = '') -> str:
     """
-    Make a table whose rows are named by their first cells.
+    Return a table whose rows are named by their first cells.
 
     :param caption: HTML, as all cells are.
     :param head: names of the columns; empty for none.
-    :param kind: its class.
+    :param kind: its CSS class.
     """
     columns = ''.join(f'<th scope="col">{cell}</th>' for cell in head)
     body = ''.join(
@@ -73,5 +73,5 @@ def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]],
 
 
 def note(html: str) -> str:
-    """Make a remark of less weight."""
+    """Return a remark of lower emphasis as HTML."""
     return f'<p class="note">{html}</p>'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How true to the clock a run was, and what its planners answered."""
+"""The sections on a run's timing, and on its planners' answers."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Sectio
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, share, table
 from crgame_ros.timing.late_step import CAUSE_WORDS
 
-# Of table I: key of `timing.json`, words, unit, factor, digits.
+# Rows of table I: key of `timing.json`, label, unit, factor, digits.
 _TABLE_I = (
     ('final_error_ms', 'Final error', 'ms', 1.0, 3),
     ('mean_step_error_ms', 'Mean step error', 'ms', 1.0, 3),
@@ -31,7 +31,7 @@ _RATIO = ('final', 'mean', 'min')
 
 
 def timing_section(run: ReportRun) -> Section:
-    """Show table I, and the errors over time."""
+    """Return the section with table I, and the errors over time."""
     if run.timing is None:
         return Section('timing', 'Timing', note(
             'An offline run keeps no clock.' if run.offline is not None else
@@ -50,7 +50,7 @@ def _rows(timing: Mapping[str, Any]) -> Iterator[Sequence[str]]:
 
 
 def _late_steps(late: Mapping[str, Any] | None) -> str:
-    """Show why steps were late: by cause, and the worst of them."""
+    """Return HTML on late steps: by cause, and the worst of them."""
     if late is None:
         return note('The recording does not tell why steps were late: an earlier '
                     'version made it.')
@@ -80,7 +80,7 @@ def _plots(run: ReportRun) -> Iterator[Plot]:
 
 
 def plan_section(run: ReportRun) -> Section | None:
-    """Show what became of the planners' answers; None without planners."""
+    """Return the section on the planners' answers; None without planners."""
     if not run.log.game.avs:
         return None
     if run.outcome is None:

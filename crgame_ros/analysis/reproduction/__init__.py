@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The papers' experiments again, beside what they report."""
+"""Repeats the papers' experiments, and compares the results to those reported."""

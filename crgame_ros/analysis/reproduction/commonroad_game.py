@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""CommonRoad-Game's evaluation (CRG section IV) from its first recording to its last figure."""
+"""Repeats CommonRoad-Game's evaluation (CRG section IV), from recordings to figures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,8 @@ from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from matplotlib.figure import Figure
 import numpy as np
 
-# Between the panels of the close view, as in the paper; the other view shows the whole run [s].
+# Number and spacing [s] of the close view's panels, as in the paper; the other view shows the
+# whole run.
 PANELS, SPACING_S = 12, 0.2
 
 
@@ -48,8 +49,8 @@ def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, fol
     """
     Draw frames and profiles of a run.
 
-    :param numbers: of the paper's figures of frames and of profiles.
-    :param name: of the run, for the files' names.
+    :param numbers: numbers of the paper's figures of frames and of profiles.
+    :param name: name of the run, for the files' names.
     :return: the files.
     :raises InputError: if a file cannot be written.
     """
@@ -74,7 +75,7 @@ def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, fol
 
 def write_timing_figure(found: Synchronization, folder: Path,
                         formats: Sequence[str]) -> tuple[Path, ...]:
-    """Draw figure 14 and write table I; give the files."""
+    """Draw figure 14 and write table I; return the files."""
     written = list(_write(timing_figure((found.proposed, found.naive)),
                           folder / 'figure_14_timing', formats))
     table = found.table
@@ -104,15 +105,15 @@ def _write(figure: Figure, place: Path, formats: Sequence[str]) -> tuple[Path, .
 @dataclass(frozen=True)
 class EvaluationRequest:
     """
-    How to repeat the evaluation.
+    Settings of a repetition of the evaluation.
 
-    :param folder: of all files; exists.
-    :param idm: planner in the place of the IDM planner.
-    :param reactive: planner in the place of the reactive planner.
+    :param folder: folder of all files, which exists.
+    :param idm: planner that replaces the IDM planner.
+    :param reactive: planner that replaces the reactive planner.
     :param is_live: whether the games are recorded live and the timing is measured.
     :param timed_s: wall time of each loop of the timing experiment [s]
     :param formats: of figures.
-    :param say: takes a line for people, on what is going on.
+    :param say: called with a line of progress, for people.
     """
 
     folder: Path
@@ -125,7 +126,7 @@ class EvaluationRequest:
 
     @property
     def runs(self) -> Path:
-        """Name the folder of the runs' own files."""
+        """Return the folder of the runs' own files."""
         return self.folder / 'runs'
 
     def record(self, game: Path) -> RecordedHuman:
@@ -145,10 +146,10 @@ class EvaluationRequest:
 @dataclass(frozen=True)
 class EvaluationPart:
     """
-    One of the three experiments, over.
+    The results of one of the three experiments.
 
-    :param judgements: of what must come out.
-    :param numbers: for JSON.
+    :param judgements: each expectation with what was found.
+    :param numbers: results for JSON.
     :param files: figures and tables.
     """
 

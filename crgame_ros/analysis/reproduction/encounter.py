@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""An AV's encounter with the recorded human, in numbers."""
+"""Measures an AV's encounter with the recorded human."""
 
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
-# How far the lane is followed [m]: longer than any game.
+# Length to which the lane is followed [m]: longer than any game.
 _ALONG = 2000.0
 
 
@@ -22,10 +22,10 @@ class DrivenLane:
     The lane of a vehicle's start and its straightest continuation.
 
     :param log: a run.
-    :param vehicle: whose lane it is, by its place among the driven vehicles.
-    :ivar width: of the lane at the start [m]
+    :param vehicle: index of the vehicle among the driven ones.
+    :ivar width: width of the lane at the start [m]
     :ivar along: (K, V) arc lengths of the rear axles [m]
-    :ivar across: (K, V) their offsets from the middle of the lane, left positive [m]
+    :ivar across: (K, V) their lateral offsets from the centre line, left positive [m]
     :raises InputError: if the scenario in the log cannot be used.
     """
 
@@ -47,7 +47,7 @@ FloatArray = NDArray[np.float64]
 
 class Encounter:
     """
-    What one AV did in a run with one human.
+    The behaviour of one AV in a run with one human.
 
     :param alternative: the run.
     :param av: id of the AV.
@@ -62,7 +62,7 @@ class Encounter:
 
     @cached_property
     def lane(self) -> DrivenLane:
-        """Find the lane in which the AV began."""
+        """Return the lane in which the AV started."""
         return DrivenLane(self.alternative.log, self._place)
 
     @property
@@ -72,18 +72,18 @@ class Encounter:
 
     @property
     def deviation(self) -> float:
-        """How far the AV's rear axle came from the middle of its lane [m]."""
+        """The greatest distance of the AV's rear axle from its lane's centre line [m]."""
         return float(np.abs(self.lane.across[:, self._place]).max())
 
     @property
     def lead(self) -> float:
-        """How far the AV's rear axle is ahead of the human's at the end, along the lane [m]."""
+        """The AV's lead over the human at the end, between rear axles along the lane [m]."""
         last = self.lane.along[-1]
         return float(last[self._place] - last[0])
 
     @property
     def least_gap(self) -> float | None:
-        """Return the smallest gap to the human ahead, by bumpers; None: never behind it [m]."""
+        """Return the smallest bumper-to-bumper gap to the human ahead; None: never behind [m]."""
         return self._worst('gap')
 
     @property
@@ -93,13 +93,13 @@ class Encounter:
 
     @property
     def contacts(self) -> int | None:
-        """Contacts in which the AV had a part; None where they are not known."""
+        """The number of contacts of the AV; None if it is unknown."""
         found = self.alternative.contacts
         return None if found is None else sum(
             self.av in (item['vehicle'], item['with']) for item in found)
 
     def as_dict(self) -> dict[str, float | int | str | None]:
-        """Return the numbers as JSON has them."""
+        """Return the numbers as a JSON-compatible dictionary."""
         return {
             'av': self.av, 'final_speed': float(self.speeds[-1]),
             'least_speed': float(self.speeds.min()), 'lane_deviation': self.deviation,
@@ -114,5 +114,5 @@ class Encounter:
 
 
 def human_states(log: RunTrajectories) -> FloatArray:
-    """Return the states of the humans as they were published (K, H, 8)."""
+    """Return the published states (K, H, 8) of the humans."""
     return log.published_states[:, :len(log.game.humans)]

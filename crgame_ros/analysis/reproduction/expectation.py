@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an experiment must show, said before it is run, and what it did show."""
+"""Expectations of an experiment, stated before it runs, and their comparison to its results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ Evidence = TypeVar('Evidence')
 
 class Finding(NamedTuple):
     """
-    What was found of an expectation.
+    The result for an expectation.
 
-    :param is_met: whether it came out.
-    :param text: the numbers that say so.
+    :param is_met: whether the expectation is met.
+    :param text: the numbers that show it.
     """
 
     is_met: bool
@@ -24,12 +24,12 @@ class Finding(NamedTuple):
 @dataclass(frozen=True)
 class Expectation(Generic[Evidence]):
     """
-    Something that must come out.
+    A result that an experiment must show.
 
-    :param name: in a few words.
-    :param sentence: what must come out, with its bounds, and why these.
-    :param paper: what the paper says of it.
-    :param check: looks for it in the evidence.
+    :param name: a few words.
+    :param sentence: the required result with its bounds, and the reason for these.
+    :param paper: what the paper states on it.
+    :param check: function that checks it in the evidence.
     """
 
     name: str
@@ -41,9 +41,9 @@ class Expectation(Generic[Evidence]):
 @dataclass(frozen=True)
 class Judgement:
     """
-    An expectation beside what was found.
+    An expectation with its finding.
 
-    :param subject: the experiment, and who was looked at in it.
+    :param subject: the experiment, and the vehicle or run examined in it.
     """
 
     subject: str
@@ -55,17 +55,17 @@ class Judgement:
 
     @property
     def line(self) -> str:
-        """Return it in one line."""
+        """Return the judgement in one line."""
         return f'{"met" if self.is_met else "UNMET"}: {self.subject}: {self.name}: {self.found}'
 
 
 def judge(subject: str, expectations: Sequence[Expectation[Evidence]],
           evidence: Evidence) -> tuple[Judgement, ...]:
-    """Look for every expectation in the evidence."""
+    """Check every expectation in the evidence."""
     judgements = []
     for each in expectations:
         finding = each.check(evidence)
-        # Comparisons of arrays give a bool of their own, which JSON does not know.
+        # Comparisons of arrays result in numpy's bool, which JSON cannot write.
         judgements.append(Judgement(subject, each.name, each.sentence, each.paper,
                                     bool(finding.is_met), finding.text))
     return tuple(judgements)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One recorded human: a game driven once, live or offline, and what repeats its human."""
+"""A recorded human: a game driven once, live or offline, and its repetition with any planner."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ from crgame_ros.simulation.setup import Setup
 @dataclass(frozen=True)
 class RecordedHuman:
     """
-    A game that was driven once.
+    A recorded run of a game, whose human can be repeated.
 
-    :param name: of the game.
+    :param name: name of the game.
     :param log: the run.
-    :param setup_for: gives the same game with the recorded human and a planner of that name.
-    :param inputs: of the human; None where the setup names the recording that has them.
-    :param live: the run itself, if it was a live one.
+    :param setup_for: returns the same game with the recorded human and the planner of a name.
+    :param inputs: inputs of the human; None where the setup names the recording with them.
+    :param live: the run itself, if it was live.
     """
 
     name: str
@@ -44,12 +44,12 @@ class RecordedHuman:
 
     @property
     def duration_s(self) -> float:
-        """How long it lasted, on the scenario's time line [s]."""
+        """The duration on the scenario's time line [s]."""
         return (len(self.log.ks) - 1) * self.log.game.scheduler.time_step_s
 
     def against(self, planner: str) -> Alternative:
         """
-        Drive the same human against a planner of all AVs.
+        Repeat the human, with a planner that drives all AVs.
 
         :raises InputError: if there is no such planner.
         """
@@ -58,9 +58,9 @@ class RecordedHuman:
 
 def record_offline(game: Path, planner: str, duration_s: float | None = None) -> RecordedHuman:
     """
-    Drive a game by its scripted driver on a virtual clock.
+    Run a game with its scripted driver on a virtual clock.
 
-    :param duration_s: the game's own where None [s]
+    :param duration_s: None for the game's own [s]
     :raises InputError: if game or planner cannot be used.
     """
     def setup_for(name: str) -> Setup:
@@ -73,10 +73,10 @@ def record_offline(game: Path, planner: str, duration_s: float | None = None) ->
 def record_live(game: Path, planner: str, folder: Path,
                 duration_s: float | None = None) -> RecordedHuman:
     """
-    Drive a game by its scripted driver in real time, without the page, and read its recording.
+    Run a game with its scripted driver in real time, without the page, and read its recording.
 
-    :param folder: of the run; must not exist.
-    :param duration_s: the game's own where None [s]
+    :param folder: folder of the run; must not exist.
+    :param duration_s: None for the game's own [s]
     :raises InputError: if game, planner or folder cannot be used.
     :raises CrgameError: if the run failed.
     """
@@ -88,9 +88,9 @@ def read_recorded(name: str, planner: str, folder: Path) -> RecordedHuman:
     """
     Read a live run.
 
-    :param name: of its game.
-    :param planner: that drove the AVs in it.
-    :param folder: of the run.
+    :param name: name of its game.
+    :param planner: planner that drove the AVs.
+    :param folder: folder of the run.
     :raises InputError: if its recording cannot be used.
     """
     bag = recording_in(folder)
@@ -106,9 +106,9 @@ def run_live(game: Path, planner: str, folder: Path, duration_s: float | None = 
     """
     Run a game live, without the page, as `record_live` does.
 
-    :raises CrgameError: if it failed; what it said is on the terminal.
+    :raises CrgameError: if the run failed; its messages are on the terminal.
     """
-    # Before any process starts: what is wrong is told in one line.
+    # Checked before any process starts, so that an error is reported in one line.
     effective_setup(RunRequest(game=game, planners=(planner,)))
     done = subprocess.run([
         sys.executable, '-m', 'crgame_ros.launcher.main', str(game), '--headless',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame reproduce`: a paper's evaluation again, and whether what must come out does."""
+"""`crgame reproduce`: repeat a paper's evaluation, and check the expected results."""
 
 import argparse
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from crgame_ros.analysis.reproduction.synchronization import PAPER_TABLE
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import write_text
 
-# What each figure of ours stands beside, by how its file is named.
+# Captions of the figures, by file name: which figure of the paper each corresponds to.
 CAPTIONS = {
     'figure_08_idm_frames': 'fig. 8: the IDM planner around the most critical moment, 0.2 s apart',
     'figure_08_idm_whole': 'fig. 8: the whole encounter',
@@ -39,7 +39,7 @@ CAPTIONS = {
     'figure_13_two_avs_reactive_profiles': 'fig. 13: the same with the reactive planner',
     'figure_14_timing': 'fig. 14: timelines and errors of our loop and the naive one'}
 NAME, NUMBERS = 'REPRODUCTION.md', 'comparison.json'
-# A picture in a Markdown file is one of these.
+# File formats that a Markdown file can show.
 _SHOWN = ('.svg', '.png')
 
 
@@ -95,7 +95,7 @@ def _lines(request: EvaluationRequest, judgements: Sequence[Judgement],
     else:
         yield 'Not measured: it is about runs in real time; leave --offline out.'
     yield from ('', '## Figures', '')
-    # Of a figure in several formats the first that a page shows.
+    # For a figure in several formats, the first format that a page can show.
     shown = {each.stem: each for each in reversed(files) if each.suffix in _SHOWN}
     for name, caption in CAPTIONS.items():
         if name in shown:
@@ -152,7 +152,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def reproduce(values: argparse.Namespace) -> int:
-    """Run the experiments, write the report and tell every expectation."""
+    """Run the experiments, write the report and print every expectation."""
     from crgame_ros.analysis.reproduction.commonroad_game import (
         evaluate_multi_av,
         evaluate_single_av,
@@ -163,7 +163,7 @@ def reproduce(values: argparse.Namespace) -> int:
     formats = _formats(values.format)
     if not 1.0 <= values.duration < math.inf:
         raise InputError(f'is {values.duration:g} s', '--duration', 'give a second or more')
-    # Both are known before the first of them drives.
+    # Check both names before the first planner drives.
     for name in (values.idm, values.reactive):
         planner_class(name)
     say = partial(print, file=sys.stderr, flush=True)
@@ -175,7 +175,7 @@ def reproduce(values: argparse.Namespace) -> int:
         timing, found = evaluate_timing(request)
         print(found.table.text())
     report, _ = write_report(request, single, multi, timing)
-    # What planners hold in circles compiled packages would complain of at the end.
+    # Free the planners' reference cycles now: compiled packages warn at exit about what is left.
     gc.collect()
     judgements = [*single.judgements, *multi.judgements,
                   *(() if timing is None else timing.judgements)]
@@ -194,7 +194,7 @@ def _formats(text: str) -> tuple[str, ...]:
 
 
 def _make_folder(wanted: Path) -> Path:
-    """Make a new folder: what is there already stays as it is."""
+    """Create a new folder; an existing one is left unchanged."""
     from crgame_ros.paths import numbered
     from crgame_ros.recording.export import prepare_folder
     folder = next(name for name in numbered(wanted.absolute()) if not name.exists())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One recorded human against two planners of one AV (CRG section IV-A, figures 8 to 11)."""
+"""Repeats one recorded human against two planners (CRG section IV-A, figures 8 to 11)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,25 +25,25 @@ from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
 
-# Who stays within this of the middle of a lane neither changes it nor swerves: a car of 2 m in a
-# lane of 3.75 m has 0.87 m on either side [m].
+# A vehicle that stays within this of its lane's centre line neither changes lanes nor swerves: a
+# car of 2 m in a lane of 3.75 m has 0.87 m on either side [m].
 IN_LANE = 0.5
-# Slower is standing: a metre in ten seconds [m/s].
+# Below this speed a vehicle counts as standing: a metre in ten seconds [m/s].
 STANDING = 0.1
-# Who is farther from where it would be without the human reacts to it [m]; without one there is
-# no difference at all, for runs are deterministic.
+# An AV that deviates by more from its run without the human reacts to the human [m]. Without a
+# reaction there is no difference at all, because runs are deterministic.
 REACTS = 1.0
-# A step's length and its speeds may differ by this [m]: a vehicle that turns takes the chord, and
-# plans are sampled; a jump is a multiple of it.
+# Tolerance between a step's length and the distance by its speeds [m]: the step of a turning
+# vehicle is a chord, and plans are sampled. A jump is a multiple of it.
 JUMP = 0.05
 
 
 class SameHuman(NamedTuple):
     """
-    Runs in which the human must be the same.
+    Runs in which the human must be identical.
 
-    :param recorded: the run from which its inputs are.
-    :param runs: those that repeat them.
+    :param recorded: the run in which the inputs were recorded.
+    :param runs: runs that repeat these inputs.
     """
 
     recorded: RunTrajectories
@@ -68,7 +68,7 @@ def _behind(found: Encounter) -> Finding:
 
 
 def no_contact(found: Encounter) -> Finding:
-    """Find contacts of the AV with anybody."""
+    """Return the finding on contacts of the AV."""
     if found.contacts is None:
         return Finding(False, 'contacts were not checked')
     near = '' if found.least_distance is None else f', {found.least_distance:.2f} m at least'
@@ -99,7 +99,7 @@ def _same(found: SameHuman) -> Finding:
             return Finding(False, f'differs between {found.runs[0].planner} and {other.planner}')
     recorded = human_states(found.recorded)
     common = min(len(recorded), len(first))
-    # A recording holds joints: positions and heading as they were, speeds in x and y.
+    # Positions and headings are recorded as they were, speeds as components in x and y.
     apart = np.abs(recorded[:common] - first[:common]).max(axis=(0, 1))
     exact = bool((apart[:3] == 0.0).all())
     return Finding(exact, f'at {first.shape[0]} scenario steps the same to the last bit, and at '
@@ -139,12 +139,12 @@ HUMAN_EXPECTATIONS: tuple[Expectation[SameHuman], ...] = (
 def judge_single_av(recorded: RunTrajectories, idm: Alternative, reactive: Alternative,
                     live: Alternative | None = None) -> tuple[Judgement, ...]:
     """
-    Look for what must come out of the single-AV experiment.
+    Judge the expectations of the single-AV experiment.
 
     :param recorded: the run that was recorded.
-    :param idm: the same human against the planner in the place of the IDM planner.
-    :param reactive: and against that in the place of the reactive planner.
-    :param live: the recorded run itself, if it was live; it is one against the first planner.
+    :param idm: the same human against the planner that replaces the IDM planner.
+    :param reactive: the same human against the planner that replaces the reactive planner.
+    :param live: the recorded run itself, if it was live; its planner is the first one.
     """
     av = recorded.game.avs[0].id
     return (
@@ -168,7 +168,7 @@ class MultiAvRun:
     alone: RunTrajectories
 
     def reactions(self) -> dict[str, float]:
-        """Return how far each AV got from where it would be without the human [m]."""
+        """Return the greatest deviation of each AV from its run without the human [m]."""
         log, alone = self.run.log, self.alone
         _, here, there = np.intersect1d(log.ks, alone.ks, return_indices=True)
         places = {item.id: i for i, item in enumerate(log.vehicles)}
@@ -190,7 +190,7 @@ def run_alone(game: Path, planner: str, duration_s: float) -> RunTrajectories:
 
 
 def jumps(log: RunTrajectories) -> NDArray[np.float64]:
-    """Return by how much each step's length differs from what its speeds say (K - 1, V) [m]."""
+    """Return the differences (K - 1, V) of step lengths from the distances by speed [m]."""
     lengths = np.hypot(*np.moveaxis(np.diff(log.vehicle_states[:, :, :2], axis=0), 2, 0))
     speeds = np.abs(log.vehicle_states[:, :, StateColumn.SPEED])
     expected = 0.5 * (speeds[1:] + speeds[:-1]) * log.game.scheduler.time_step_s
@@ -234,6 +234,6 @@ MULTI_AV_EXPECTATIONS: tuple[Expectation[MultiAvRun], ...] = (
 
 
 def judge_multi_av(runs: Sequence[tuple[str, MultiAvRun]]) -> tuple[Judgement, ...]:
-    """Look for what must come out of the multi-AV experiment, in runs with their names."""
+    """Judge the expectations of the multi-AV experiment, for runs by their names."""
     return tuple(each for name, run in runs
                  for each in judge(f'two AVs, {name}', MULTI_AV_EXPECTATIONS, run))

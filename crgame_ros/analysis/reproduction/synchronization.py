@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Our loop beside the naive one (CRG section IV-C, figure 14 and table I)."""
+"""Compares the project's loop to the naive one (CRG section IV-C, figure 14 and table I)."""
 
 from array import array
 from dataclasses import dataclass, replace
@@ -36,10 +36,10 @@ import numpy as np
 
 class NaiveLoop:
     """
-    One loop that does everything: drive, plan, check, record, then sleep what is left of the step.
+    A single loop: drive, plan, check, record, then sleep for the rest of the step.
 
     :param setup: the run.
-    :param folder: where it records.
+    :param folder: folder of its recording.
     """
 
     def __init__(self, setup: Setup, folder: Path) -> None:
@@ -62,12 +62,12 @@ class NaiveLoop:
 
     @property
     def cycles(self) -> CycleTable:
-        """Return the cycles so far, as the graph publishes its own."""
+        """Return the cycles so far, as the graph publishes them for its own loop."""
         rows = np.array(self._rows).reshape(-1, len(TIMING_COLUMNS))
         return CycleTable(TIMING_COLUMNS, rows)
 
     def run(self, duration_s: float) -> None:
-        """Run for a stretch of wall time; the time between stretches doesn't count."""
+        """Run for a duration of wall time; the time between calls does not count."""
         now_ns = time.monotonic_ns()
         if self._started:
             self._controller.resume(now_ns)
@@ -105,14 +105,14 @@ class NaiveLoop:
             cycle.resets, cycle.dropped_s))
 
     def close(self) -> TimingSummary:
-        """Finish the recording and give the metrics."""
+        """Finish the recording, and return the metrics."""
         self._writer.close()
         return self.metrics.summary()
 
 
 PROPOSED, NAIVE = 'Proposed', 'Naive'
-# Table I as it is printed, by the name of the metric: proposed, naive, in the units of
-# `TIMING_ROWS`.
+# Table I as printed in the paper, by metric: values of the proposed and the naive loop, in the
+# units of `TIMING_ROWS`.
 PAPER_TABLE = {
     'Final Error': ('1.48', '402.38'),
     'Average Step Error': ('4.10', '22.84'),
@@ -130,8 +130,8 @@ class Synchronization:
     """
     The cycles of both loops.
 
-    :param proposed: ours, a live graph.
-    :param naive: one loop for everything.
+    :param proposed: cycles of the project's loop in a live graph.
+    :param naive: cycles of the naive loop.
     """
 
     proposed: TimedRun
@@ -139,11 +139,11 @@ class Synchronization:
 
     @property
     def table(self) -> TimingTable:
-        """Return table I of them."""
+        """Return table I for both loops."""
         return TimingTable((self.proposed, self.naive))
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return table I beside the paper's, as JSON has it."""
+        """Return table I with the paper's values, as JSON-compatible rows."""
         ours, naive = self.table.summaries
         return [{'metric': row.name, 'unit': row.unit,
                  'proposed': row.value(ours), 'naive': row.value(naive),
@@ -154,10 +154,10 @@ class Synchronization:
 def measure_synchronization(game: Path, planner: str, duration_s: float,
                             folder: Path) -> Synchronization:
     """
-    Run the graph live, then the naive loop, for as long by the wall clock.
+    Run the graph live, then the naive loop, for the same wall time.
 
-    :param duration_s: of each [s]
-    :param folder: of both runs' files: `proposed` and `naive` in it.
+    :param duration_s: wall time of each [s]
+    :param folder: folder of both runs' files, with subfolders `proposed` and `naive`.
     :raises CrgameError: if a run failed.
     """
     run_live(game, planner, folder / 'proposed', duration_s)
@@ -170,7 +170,7 @@ def measure_synchronization(game: Path, planner: str, duration_s: float,
 
 
 def _smaller(name: str) -> Expectation[tuple[TimingSummary, TimingSummary]]:
-    """Expect a metric of table I to be smaller in our loop."""
+    """Build the expectation that a metric of table I is smaller in the project's loop."""
     row = next(each for each in TIMING_ROWS if each.name == name)
     paper = PAPER_TABLE[name]
 
@@ -185,12 +185,12 @@ def _smaller(name: str) -> Expectation[tuple[TimingSummary, TimingSummary]]:
         f'{paper[0]} {row.unit}, naive {paper[1]} {row.unit} (table I)', check)
 
 
-# Of the other rows the machine decides: a fast one has no timeouts in either loop.
+# The other rows depend on the machine: a fast one has no timeouts in either loop.
 TIMING_EXPECTATIONS = tuple(map(_smaller, (
     'Final Error', 'Average Step Error', 'Maximum Cumulative Error')))
 
 
 def judge_synchronization(found: Synchronization) -> tuple[Judgement, ...]:
-    """Look for what of the paper's table must come out on any machine."""
+    """Judge the expectations on the paper's table that hold on any machine."""
     ours, naive = found.table.summaries
     return judge('timing', TIMING_EXPECTATIONS, (ours, naive))

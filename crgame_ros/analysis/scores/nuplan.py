@@ -36,8 +36,8 @@ HORIZON_S, STRIDE_S = 3.0, 0.1
 # A slower vehicle has no time to collision [m/s] (nuplan-devkit,
 # time_to_collision_within_bound.py).
 STANDS = 0.005
-# nuPlan smooths over windows of samples of 0.1 s: a short one for accelerations and yaw, a long one
-# for jerks.
+# nuPlan smooths over windows of samples of 0.1 s: a short one for accelerations and yaw, a long
+# one for jerks.
 _SAMPLE_S, _SHORT, _LONG = 0.1, 5, 15
 # Jerk needs at least so many steps.
 LEAST_STEPS = 5
@@ -147,8 +147,8 @@ def measure_comfort(drive: ScoredDrive) -> DriveComfort | None:
     """
     Return the extremes of a drive; None for fewer than `LEAST_STEPS` steps.
 
-    A Savitzky-Golay filter of order 2 over 0.5 s smooths and differentiates the speed v of the rear
-    axle and the yaw. With yaw rate w, the centre, r ahead of the rear axle, has the longitudinal
+    A Savitzky-Golay filter of order 2 over 0.5 s smooths and differentiates the rear axle's speed
+    v and the yaw. With yaw rate w, the centre, r ahead of the rear axle, has the longitudinal
     acceleration v' - r w^2 and the lateral one v w + r w'. Jerk is the derivative of the
     acceleration's magnitude, longitudinal jerk that of the longitudinal one, over 1.5 s.
     """
@@ -216,8 +216,8 @@ def driven_against(roads: RoadNetwork, drive: ScoredDrive, lanes: LanesDriven) -
     Return the longest distance driven against the lane within any window of 1 s, 0 or more [m].
 
     The distance of a step is that of the centre along the lanelet in which the step ends. Off the
-    lanes, and where cars may drive in both directions, there is no direction. nuPlan leaves out the
-    steps at which the lane changes, and would miss a drive over short lanelets.
+    lanes, and where cars may drive in both directions, there is no direction. nuPlan leaves out
+    the steps at which the lane changes, and would miss a drive over short lanelets.
     """
     network = roads.lanelet_network
     ways = np.zeros(len(drive.poses))
@@ -335,7 +335,7 @@ class NuplanScorer:
         Score a drive.
 
         :param expert: None to compare the progress with a free drive at the speed limit.
-        :param problem: planning problem with the goal of the free drive; None: it follows the lane.
+        :param problem: planning problem with the free drive's goal; None: it follows the lane.
         :raises InputError: if the drive is too short.
         """
         comfort = measure_comfort(drive)

@@ -12,7 +12,7 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Shorter progress is noise, and backwards progress counts as none beyond this (nuplan-devkit,
+# Shorter progress counts as this, and a drive backwards by more has a ratio of 0 (nuplan-devkit,
 # docs/metrics_description.md) [m].
 NOISE = 0.1
 # In the free drive a vehicle accelerates at nuPlan's limit of comfort [m/s^2]. Where no limit is

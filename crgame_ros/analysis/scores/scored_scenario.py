@@ -104,7 +104,7 @@ class ScoredScenario:
         return ScenarioObstacles(self.loaded)
 
     def course(self, obstacle_id: int) -> FloatArray:
-        """Return the poses (n, 3) of an obstacle's centre from time step 0 on; NaN where absent."""
+        """Return the poses (n, 3) of an obstacle's centre from time step 0; NaN where absent."""
         column = self.obstacles.ids.index(f'o{obstacle_id}')
         poses = self.obstacles.poses[:, column]
         before = np.full((max(self.obstacles.first_k, 0), 3), np.nan)

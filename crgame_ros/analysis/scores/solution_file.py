@@ -58,7 +58,7 @@ def solution_name(solution: Solution, vehicle_id: str = '') -> str:
 
 
 def dated(solution: Solution, when: datetime | None) -> Solution:
-    """Return a solution with the date at which it was made; None: without a date."""
+    """Set the date at which a solution was made, None for no date, and return the solution."""
     solution.date = None if when is None else when.replace(tzinfo=None, microsecond=0)
     return solution
 

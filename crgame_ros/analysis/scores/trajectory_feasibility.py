@@ -44,8 +44,8 @@ class TrajectoryFeasibility:
     :param heading_error: likewise for the heading [rad]
     :param excess_acceleration: excess of the needed acceleration over the model's limit [m/s^2]
     :param excess_steering_rate: likewise for the steering rate [rad/s]
-    :param excess_friction: likewise for the magnitude of the acceleration, with its lateral part
-        [m/s^2]
+    :param excess_friction: likewise for the magnitude of the longitudinal and lateral
+        acceleration [m/s^2]
     :param step_s: time of a transition [s]
     """
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How people drove, in tables: of each vehicle, event, lane change and take-over."""
+"""The tables of driving behaviour: for each vehicle, event, lane change and take-over."""
 
 from collections.abc import Iterable, Mapping, Sequence
 import math
@@ -19,7 +19,7 @@ _SINCE_START = "since the run's start"
 
 
 def _column(name: str, empty: str) -> Column:
-    """Declare a measure by what it says of itself."""
+    """Return the column of a measure, from the measure's own definition."""
     measure = MEASURES[name]
     return Column(name, NUMBER, measure.unit, measure.definition, measure.reference,
                   measure.variant, empty)

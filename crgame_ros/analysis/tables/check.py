@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether exported tables are what their dictionary says."""
+"""Checks exported tables against their data dictionary."""
 
 from collections.abc import Iterator, Mapping
 import hashlib
@@ -26,8 +26,8 @@ def table_faults(folder: Path) -> tuple[int, list[str]]:
     """
     Compare the tables in a folder with their `datapackage.json`.
 
-    :return: the number of tables, and what is wrong, one line each.
-    :raises InputError: if there is no such dictionary, or it is none.
+    :return: the number of tables, and the faults, one line each.
+    :raises InputError: if there is no such dictionary, or the file is not a dictionary.
     """
     file = folder / PACKAGE_FILE
     try:
@@ -40,7 +40,7 @@ def table_faults(folder: Path) -> tuple[int, list[str]]:
 
 
 class _Resource:
-    """A table's file, and what the dictionary says of it."""
+    """A table's file with its entry in the dictionary."""
 
     def __init__(self, resource: Mapping[str, Any], folder: Path) -> None:
         name = str(resource['path'])
@@ -52,7 +52,7 @@ class _Resource:
         self._schema = {name: _TYPES[field['type']] for name, field in self._fields.items()}
 
     def faults(self) -> Iterator[str]:
-        """Yield what is wrong."""
+        """Yield the faults."""
         try:
             with self._path.open('rb') as stream:
                 digest = f'sha256:{hashlib.file_digest(stream, "sha256").hexdigest()}'

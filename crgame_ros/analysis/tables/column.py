@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A column and a table as they are declared: what is written, and what the dictionary says."""
+"""Declarations of columns and tables, for the files and the data dictionary."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ class Column:
     """
     A column of a table.
 
-    :param name: in the files.
-    :param type: of its values: NUMBER, INTEGER, TEXT or FLAG.
-    :param unit: SI; 1 for a bare number, empty for what is no quantity.
-    :param definition: in a sentence, without its unit.
-    :param reference_point: of the vehicle or object that a position or motion is of.
-    :param variant: which of several usual ways of computing it.
+    :param name: name in the files.
+    :param type: type of its values: NUMBER, INTEGER, TEXT or FLAG.
+    :param unit: SI; 1 for a bare number, empty for a column that is no quantity.
+    :param definition: one sentence, without its unit.
+    :param reference_point: reference point of a position or motion on the vehicle or object.
+    :param variant: which of several usual definitions is used.
     :param empty: when it has no value; empty for a column that always has one.
-    :param values: the only ones that it can have; empty for no such list.
+    :param values: the allowed values; empty for no such list.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Column:
 
     @property
     def notes(self) -> dict[str, str]:
-        """Return what is said of it beside name and type, without what is empty."""
+        """Return the fields other than name and type that are not empty."""
         given = {'unit': self.unit, 'description': self.definition,
                  'referencePoint': self.reference_point, 'variant': self.variant,
                  'emptyWhere': self.empty}
@@ -53,10 +53,10 @@ class TableDeclaration:
     """
     A table.
 
-    :param name: of its file.
-    :param row: what a row is.
-    :param key: columns that no two rows have alike.
-    :param columns: in the order of the files.
+    :param name: name of its file.
+    :param row: meaning of a row.
+    :param key: columns whose values together are unique.
+    :param columns: columns in the files' order.
     """
 
     def __init__(self, name: str, row: str, key: tuple[str, ...],
@@ -65,7 +65,7 @@ class TableDeclaration:
         self.row = row
         self.key = key
         self.columns = tuple(columns)
-        # A Parquet file that has lost its dictionary still explains itself.
+        # A Parquet file without its dictionary still contains the definitions.
         self.schema = pa.schema([
             pa.field(column.name, column.type, nullable=column.name not in key,
                      metadata=column.notes) for column in self.columns],
@@ -78,9 +78,9 @@ RUN = Column('run', TEXT, '', "the run: its folder's name, a colon and its epoch
 
 def step_columns(of: str) -> tuple[Column, Column]:
     """
-    Declare a scenario step and its time.
+    Return the columns of a scenario step and its time.
 
-    :param of: what happens then.
+    :param of: what happens at that step.
     """
     return (Column('k', INTEGER, '1', f'scenario time step of {of}'),
             Column('time_s', NUMBER, 's', f"time of {of} since the run's start",

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The data dictionary beside the tables: a Frictionless Data Package with Table Schemas."""
+"""The data dictionary of the tables: a Frictionless Data Package with Table Schemas."""
 
 from collections.abc import Sequence
 import hashlib
@@ -36,9 +36,9 @@ class WrittenTable(NamedTuple):
 
 def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str) -> dict[str, Any]:
     """
-    Describe tables that have been written.
+    Return the data package of tables that have been written.
 
-    :param name: of the package.
+    :param name: name of the package.
     """
     return {
         '$schema': PROFILE.format('datapackage'), 'name': name, 'title': f'Runs: {name}',

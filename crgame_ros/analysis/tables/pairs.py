@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of criticality: what is left to each pair at each step, and whose ways crossed."""
+"""The tables of criticality: the measures of each pair at each step, and crossings."""
 
 from collections.abc import Callable
 from typing import Any
@@ -33,10 +33,10 @@ _BUFFERED_ROWS = 8192
 
 def measure_column(name: str, prefix: str = '', empty: str = '') -> Column:
     """
-    Declare a column of a measure of criticality, by what the measure says of itself.
+    Return the column of a criticality measure, from the measure's own definition.
 
-    :param prefix: of the column's name; `worst_` for the worst moment of a run.
-    :param empty: when it has no value, where that is not when the measure is undefined.
+    :param prefix: prefix of the column's name; `worst_` for the worst moment of a run.
+    :param empty: when it has no value, if that differs from when the measure is undefined.
     """
     measure, place = MEASURES[name], COLUMN[name]
     following = place < len(WITHOUT_LEADER)
@@ -70,7 +70,7 @@ CROSSINGS = TableDeclaration(
 def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
                       progress: Callable[[float], object]) -> None:
     """
-    Measure a run, write both tables as it goes on, and note the worst of each vehicle.
+    Measure a run, write both tables step by step, and store the worst values of each vehicle.
 
     :raises InputError: if its scenario cannot be used.
     """
@@ -82,7 +82,7 @@ def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
 
 
 class _Collected:
-    """Keeps rows of pairs until they are worth writing."""
+    """A buffer of rows of pairs, written in larger pieces."""
 
     def __init__(self, run: TableRun, pairs: TableRows, crossings: TableRows) -> None:
         self._run, self._pairs, self._crossings = run, pairs, crossings
@@ -93,7 +93,7 @@ class _Collected:
         self._rows = 0
 
     def add(self, criticality: Criticality) -> None:
-        """Take what was measured at a step."""
+        """Add the measures of a step."""
         if self._ids is None:
             self._ids = pa.array(criticality.ids, TEXT)
         k = self._run.record.log.game.scheduler.k(criticality.n)
@@ -113,7 +113,7 @@ class _Collected:
             self.flush()
 
     def flush(self) -> None:
-        """Hand the rows over."""
+        """Write the buffered rows."""
         if not self._rows or self._ids is None:
             return
         ks, subjects, counts = np.array(self._steps).T

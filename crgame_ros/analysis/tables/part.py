@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Columns that one computation fills: whoever has more to say of a row adds a part."""
+"""Parts of tables: columns that one computation fills; further columns are further parts."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from crgame_ros.analysis.tables.table_run import TableRun
 @dataclass(frozen=True)
 class TablePart:
     """
-    Some columns of a table whose rows all parts know: `vehicles`, `events`, `runs`.
+    Some columns of a table whose parts share the same rows: `vehicles`, `events`, `runs`.
 
-    :param columns: what it fills.
-    :param values: gives the values of a run by column, in the order of the table's rows; columns
-        that it leaves out stay empty.
+    :param columns: the columns that it fills.
+    :param values: returns the values of a run by column, in the order of the table's rows;
+        columns that it leaves out stay empty.
     """
 
     columns: tuple[Column, ...]
@@ -26,7 +26,7 @@ class TablePart:
 
 def declare(name: str, row: str, key: tuple[str, ...],
             parts: Sequence[TablePart]) -> TableDeclaration:
-    """Declare a table of parts; the first says which rows there are."""
+    """Return the declaration of a table from its parts; the first part defines the rows."""
     return TableDeclaration(name, row, key, (column for part in parts for column in part.columns))
 
 

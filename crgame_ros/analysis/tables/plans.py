@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of plans: what planners answered, when, and how it fits what was driven."""
+"""The table of plans: planners' answers, their times, and their agreement with the motion."""
 
 from collections.abc import Iterator
 import math
@@ -109,7 +109,7 @@ def _row(run: TableRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> 
 
 
 def _planned(run: TableRun, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
-    """Return what is said of a plan's states."""
+    """Return the columns that concern a plan's states."""
     assert found.plan is not None
     log, states = run.record.log, found.plan.states.copy()
     states[:, :3] = av.transform.to_simulation(states[:, :3])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All tables of runs, and how they are filled."""
+"""Fills all tables of runs, and writes them into a folder."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -43,17 +43,19 @@ _LARGEST_PACKAGE = 10_000_000
 
 class TableFolder:
     """
-    Writes tables under temporary names, and gives them their own once all are whole.
+    A folder of tables, which are written under temporary names and renamed once all are complete.
 
-    The dictionary goes first and comes last: where it is, everything it names is whole and of one
-    export. An earlier export of this program is replaced, nothing else.
+    The old dictionary is removed first and the new one written last. If a dictionary is present,
+    all tables that it names are complete and from one export. Only an earlier export of this
+    program is replaced.
 
-    :param out: the folder; it is made if it is not there.
-    :param declarations: of the tables.
+    :param out: the folder; it is created if it is missing.
+    :param declarations: declarations of the tables.
     :param file_format: Parquet or CSV.
-    :param name: of the data package.
-    :ivar writers: by the tables' names.
-    :raises InputError: if the folder cannot be written, or a file of somebody else is in the way.
+    :param name: name of the data package.
+    :ivar writers: writers by table name.
+    :raises InputError: if the folder cannot be written, or a file of another program is in the
+        way.
     """
 
     def __init__(self, out: Path, declarations: tuple[TableDeclaration, ...], file_format: Format,
@@ -109,12 +111,12 @@ class TableFolder:
                    self._out / PACKAGE_FILE)
 
     def _discard(self) -> None:
-        """Leave nothing unfinished."""
+        """Remove unfinished files."""
         for writer in self.writers.values():
             try:
                 writer.release()
             except (OSError, pa.ArrowInvalid):
-                # Of a full disk; the part is removed all the same.
+                # The disk may be full; the partial file is removed anyway.
                 continue
         for part in self._parts.values():
             part.unlink(missing_ok=True)
@@ -126,7 +128,7 @@ class TableFolder:
 
 
 def _earlier(out: Path) -> set[str]:
-    """Name the files of an earlier export in a folder; none if there is no such."""
+    """Return the names of an earlier export's files in a folder; empty without one."""
     try:
         with (out / PACKAGE_FILE).open('rb') as stream:
             package: Any = json.loads(stream.read(_LARGEST_PACKAGE))
@@ -135,7 +137,7 @@ def _earlier(out: Path) -> set[str]:
         files = {str(resource['path']) for resource in package['resources']}
     except (OSError, ValueError, RecursionError, LookupError, TypeError):
         return set()
-    # Whatever it names, only what could be a table of ours is ours.
+    # Only names of possible tables are accepted, whatever the dictionary contains.
     return {PACKAGE_FILE, *(file for file in files if file.rpartition('.')[2] in FORMATS
                             and Path(file).name == file)}
 
@@ -148,16 +150,16 @@ def write_tables(runs: Iterable[TableRun], out: Path, file_format: Format,
                  progress: Callable[[str, float], object] = lambda _what, _share: None,
                  ) -> dict[str, int]:
     """
-    Write the tables of runs and their dictionary into a folder; all are there whole, or none.
+    Write the tables of runs and their dictionary into a folder, all completely or none.
 
-    One run after the other is taken, so that memory is that of one.
+    Runs are processed one after the other, so that memory is that of one run.
 
-    :param runs: ids must differ.
+    :param runs: runs with different ids.
     :param out: the folder; an earlier export in it is replaced.
     :param file_format: Parquet or CSV.
-    :param progress: is told what of which run is under way, and how much of it is done, 0 to 1.
-    :return: rows by table.
-    :raises InputError: if a scenario cannot be used, or the folder not be written.
+    :param progress: called with the current run and task, and the share done of it, 0 to 1.
+    :return: number of rows by table.
+    :raises InputError: if a scenario cannot be used, or the folder cannot be written.
     """
     with TableFolder(out, TABLES, file_format, 'tables') as folder:
         for run in runs:
@@ -184,14 +186,14 @@ def _add_run(run: TableRun, writers: Mapping[str, TableRows],
     try:
         _add_rows(run, writers, progress)
     except (OverflowError, pa.ArrowInvalid) as error:
-        # Documents of a recording may hold any number.
+        # Documents of a recording may contain any number.
         raise InputError(f'a number in it is out of all bounds ({error})', run.id,
                          'the recording is damaged; record again') from error
 
 
 def _add_rows(run: TableRun, writers: Mapping[str, TableRows],
               progress: Callable[[str, float], object]) -> None:
-    """Fill tables one after the other; vehicles and runs come last, for they sum it up."""
+    """Fill tables one after the other; vehicles and runs come last: they summarise the others."""
     for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
         writers[STATES.name].add(rows)
     write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of runs: what was run, how it kept to its time, and what went wrong."""
+"""The table of runs: the settings of each run, its timing, and its problems."""
 
 from collections.abc import Mapping, Sequence
 import hashlib
@@ -14,7 +14,7 @@ from crgame_ros.game.objects import Role
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'
 UNTOLD = 'its cycles were not recorded'
-# Of `timing.json`: key, unit there, column, its unit and factor; docs/timing.md defines them.
+# From `timing.json`: key, unit there, column, its unit and factor; docs/timing.md defines them.
 _MS = ('s', 1e-3)
 TIMING = {
     'final_error_ms': ('final_error_s', *_MS, 'final timing error E_f'),

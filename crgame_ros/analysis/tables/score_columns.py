@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well each vehicle drove, in the table of vehicles: the scores of `crgame score`."""
+"""Columns of the table of vehicles with the scores of `crgame score`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -20,10 +20,10 @@ class _ScoreColumn(NamedTuple):
     """
     The column of a measure.
 
-    :param name: of the column.
-    :param measure: of the scores.
-    :param factor: from the measure's unit to SI.
-    :param median: whether the measure is a spread, of which the median is taken.
+    :param name: name of the column.
+    :param measure: name of the score.
+    :param factor: factor from the measure's unit to SI.
+    :param median: whether the measure is a spread, and the column has its median.
     """
 
     name: str
@@ -32,7 +32,7 @@ class _ScoreColumn(NamedTuple):
     median: bool = False
 
 
-# Latencies stand in the plans' own columns.
+# Latencies are in the plans' own columns.
 _COLUMNS = (
     _ScoreColumn('score_nuplan', 'nuplan_score'),
     *(_ScoreColumn(f'score_{name.removesuffix("_m").lower()}', name) for name in MEASURES
@@ -53,9 +53,9 @@ def _declared(column: _ScoreColumn) -> Column:
 def score_vehicles(run: TableRun, *, drives_only: bool = False,
                    progress: Callable[[float], object] = lambda _: None) -> None:
     """
-    Score a run, for the table of vehicles; why it cannot be scored is for the table of runs.
+    Score a run for the table of vehicles; a reason for no scores goes to the table of runs.
 
-    :param drives_only: without CommonRoad's tools, which take most of the time.
+    :param drives_only: whether to leave out CommonRoad's tools, which take most of the time.
     :param progress: called with the share done so far, 0 to 1.
     """
     found = scores_of(run.record, plans_of_report(run.outcome), drives_only=drives_only,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of states: where everybody was at each scenario step, and what drivers did."""
+"""The table of states: all vehicles and objects at each scenario step, and drivers' inputs."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -102,7 +102,7 @@ def state_rows(run: TableRun, progress: Callable[[float], object] = lambda _: No
 
 
 class _StateRows:
-    """Makes rows of some consecutive steps of a run."""
+    """Builder of the rows of consecutive steps of a run."""
 
     def __init__(self, run: TableRun) -> None:
         self._run, log = run, run.record.log
@@ -153,7 +153,7 @@ class _StateRows:
         return found | self._lanes(poses, here)
 
     def _commands(self, part: slice, everybody: int) -> FloatArray:
-        """Return what led to each state (steps, everybody, 5), NaN where nothing did."""
+        """Return the commands that led to each state (steps, all, 5); NaN without a command."""
         log, record = self._run.record.log, self._run.record
         found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
         wanted = self._run.steps_of(log.ks[part])
@@ -164,12 +164,12 @@ class _StateRows:
         return found
 
     def _lanes(self, poses: FloatArray, here: NDArray[np.bool_]) -> dict[str, Any]:
-        """Return lanelet, arc length and offset of all who are there."""
+        """Return lanelet, arc length and lateral offset of all that are present."""
         avs = self._run.record.log.game.avs
         transforms = {item.id: item.transform for item in avs}
         on_road = poses.copy()
         for column, item in enumerate(self._run.record.log.descriptions):
-            # Of who is no AV as humans are seen on the road (CRG 28): by that of the first AV.
+            # All but AVs are placed on the road by the first AV's transform, as humans are (CRG 28).
             transform = transforms.get(item.id, avs[0].transform if avs else None)
             if transform is not None and not transform.is_identity:
                 on_road[:, column] = transform.to_scenario(poses[:, column])
@@ -187,8 +187,8 @@ class _StateRows:
 
 
 def _consumed(commands: FloatArray) -> dict[str, Any]:
-    """Return the columns of what was consumed (R, 5)."""
-    # Being put back is an event (`events`).
+    """Return the columns of the commands consumed (R, 5)."""
+    # Putting a vehicle back is an event (`events`).
     found: dict[str, Any] = {name: column for name, column in zip(
         COMMAND_COLUMNS, commands.T, strict=True) if name != 'put_back'}
     shown, reverse = found.pop('lights'), found['reverse']

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run that becomes rows of the tables, and what is known of it only once it was measured."""
+"""A run to tabulate, with results that are known only once it was measured."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ _BAG = re.compile(r'bag(_[0-9]+|_part[0-9]+)*')
 
 @dataclass
 class PlanTally:
-    """What was counted of an AV's plans: answers, and those that pass the engine's check."""
+    """Counts of an AV's plans: answers, and those that pass the engine's check."""
 
     answers: int = 0
     passing: int = 0
@@ -41,16 +41,16 @@ class TableRun:
     """
     A run to tabulate.
 
-    :param id: that is in every row.
-    :param record: how everybody moved, what drivers did, and events.
-    :param timing: as `recording.timing_report` gives it; None where nobody measured it.
-    :param plans: gives the recorded plans, one by one; None where they were not recorded.
-    :param offline: of an offline run what `offline_outcome` gives; None otherwise.
+    :param id: id in every row.
+    :param record: motion, drivers' inputs and events.
+    :param timing: result of `recording.timing_report`; None where timing was not measured.
+    :param plans: yields the recorded plans one by one; None where they were not recorded.
+    :param offline: result of `offline_outcome` for an offline run; None otherwise.
     :param scored: whether its vehicles are scored, which takes most of the time.
     :ivar criticality: by vehicle, once `pairs` has been written.
     :ivar tallies: by AV, once `plans` has been written.
     :ivar scores: by vehicle, once it has been scored.
-    :ivar remarks: what could not be had of it, one line each.
+    :ivar remarks: values that could not be computed, one line each.
     """
 
     id: str  # noqa: A003
@@ -71,12 +71,12 @@ class TableRun:
 
     @cached_property
     def behaviour(self) -> tuple[DriverBehaviour, ...]:
-        """Measure how each vehicle was driven, in the order of the log's."""
+        """Measure how each vehicle was driven, in the log's order."""
         return measure_behaviour(self.record)
 
     @property
     def driven(self) -> tuple[DrivenVehicle, ...]:
-        """Return the driven vehicles, as the game has them, in the order of the log's."""
+        """Return the game's driven vehicles, in the log's order."""
         game = {item.id: item for item in self.record.log.game.vehicles}
         return tuple(game[item.id] for item in self.record.log.vehicles)
 
@@ -86,19 +86,19 @@ class TableRun:
         return np.asarray((ks - scheduler.k0) * scheduler.steps_per_tick)
 
     def times_s(self, ks: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the times of scenario steps k since the run's start, alike in all tables [s]."""
+        """Return the times of scenario steps k since the run's start, equal in all tables [s]."""
         return np.asarray(self.steps_of(ks) * self.record.log.game.scheduler.dt_s)
 
 
 def run_name(path: Path) -> str:
     """
-    Name a run by its folder, whether that is given or the recording in it.
+    Return a run's name: that of its folder, given either the folder or the recording in it.
 
-    A later run of a session, in its `run_2`, has the session's name: its epoch is another.
+    A later run of a session, in its `run_2`, has the session's name and another epoch.
     """
     path = path.resolve()
     if path.is_file():
-        # What a recording without a folder of its own is called.
+        # The name of a recording without a folder of its own.
         path = path.with_suffix('') if not _BAG.fullmatch(path.stem) else path.parent
     if _BAG.fullmatch(path.name) and path.parent.name:
         path = path.parent
@@ -112,7 +112,7 @@ def tabulated_runs(paths: Sequence[Path], epoch: int | None,
     Read runs one after the other.
 
     :param paths: folders of runs, or recordings.
-    :param epoch: which run of each, where a recording holds several; None for the last.
+    :param epoch: number of the run where a recording holds several; None for the last.
     :param scored: whether vehicles are scored, which takes most of the time.
     :raises InputError: if one cannot be read, or is given twice.
     """
@@ -132,7 +132,7 @@ def tabulated_runs(paths: Sequence[Path], epoch: int | None,
 
 def own_id(name: str, taken: Iterable[str]) -> str:
     """
-    Return a run an id that no other has: folders in different places may be named alike.
+    Return a unique id for a run: folders in different places may have the same name.
 
     :param taken: ids of the others.
     """
@@ -153,7 +153,7 @@ def _read(path: Path, bag: Path, epoch: int | None,
     except CrgameError as error:
         if record.log.cycles is not None and len(record.log.cycles.rows) > 1:
             raise
-        # Of a recording without cycles there is motion, but no timing.
+        # A recording without cycles has motion, but no timing.
         timing = None
         progress(f'no timing of {path}: {error}', 1.0)
     return TableRun(

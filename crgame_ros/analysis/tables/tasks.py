@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of tasks: stimuli and answers, scores, take-over requests, and what lasted."""
+"""The tables of tasks: stimuli and answers, scores, take-over requests, and spans."""
 
 from collections.abc import Iterable, Mapping, Sequence
 import math

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of driven vehicles: who drove, how far and how well, and the worst moments."""
+"""The table of driven vehicles: driver, distance, scores, and worst moments."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,7 +21,7 @@ REAR_AXLE = 'rear axle'
 AT_STEPS = 'at the scenario steps'
 NOBODY = 'it was never defined: no other was near'
 HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
-# Of `timing.json`, with what each counts.
+# Keys of `timing.json`, with the meaning of each count.
 COUNTS = {
     'requests': 'plan requests', 'accepted': 'plans that were accepted',
     'refused': 'plans that were refused', 'skipped': 'requests left out while one was open',

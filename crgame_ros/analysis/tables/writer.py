@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One table's file, written in pieces: memory is that of a piece, however long the run."""
+"""Writes one table's file in pieces, so that memory does not grow with the run's length."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -16,12 +16,12 @@ import pyarrow.parquet as pq
 
 class TableRows(ABC):
     """
-    Takes the rows of one table.
+    A receiver of the rows of one table.
 
     Numbers that are NaN and texts that are empty are missing.
 
     :param declaration: the table.
-    :ivar rows: that have been added.
+    :ivar rows: number of rows added.
     """
 
     def __init__(self, declaration: TableDeclaration) -> None:
@@ -49,18 +49,18 @@ class TableRows(ABC):
 
     @abstractmethod
     def add_batch(self, batch: pa.RecordBatch) -> None:
-        """Take rows in the table's own types."""
+        """Add rows in the table's own types."""
 
 
 class KeptTable(TableRows):
-    """Keeps the rows of a table."""
+    """A table in memory."""
 
     def __init__(self, declaration: TableDeclaration) -> None:
         super().__init__(declaration)
         self._kept: list[pa.RecordBatch] = []
 
     def add_batch(self, batch: pa.RecordBatch) -> None:
-        """Keep rows."""
+        """Add rows."""
         self._kept.append(batch)
 
     @property
@@ -87,7 +87,7 @@ def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
 
 
 def _plain_text(value: Any) -> Any:
-    """Return text that every reader takes: no control characters but tabs and ends of lines."""
+    """Return text that every reader accepts: without control characters but tabs and newlines."""
     if not isinstance(value, str) or value.isprintable():
         return value
     text = value.encode('utf-8', 'replace').decode('utf-8')
@@ -98,22 +98,22 @@ def _plain_text(value: Any) -> Any:
 
 Format = Literal['parquet', 'csv']
 FORMATS: tuple[Format, ...] = ('parquet', 'csv')
-# Rows that are kept until they are written together: a row group of Parquet.
+# Number of rows that are buffered and written together: a row group of Parquet.
 PIECE_ROWS = 65_536
-# What spreadsheets take for a formula (OWASP, CSV injection) gets this in front.
+# Text that spreadsheets would read as a formula gets this prefix (OWASP, CSV injection).
 FORMULA_BEGINS, FORMULA_GUARD = ('=', '+', '-', '@', '\t', '\r'), "'"
 NOT_A_NUMBER = 'NaN'
 
 
 class TableWriter(TableRows):
     """
-    Writes the rows of one table.
+    A writer of the rows of one table.
 
     Numbers that are NaN and texts that are empty are missing: null in Parquet; in CSV `NaN` and an
     empty field. CSV is RFC 4180, UTF-8; infinite numbers are inf and -inf.
 
     :param declaration: the table.
-    :param path: of the file to write; Parquet also into an open stream.
+    :param path: path of the file to write; for Parquet also an open stream.
     :param file_format: Parquet or CSV.
     """
 
@@ -131,7 +131,7 @@ class TableWriter(TableRows):
             self._parquet = pq.ParquetWriter(path, declaration.schema, compression='zstd')
 
     def add_batch(self, batch: pa.RecordBatch) -> None:
-        """Keep rows until a piece is worth writing."""
+        """Buffer rows, and write them once a piece is full."""
         self._kept.append(batch)
         self._kept_rows += len(batch)
         if self._kept_rows >= PIECE_ROWS:
@@ -147,13 +147,13 @@ class TableWriter(TableRows):
                 self._csv.writerows(zip(*map(_spelled, batch.columns), strict=True))
 
     def close(self) -> None:
-        """Write what is left, and let go of the file."""
+        """Write the remaining rows, and close the file."""
         if self._kept:
             self._write()
         self.release()
 
     def release(self) -> None:
-        """Let go of the file as it is."""
+        """Close the file without writing the remaining rows."""
         if self._parquet is not None:
             self._parquet.close()
         if self._csv is not None:
@@ -171,15 +171,16 @@ class TableWriter(TableRows):
 
 
 def _spelled(column: pa.Array) -> list[Any]:
-    """Return a column's values as CSV has them."""
+    """Return a column's values as in CSV."""
     values: list[Any] = column.to_pylist()
     if column.type == NUMBER:
-        # Full precision, and always with a point, an exponent or as inf: never an integer's look.
+        # Full precision, always with a point, an exponent or as inf, so that none looks like an
+        # integer.
         return [NOT_A_NUMBER if value is None else value for value in values]
     if column.type == TEXT:
         return [FORMULA_GUARD + text if text and text.startswith(FORMULA_BEGINS) else text
                 for text in values]
     if column.type == pa.bool_():
-        # In capitals, as R wants them; the others take them too.
+        # Capitals, which R requires and other readers accept.
         return [None if flag is None else 'TRUE' if flag else 'FALSE' for flag in values]
     return values

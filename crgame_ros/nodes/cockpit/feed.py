@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The live run for the cockpit: topics turned into documents and frames for the page.
-"""
+"""The live run for the cockpit: topics turned into documents and frames for the page."""
 
 from collections.abc import Callable
 from contextlib import suppress

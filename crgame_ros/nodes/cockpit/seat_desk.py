@@ -178,9 +178,7 @@ class SeatDesk:
             self._feed.pace(client)
 
     def joined(self, client: Client) -> None:
-        """
-        Return the seat to a client that is back; free the seat of one that now only watches.
-        """
+        """Return its seat to a client that is back; free that of one that only watches."""
         held = self.table.seat_of(client.id)
         if held is not None and not client.rights.drives:
             self._release(client, held.id)
@@ -342,9 +340,7 @@ class SeatDesk:
         self._awaited.note(demand, self.table.seats, self.table.tenants, time.monotonic())
 
     def _publish_hands_off(self, seat: HeldSeat) -> None:
-        """
-        Publish once that the hands are off; the seat's watchdog brakes in the silence after.
-        """
+        """Publish once that the hands are off; in the silence after, the watchdog brakes."""
         seat.release()
         self._publish(seat)
 

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The look of markers: colours that the colour-blind can distinguish, heights, a blank marker.
-"""
+"""Colours that the colour-blind can distinguish, heights, and a blank marker."""
 
 from collections.abc import Iterable
 

@@ -18,9 +18,7 @@ MAX_REFUSALS_PER_REPORT = 5
 
 
 class LiveDiagnostics:
-    """
-    The reports of sim_node: every second, one subject per step; refusals at once.
-    """
+    """The reports of sim_node: every second, one subject per step; refusals at once."""
 
     def __init__(self, outputs: SimOutputs, simulation: Simulation, inputs: SimInputs) -> None:
         self._outputs = outputs

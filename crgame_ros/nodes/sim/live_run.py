@@ -196,9 +196,7 @@ class LiveRun:
         self._watch.close()
 
     def _settle(self) -> None:
-        """
-        Wait until subscribers have the new documents, before messages that need them.
-        """
+        """Wait until subscribers have the new documents, before messages that need them."""
         until_ns = time.monotonic_ns() + SETTLE_NS
         while time.monotonic_ns() < until_ns:
             self._executor.spin_once(timeout_sec=0.02)

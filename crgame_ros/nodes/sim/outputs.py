@@ -306,9 +306,7 @@ class SimOutputs:
                 if self._request_topics[av] == name}
 
     def _connected(self, publisher: Publisher, expected: set[str]) -> set[str]:
-        """
-        Return the companions connected to a topic: all or none, as DDS gives no names.
-        """
+        """Return the companions connected to a topic: all or none, as DDS gives no names."""
         names = [info.node_name for info in
                  self._node.get_subscriptions_info_by_topic(publisher.topic_name)]
         if publisher.get_subscription_count() < len(names):

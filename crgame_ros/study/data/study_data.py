@@ -12,22 +12,148 @@ from typing import Any
 from crgame_ros.analysis.report.command import REPORT_FILE
 from crgame_ros.analysis.report.file import write_report
 from crgame_ros.analysis.report.run import read_report_run
-from crgame_ros.analysis.tables.column import TableDeclaration
+from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.finish import finish_run
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK
-from crgame_ros.study.data.answers_table import answer_rows, ANSWERS
-from crgame_ros.study.data.asked_questions import AskedQuestions, trials_by_number
+from crgame_ros.study.data.asked_questions import AskedQuestions, plain_answer, trials_by_number
 from crgame_ros.study.data.conducted_study import ConductedStudy
-from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
-from crgame_ros.study.data.participants_table import ParticipantsTable
+from crgame_ros.study.data.participant_record import AnsweredItem, ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables, RunTablesCache
 from crgame_ros.study.data.session_events_table import event_rows, EVENTS_OF_SESSIONS
-from crgame_ros.study.data.study_row_table import table_of_rows
-from crgame_ros.study.data.trials_table import TrialsTable
+from crgame_ros.study.data.study_row_table import (
+    flag_column,
+    question_column,
+    table_of_rows,
+    unlike,
+)
+from crgame_ros.study.data.trials_table import PARTICIPANT, TrialsTable, utc, WALL
+from crgame_ros.study.file import StudyFile
+from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.session_journal import JOURNAL
+from crgame_ros.study.session_script import Fields
 import pyarrow as pa
+
+KEPT = '.runs'
+_PARTICIPANT_COLUMNS = (
+    PARTICIPANT, Column('place', INTEGER, '1', 'among all participants, from 1 on'),
+    Column('language', TEXT, '', 'that was chosen', empty='not reported'),
+    Column('begun', TEXT, '', 'when the session began, ISO 8601, UTC'),
+    Column('begun_s', NUMBER, 's', 'when the session began', variant=WALL),
+    Column('ended', TEXT, '', 'when its last entry was made, ISO 8601, UTC'),
+    Column('ended_s', NUMBER, 's', 'when its last entry was made', variant=WALL),
+    Column('sessions', INTEGER, '1', 'how often the simulator was started for the participant'),
+    Column('trials', INTEGER, '1', 'trials that count'),
+    Column('trials_planned', INTEGER, '1', 'trials of the session'),
+    flag_column('complete', 'whether everything of the session is finished or left out'),
+    Column('end_reason', TEXT, '', 'why the session was ended early', empty='it was not'))
+
+
+class ParticipantsTable:
+    """
+    The declaration of the table, and its rows.
+
+    :param study: the study.
+    :param asked: its questionnaires.
+    """
+
+    def __init__(self, study: StudyFile, asked: AskedQuestions) -> None:
+        self._asked = asked
+        answers = [column for scale in asked.else_where.values()
+                   for column in scale.columns(study.language)]
+        taken = {column.name for column in (*_PARTICIPANT_COLUMNS, *answers)}
+        self._fields: dict[str, Column] = {}
+        for question in study.fields:
+            name = unlike(question.name, taken, '_field')
+            taken.add(name)
+            self._fields[question.name] = question_column(question, name, study.language)
+        self.declaration = TableDeclaration(
+            'participants', 'a participant who has begun', ('participant',),
+            (*_PARTICIPANT_COLUMNS, *self._fields.values(), *answers))
+
+    @property
+    def fields(self) -> list[Column]:
+        """Return the columns of the questions to each participant at the start."""
+        return list(self._fields.values())
+
+    def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, Any]:
+        """Return a participant's row."""
+        runs = {Path(entry['run']).parts[:2] for entry in record.entries
+                if isinstance(entry.get('run'), str) and entry['run']}
+        row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,
+               'begun': utc(record.begun_at), 'begun_s': record.begun_at,
+               'ended': utc(record.ended_at), 'ended_s': record.ended_at, 'sessions': len(runs),
+               'trials': len(record.counted), 'trials_planned': trials_planned,
+               'complete': record.complete,
+               'end_reason': next((entry.get('reason') for entry in record.entries
+                                   if entry['entry'] == SessionEvent.ENDED), None)}
+        for answered in record.answered:
+            scale = self._asked.find(answered.item)
+            if isinstance(answered.item.what, Fields):
+                row |= {self._fields[name].name: plain_answer(answer)
+                        for name, answer in answered.answers.items() if name in self._fields}
+            elif answered.item.trial is None and scale is not None:
+                row |= scale.values(answered.answers)
+        return row
+
+
+ANSWERS = TableDeclaration('answers', 'a question that was put', (
+    'participant', 'item', 'question'), (
+        PARTICIPANT, Column('item', TEXT, '', 'of the session, in which it was asked'),
+        Column('trial', INTEGER, '1', 'after which it was asked', empty='it was after none'),
+        Column('attempt', INTEGER, '1', 'at the trial, after which it was answered',
+               empty='it was after none'),
+        Column('questionnaire', TEXT, '', 'name of its questionnaire',
+               empty='it is a field of the participant'),
+        Column('question', TEXT, '', 'name of the question'),
+        Column('number', NUMBER, '1', 'the answer, where it is a number',
+               empty='it is a text, or none was given'),
+        Column('text', TEXT, '', 'the answer, where it is a text: to the last character',
+               variant='several choices as a JSON array',
+               empty='it is a number, or none was given'),
+        Column('answered', TEXT, '', 'when, ISO 8601, UTC'),
+        Column('answered_s', NUMBER, 's', 'when', variant=WALL),
+        Column('shown_s', NUMBER, 's', 'when its page was shown', variant=f'{WALL}; '
+               "by the page's clock, compared with the server's", empty='no page told it'),
+        Column('taken_s', NUMBER, 's', 'from when its page was shown to when all of it was told',
+               empty='no page told it'),
+        Column('after_s', NUMBER, 's', 'from when its page was shown to the last change of this '
+               'answer', empty='it was left as it was, or no page told it'),
+        Column('recording', TEXT, '', 'folder of the run after which it was asked, from the '
+               "participant's on", empty='it was after none'),
+        Column('run_end_s', NUMBER, 's', "end of that run, on the run's clock",
+               empty='it was after none, or nothing told it'),
+        Column('run_ended_s', NUMBER, 's', 'when that run was recorded to its end', variant=WALL,
+               empty='it was after none')))
+
+
+def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a participant: each item's last answers."""
+    for answered in record.answered:
+        scale = asked.find(answered.item)
+        times = _times(record, answered)
+        after_s = answered.told.get('after_s')
+        for question, answer in answered.answers.items():
+            value = plain_answer(answer)
+            yield {'participant': record.id, 'item': answered.item.id,
+                   'trial': answered.item.trial, 'attempt': answered.attempt,
+                   'questionnaire': None if scale is None else scale.scale.name,
+                   'question': question,
+                   'number' if isinstance(value, int | float) else 'text': value,
+                   'answered': utc(answered.at), 'answered_s': answered.at, **times,
+                   'after_s': after_s.get(question) if isinstance(after_s, dict) else None}
+
+
+def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, Any]:
+    """Return when an item was shown, and values of the run before it."""
+    run = answered.after
+    folder = None if run is None else run.folder
+    return {'shown_s': answered.told.get('shown_at'), 'taken_s': answered.told.get('taken_s'),
+            'recording': None if folder is None
+            else folder.relative_to(record.folder).as_posix(),
+            'run_end_s': None if run is None else run.says('end_time_s'),
+            'run_ended_s': None if run is None else run.ended_at}
 
 
 def session_goes_on(participant: Path) -> bool:
@@ -65,9 +191,6 @@ def finished_recording(folder: Path, participant: Path, say: Callable[[str], obj
     say(f'{folder}: finishing what was left unfinished')
     finish_run(folder, lambda line: say(line) if line.startswith('error') else None)
     return ''
-
-
-KEPT = '.runs'
 
 
 @dataclass

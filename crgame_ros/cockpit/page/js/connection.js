@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The WebSocket to the cockpit's server: it comes back by itself and feeds the store. */
+/** The WebSocket to the cockpit's server, which reconnects by itself and feeds the store. */
 
 /** @import { PageMessage, Reply, RequestMessage, ServerMessage } from './messages.js' */
 /** @import { Store } from './store.js' */
@@ -37,7 +37,7 @@ export class Connection {
       () => this.#ping(), PING_EVERY_MS);
   }
 
-  /** Return whether the server can be reached at this moment. */
+  /** Return whether the server can be reached now. */
   get open() {
     return this.#socket?.readyState === WebSocket.OPEN;
   }
@@ -75,7 +75,7 @@ export class Connection {
     });
   }
 
-  /** Drop the connection; it is taken up again at once. */
+  /** Drop the connection, which is then restored at once. */
   interrupt() {
     this.#socket?.close();
   }
@@ -88,7 +88,7 @@ export class Connection {
     this.#socket?.close();
   }
 
-  /** The last way there and back goes with it: the others see who is far away. */
+  /** Send a ping with the last round-trip time, which the others can see. */
   #ping() {
     const { round_trip_ms } = this.#store;
     const t = performance.now();
@@ -152,7 +152,7 @@ export class Connection {
 }
 
 /**
- * Return the socket beside a page: the replay of a past run has an address below the cockpit's.
+ * Return the socket's address beside a page's: a replay has an address below the cockpit's.
  *
  * @param {Location} location of the page
  */

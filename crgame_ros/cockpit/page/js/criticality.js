@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What was left to the driven vehicles, step by step: time, room and braking. */
+/** Criticality of the driven vehicles, step by step: time, distance and braking measures. */
 
 import { CRITICALITY_WIDTH, MEASURES } from './frames.js';
 import { countWhile } from './search.js';
@@ -9,18 +9,18 @@ import { countWhile } from './search.js';
 /** @import { Status } from './messages.js' */
 
 /** @typedef {typeof MEASURES[number]} MeasureName */
-/** @typedef {{value: number, of: number}} Critical a value, and the column of whom it is to */
+/** @typedef {{value: number, of: number}} Critical a value, and the column of the other object */
 /** @typedef {Critical & {t: number}} Worst */
 /** @typedef {{ttc: number, drac: number, pet: number}} Limits */
 
 /**
- * As in SUMO's SSM device; a live run may say others.
+ * As in SUMO's SSM device; a live run may send others.
  *
  * @type {Limits}
  */
 const USUAL = { ttc: 3, drac: 3, pet: 2 };
 
-/** Which values are the more critical: smaller ones, but of these measures. */
+/** Smaller values are more critical, except of these measures. */
 const GREATER = new Set(['drac']);
 
 /** The most critical values of each vehicle over time. */
@@ -33,14 +33,14 @@ export class CriticalityLog {
 
   /**
    * @param {number} keeps_s how far back [s]
-   * @param {(() => void)|null} [fetch] has the frames come; null where they come by themselves
+   * @param {(() => void)|null} [fetch] requests the frames; null if they arrive by themselves
    */
   constructor(keeps_s, fetch = null) {
     this.#keeps_s = keeps_s;
     this.#fetch = fetch;
   }
 
-  /** Have the frames come, now that somebody looks. */
+  /** Request the frames, because they are shown now. */
   want() {
     const fetch = this.#fetch;
     this.#fetch = null;
@@ -52,13 +52,13 @@ export class CriticalityLog {
     this.#frames = [];
   }
 
-  /** Return how many steps are known. */
+  /** Return how many steps are stored. */
   get length() {
     return this.#frames.length;
   }
 
   /**
-   * Take in what a step has brought; one that comes again replaces what was known of it.
+   * Add the values of a step; a repeated step replaces the stored one.
    *
    * @param {CriticalityFrame} frame
    */
@@ -87,12 +87,12 @@ export class CriticalityLog {
   }
 
   /**
-   * Return what is left to a vehicle at a time.
+   * Return a measure of a vehicle at a time.
    *
    * @param {number} t [s]
    * @param {number} index of the vehicle
    * @param {MeasureName} name
-   * @returns {Critical|null} null where nothing is near, or was measured lately
+   * @returns {Critical|null} null if nothing is near, or no measurement is recent
    */
   at(t, index, name) {
     const count = countWhile(this.#frames.length, (i) => this.#frames[i].t <= t + 1e-9);

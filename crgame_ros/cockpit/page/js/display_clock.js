@@ -1,27 +1,27 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * Which simulation time the page shows now.
+ * The clock that selects which simulation time the page shows now.
  *
- * Samples arrive with jitter. The clock runs evenly at the measured rate, so far behind the
- * earliest arrivals that the sample after the shown time has usually come in: one sample period
- * plus the jitter. At 100 Hz this is about 15 ms.
+ * Samples arrive with jitter. The clock runs evenly at the measured rate. It lags the earliest
+ * arrivals by one sample period plus the jitter, so that the sample after the shown time has
+ * usually arrived. At 100 Hz this is about 15 ms.
  */
 
 const WINDOW = 64;
 const FEWEST = 8;
 const SHORTEST_SPAN_MS = 150;
-// A longer silence was a pause or a stall: what was measured before says nothing any more.
+// A longer silence was a pause or a stall, after which the old measurement is invalid.
 const SILENCE_MS = 600;
 const GUARD_MS = 1;
-// A rate that near to the one asked for is that one, measured with jitter.
+// A measured rate this near the requested one is taken for the requested one.
 const STEADY = 0.03;
 const MAX_JITTER_MS = 100;
 const MAX_LEAD_S = 0.1;
 const SNAP_S = 0.25;
 const SETTLE_MS = 250;
 
-/** Maps wall time [ms] to the simulation time to show [s]. */
+/** A map from wall time [ms] to the simulation time to show [s]. */
 export class DisplayClock {
   #t = new Float64Array(WINDOW);
   #at = new Float64Array(WINDOW);
@@ -30,7 +30,7 @@ export class DisplayClock {
   #shown = NaN;
   #shownAt_ms = 0;
 
-  /** Simulated seconds per second until enough samples have come to measure it. */
+  /** Simulated seconds per second until enough samples allow a measurement. */
   factor = 1;
   /** Measured: simulated seconds per second, sample period, jitter, delay [ms]. */
   rate = 1;
@@ -39,7 +39,7 @@ export class DisplayClock {
   delay_ms = 0;
   #lead = 0;
 
-  /** Forget everything: the next sample is shown at once. */
+  /** Reset the clock: the next sample is shown at once. */
   reset() {
     this.#count = 0;
     this.#next = 0;
@@ -47,7 +47,7 @@ export class DisplayClock {
   }
 
   /**
-   * Take note of a sample's arrival.
+   * Record the arrival of a sample.
    *
    * @param {number} t its simulation time [s]
    * @param {number} now_ms when it arrived

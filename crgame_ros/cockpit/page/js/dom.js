@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Building and updating page elements, with text only ever set as text. */
+/** Functions that build and update page elements; text is only set as text, never as mark-up. */
 
 const SVG = 'http://www.w3.org/2000/svg';
 
@@ -26,7 +26,7 @@ export function element(tag, attributes = {}, ...children) {
 }
 
 /**
- * Make an SVG element; parameters as those of `element`.
+ * Make an SVG element; the parameters are those of `element`.
  *
  * @template {keyof SVGElementTagNameMap} Tag
  * @param {Tag} tag

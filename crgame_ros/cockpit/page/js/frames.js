@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Binary frames of the cockpit: little-endian Float64 values, five of them the header. */
+/** Decoder of the cockpit's binary frames: little-endian Float64 values, with a header of five. */
 
 /** Frame kinds, the first value of a frame. */
 export const KIND = Object.freeze({
@@ -20,7 +20,7 @@ export const VEHICLE_WIDTH = 13;
 export const OBJECT_WIDTH = 6;
 export const PLAN_WIDTH = 5;
 
-/** Measures of a vehicle's row in a CRITICALITY frame, each a value and whom it is to. */
+/** Measures of a vehicle's row in a CRITICALITY frame, each a value and the other object. */
 export const MEASURES = /** @type {const} */ ([
   'gap', 'time_gap', 'thw', 'ttc', 'ttc_a', 'drac', 'a_req', 'ttc_2d', 'min_distance', 'pet',
 ]);
@@ -59,7 +59,7 @@ const HEADER = 5;
  * @typedef {object} Scan
  * @property {number} index
  * @property {number} sensor
- * @property {number} x of the sensor when it looked [m]
+ * @property {number} x of the sensor at the time of the scan [m]
  * @property {number} y [m]
  * @property {number} yaw [rad]
  * @property {number} first angle of the first ray [rad]
@@ -99,7 +99,7 @@ const HEADER = 5;
  *
  * @param {ArrayBuffer} buffer the frame
  * @returns {Frame|null} null for an unknown kind
- * @throws {RangeError} when the frame is shorter than it says
+ * @throws {RangeError} if the frame is shorter than its header says
  */
 export function decodeFrame(buffer) {
   const values = new Float64Array(buffer);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The past of one vehicle as plots take it: a list of each column over time. */
+/** The past of one vehicle for plots: a list of each column over time. */
 
 import { VEHICLE, VEHICLE_WIDTH } from './frames.js';
 
@@ -19,9 +19,9 @@ export function emptyHistory() {
 }
 
 /**
- * Add what a sample says of a vehicle.
+ * Add a vehicle's values of a sample.
  *
- * @param {History} past gets it at its end
+ * @param {History} past to which they are appended
  * @param {{t: number, vehicles: Float64Array}} sample rows of all vehicles
  * @param {number} index of the vehicle
  */

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Vehicles between and shortly after their samples; objects between their scenario steps. */
+/** Interpolation and extrapolation of vehicles between samples and of objects between steps. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from './frames.js';
 
 const TURN = 2 * Math.PI;
 
 /**
- * Turn from one angle to another by the shortest way.
+ * Interpolate from one angle to another by the shortest way.
  *
  * @param {number} from [rad]
  * @param {number} to [rad]
@@ -42,7 +42,7 @@ export function interpolateVehicles(out, before, after, share) {
 }
 
 /**
- * Move all vehicles on from a sample with their speeds and yaw rates.
+ * Extrapolate all vehicles from a sample with their speeds and yaw rates.
  *
  * @param {Float64Array} out rows of VEHICLE_WIDTH, written
  * @param {Float64Array} sample the newest rows
@@ -60,7 +60,7 @@ export function extrapolateVehicles(out, sample, dt) {
 }
 
 /**
- * Move all objects on from their scenario step: pose + velocity * dt, velocities unchanged.
+ * Extrapolate all objects from their scenario step: pose + velocity * dt, velocities unchanged.
  *
  * @param {Float64Array} out rows of OBJECT_WIDTH, written
  * @param {Float64Array} sample rows at the step

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Indicators and horn of a vehicle, as the column `lights` of its state tells them. */
+/** Indicators and horn of a vehicle, as encoded in the column `lights` of its state. */
 
 /** Bits of the column; both indicators together are the hazard lights. */
 export const LIGHT = Object.freeze({ left: 1, right: 2, horn: 4 });
@@ -13,9 +13,9 @@ export const LIGHT_BUTTONS = /** @type {const} */ ([
 const BLINKS_PER_S = 1.5;
 
 /**
- * Return the lights that shine at a moment: indicators that are on blink in simulation time.
+ * Return the lights that are lit at a time: active indicators blink in simulation time.
  *
- * @param {number|undefined} lights the column; no number is none
+ * @param {number|undefined} lights the column; undefined means none
  * @param {number} t simulation time [s]
  * @returns {{left: boolean, right: boolean, horn: boolean}}
  */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Before a run that people drive: who is ready, and the countdown over the picture. */
+/** The lobby before a run with drivers: the ready drivers, and the countdown over the picture. */
 
 import { element, setAttribute, setText } from './dom.js';
 import { describeSeat } from './driving/seat_text.js';

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Entry of the page: one store, one connection, the world, and the parts around it. */
+/** Entry point of the page: one store, one connection, the world, and the parts around it. */
 
 import { Connection } from './connection.js';
 import { readStage } from './stage/stage_address.js';
@@ -41,7 +41,7 @@ const PARTS = [
   ['./panels/save_panel.js', 'createSaving', '#panels', 'saving'],
   ['./replay/player.js', 'createReplay', '#timeline', 'replay'],
 ];
-// Of somebody who only drives; names of parts that are not there count for nothing.
+// Parts of a stage, for a person that only drives; names of missing parts are ignored.
 const STAGE = ['person', 'driving', 'tasks', 'lobby', 'sound', 'view3d', 'viewReport'];
 
 const bare = readStage(window.location.search) !== null;
@@ -67,5 +67,5 @@ for (const [path, create, root, name] of parts) {
   }
 }
 await window.crgame.stage?.begin();
-// Every part had its turn.
+// All parts have been loaded.
 window.crgame.ready = true;

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the page and its server say to each other in JSON, as types: nothing here runs.
+ * Types of the JSON messages between the page and its server: no code here.
  *
- * The other ends are crgame_ros/cockpit/scene.py (with map_lanelets.py and
+ * The server's side is crgame_ros/cockpit/scene.py (with map_lanelets.py and
  * road_furniture.py), run_status.py, seat_table.py, run_files.py,
- * library.py, replay_backend.py and, of what the page sends, page_messages.py. The binary frames
+ * library.py, replay_backend.py and, for the page's messages, page_messages.py. The binary frames
  * are in frames.js. Polylines and polygons are flat lists x0, y0, x1, y1, … [m].
  *
  * @typedef {[xmin: number, ymin: number, xmax: number, ymax: number]} Box [m]
@@ -48,14 +48,14 @@ export {};
  */
 
 /**
- * A traffic light, and the way [rad] of those for whom it is.
+ * A traffic light; `yaw` is the heading [rad] of the traffic that it controls.
  *
  * @typedef {{id: number, x: number, y: number, yaw: number, direction: string,
  *   lanelets: number[]}} Light
  */
 
 /**
- * What a plate says (as TrafficSignIDGermany and the like name it), and the way of its readers.
+ * A traffic sign, named as in TrafficSignIDGermany and the like; `yaw` is its traffic's heading.
  *
  * @typedef {{id: number, x: number, y: number, yaw: number, lanelets: number[], kind: string,
  *   value: string, virtual: boolean}} Sign
@@ -89,7 +89,7 @@ export {};
 /** @typedef {{id: string, type: string, role: ObjectRole, shape: Shape}} SceneObject */
 
 /**
- * What an event of the game does, by its kind.
+ * The action of an event of the game, by its kind.
  *
  * @typedef {{kind: 'release', object: string}} ReleaseAction
  * @typedef {{kind: 'brake', object: string, deceleration: number, speed: number}} BrakeAction
@@ -135,15 +135,15 @@ export {};
  */
 
 /**
- * @typedef {object} Scene all that stays as it is during a run
+ * @typedef {object} Scene everything that does not change during a run
  * @property {string} id
  * @property {string} benchmark_id
  * @property {string} title
  * @property {Box} bounds
- * @property {string} country three letters, ZAM where unknown
+ * @property {string} country three letters, ZAM if unknown
  * @property {Environment} environment
  * @property {Lanelet[]} lanelets
- * @property {number[][]} gaps slits between lanelets, for display alone
+ * @property {number[][]} gaps slits between lanelets, for display only
  * @property {{points: number[], lanelet: number, line: string}[]} stop_lines
  * @property {Light[]} lights
  * @property {Sign[]} signs
@@ -156,7 +156,7 @@ export {};
  * @property {boolean} occupancy whether there is a map of permanent obstacles
  * @property {GameEvent[]} events
  * @property {GameTask[]} [tasks]
- * @property {string} [language] of what drivers read
+ * @property {string} [language] of the texts for drivers
  * @property {'through'|'stop'} contact what a contact does to a vehicle that a person drives
  * @property {'on'|'none'} sound whether pages may sound and gamepads rumble
  * @property {number} [again] counts how often a recording was played
@@ -166,17 +166,17 @@ export {};
 
 /**
  * @typedef {object} Seat
- * @property {string} source whose commands the vehicle obeys
+ * @property {string} source source of the commands that the vehicle obeys
  * @property {string} driver the source that the game names
  * @property {string|null} holder id of a client
  * @property {string|null} holder_name
- * @property {Person[]} [requests] who asks for it
- * @property {Person[]} [others] who could get it
- * @property {Person|null} [offer] to whom its holder wants to give it
- * @property {{name: string, for_s: number}|null} [kept] for whom, who has gone, and how long
+ * @property {Person[]} [requests] persons that ask for it
+ * @property {Person[]} [others] persons that could get it
+ * @property {Person|null} [offer] person to which its holder offers it
+ * @property {{name: string, for_s: number}|null} [kept] for its absent driver
  * @property {boolean} [ready] whether its driver is ready to begin
- * @property {string} [device] that its driver has named
- * @property {boolean} [lost] whether nothing comes from its driver
+ * @property {string} [device] of its driver, as its page reports it
+ * @property {boolean} [lost] whether its driver is silent
  */
 
 /** @typedef {{name: string, n: number, k: number, by: string}} FiredEvent */
@@ -216,7 +216,7 @@ export {};
  */
 
 /**
- * Figures of the time-sync supervisor by key, and words; in timing.json some are nested.
+ * Figures and texts of the time-sync supervisor by key; in timing.json some are nested.
  *
  * @typedef {Record<string, number|boolean|string|null|undefined|Record<string, number|null>>
  *   } Timing
@@ -226,7 +226,7 @@ export {};
 /** @typedef {{vehicle: string, with: string, side: string, avoidable_by: string}} NamedContact */
 
 /**
- * What has been worst so far, by measure, and what counts as critical.
+ * The worst values so far by measure, and the thresholds of criticality.
  *
  * @typedef {object} Criticality
  * @property {boolean} critical now
@@ -240,7 +240,7 @@ export {};
  * @typedef {object} Status
  * @property {RunState} run
  * @property {string} [reason] why it ended
- * @property {boolean} [stays] whether the program goes on after the run
+ * @property {boolean} [stays] whether the program continues after the run
  * @property {string[]} [awaited] seats without a driver
  * @property {number} [countdown_s] until the run begins; 0 for none
  * @property {Contact[]} [contacts]
@@ -264,7 +264,7 @@ export {};
 /**
  * @typedef {object} Files
  * @property {number} epoch
- * @property {string} run id by which /api/runs knows it
+ * @property {string} run id in /api/runs
  * @property {string} folder
  * @property {string[]} names
  * @property {boolean} complete
@@ -272,7 +272,7 @@ export {};
  */
 
 /**
- * What /api/runs says of a run, and /api/runs/score.
+ * The answers of /api/runs and /api/runs/score about a run.
  *
  * @typedef {object} PastRun
  * @property {string} id
@@ -281,7 +281,7 @@ export {};
  * @property {string} scenario
  * @property {number|null} began_ms since 1970
  * @property {number|null} duration_s of its recording
- * @property {number|null} contacts null where nobody knows
+ * @property {number|null} contacts null if unknown
  * @property {boolean} closed whether it can be read
  * @property {boolean} finished whether it can be deleted
  * @property {boolean} own whether it belongs to this session
@@ -303,7 +303,7 @@ export {};
 /** @typedef {'info'|'warn'|'error'} NoticeLevel */
 
 /**
- * What the server sends and the store takes in.
+ * Messages from the server to the store.
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
  *   version: string, rights: Rights, framed_by?: string}} HelloMessage
@@ -320,7 +320,7 @@ export {};
  */
 
 /**
- * What the server answers to one page.
+ * Answers of the server to one page.
  *
  * @typedef {{ok: boolean, text: string}} Reply
  * @typedef {{type: 'reply', to: number} & Reply} ReplyMessage
@@ -329,7 +329,7 @@ export {};
  */
 
 /**
- * What the page sends.
+ * Messages from the page.
  *
  * @typedef {{away: true}|({keys: number[]}|{axes: number[]}) & {reverse: number, lights: number[],
  *   put_back: number}} Hands  `lights`: which of LIGHT_BUTTONS are held; `put_back`: whether the
@@ -358,7 +358,7 @@ export {};
  */
 
 /**
- * What /api/scenarios, /api/preview and /api/load speak of.
+ * Types of /api/scenarios, /api/preview and /api/load.
  *
  * @typedef {{id: string, kind: 'game'|'scenario'|'upload', name: string, title: string}} Entry
  * @typedef {{folders: {name: string, entries: Entry[]}[], planners: string[],

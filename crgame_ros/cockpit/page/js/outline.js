@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Outlines of lanelets, what they hold, and boxes around points: flat lists x0, y0, … [m]. */
+/** Outlines of lanelets, point-in-polygon test and bounding boxes: flat lists x0, y0, … [m]. */
 
 /**
- * Return the outline of a lanelet: its left bound and back along its right one.
+ * Return the outline of a lanelet: its left bound, then its right one reversed.
  *
  * @param {{left: number[], right: number[]}} lanelet with flat bounds
  * @returns {number[]} flat polygon

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Who is at this cockpit: roles, delays, and links by which others come in. */
+/** The people at this cockpit: roles, delays, and links that admit others. */
 
 import { element, setAttribute, setText } from './dom.js';
 import { oneLine } from './panels/format.js';
@@ -74,7 +74,7 @@ class People {
     this.#role.replaceChildren(...possible.map(([role, text]) => element('option',
       { value: role, text, selected: role === now })));
     setAttribute(this.#roleRow, 'hidden', possible.length < 2);
-    // Links are made where the cockpit is open to the network, which is over TLS.
+    // Links exist only if the cockpit is open to the network, which is over TLS.
     setAttribute(this.#invite, 'hidden', !directs || window.location.protocol !== 'https:');
     this.#whom.replaceChildren(
       ...humans.map(({ id }) => element('option', { value: `drive ${id}`, text: `drive ${id}` })),
@@ -102,7 +102,7 @@ class People {
     this.#take(this.#role.value);
   }
 
-  /** A new connection begins with all that is granted; what was chosen before holds on. */
+  /** Restore the chosen role: a new connection begins with all granted rights. */
   #chooseAgain() {
     const role = sessionStorage.getItem(ROLE)
       ?? new URLSearchParams(window.location.search).get('role');

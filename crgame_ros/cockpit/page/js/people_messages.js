@@ -1,29 +1,29 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the server says of people, as types: nothing here runs.
+ * Types of the server's messages about people: no code here.
  *
- * The other ends are crgame_ros/cockpit/hub.py and crgame_ros/nodes/cockpit/people_feed.py.
+ * The server's side is crgame_ros/cockpit/hub.py and crgame_ros/nodes/cockpit/people_feed.py.
  */
 
 export {};
 
 /**
- * What this page may do: `directs` and `drives` now, `may_…` if it wants to.
+ * The rights of this page: `directs` and `drives` are in use, `may_…` are granted.
  *
  * @typedef {{role: string, directs: boolean, drives: boolean, seat: string, may_direct: boolean,
  *   may_drive: boolean}} Rights
  */
 
 /**
- * @typedef {object} Present somebody at a page
+ * @typedef {object} Present a person at a page
  * @property {string} client
  * @property {string} name
  * @property {string} role
  * @property {string|null} seat
- * @property {boolean} away whether the hands are off the controls
+ * @property {boolean} away whether the controls are released
  * @property {number|null} round_trip_ms
- * @property {number|null} input_delay_ms from the hand to the answer, at the page
+ * @property {number|null} input_delay_ms from an input to the visible answer, at the page
  */
 
 /**
@@ -35,7 +35,7 @@ export {};
  */
 
 /**
- * `accepted`: whether the page is taken for the one whose key it has.
+ * `accepted`: whether the server has recognised the page by its key.
  *
  * @typedef {{type: 'you', rights: Rights, accepted: boolean}} YouMessage
  * @typedef {{type: 'people', people: Present[], devices: DeviceDelay[]}} PeopleMessage

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What AVs perceive, as far as this page asked for it, and the map of permanent obstacles. */
+/** The requested perception of AVs, and the map of permanent obstacles. */
 
 import { KIND } from './frames.js';
 import { turn } from './interpolation.js';
@@ -11,14 +11,14 @@ import { SampleRing } from './samples.js';
 
 // 3 s at the 30 Hz of a live run, 1 s at the 100 Hz of a recording.
 const ESTIMATES = 100;
-// A planner is told 10 times a second: what it was told so long ago it may have forgotten [s].
+// A planner gets a request 10 times a second: after this time its knowledge is out of date [s].
 const SEEN_LASTS_S = 1;
-// An estimate that is older says nothing; until then it is moved on [s].
+// Age up to which an estimate is extrapolated; an older one is not used [s].
 const ESTIMATE_LASTS_S = 0.5;
-// A scan stays for so many of its sensor's periods, and a moment longer [s].
+// A scan stays for so many of its sensor's periods, and a little longer [s].
 const SCAN_PERIODS = 2;
 const SCAN_LASTS_S = 0.3;
-// Frames may be ahead of what is shown by the delay of the display [s].
+// Frames may be ahead of the shown time by the delay of the display [s].
 const AHEAD_S = 0.5;
 
 /**
@@ -44,9 +44,9 @@ export class Perceived {
   #scans = new Map();
 
   /**
-   * Take in a frame of one of these kinds.
+   * Add a frame of one of these kinds.
    *
-   * @param {PerceptionFrame} frame as decodeFrame gives it
+   * @param {PerceptionFrame} frame decoded frame
    */
   take(frame) {
     switch (frame.kind) {
@@ -63,7 +63,7 @@ export class Perceived {
     }
   }
 
-  /** Forget what AVs perceived; the map stays as long as its scene. */
+  /** Clear the perception of AVs; the map stays as long as its scene. */
   clear() {
     this.#seen.clear();
     this.#estimates.clear();
@@ -71,11 +71,11 @@ export class Perceived {
   }
 
   /**
-   * Return who an AV's planner has been told of.
+   * Return the objects that an AV's planner has been told of.
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]
-   * @returns {Float64Array|null} columns: vehicles, then objects; null while it is not known
+   * @returns {Float64Array|null} columns: vehicles, then objects; null while unknown
    */
   seenBy(av, t) {
     const frame = this.#seen.get(av);
@@ -84,7 +84,7 @@ export class Perceived {
   }
 
   /**
-   * Return where an AV takes itself to be: the last estimate, moved on.
+   * Return the estimated pose of an AV: the last estimate, extrapolated.
    *
    * @param {number} av index of the AV
    * @param {number} t time that is shown [s]

@@ -1,18 +1,18 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Which page this is: its key, by which the server knows it again after a lost connection. */
+/** The key of this page, by which the server recognises it after a lost connection. */
 
 /** @import { Connection } from './connection.js' */
 /** @import { Store } from './store.js' */
 
 const KEY = 'crgame.key';
 
-/** The key of this tab, and of the tab to come once it has been closed. */
+/** The key of this tab, and of its successor after it has been closed. */
 class Person {
   #connection;
-  // Whoever gives out the address of a stage may say who its driver is, whatever the browser.
+  // The address of a stage may carry the key of its driver, whatever the browser.
   #given = givenKey();
-  // Of a tab that was open before: another tab may have it, and keeps it then.
+  // The key of an earlier tab: if another open tab has it, that tab keeps it.
   #fresh = this.#given === null && sessionStorage.getItem(KEY) === null;
   #key = this.#given ?? sessionStorage.getItem(KEY) ?? localStorage.getItem(KEY) ?? newKey();
 
@@ -29,7 +29,7 @@ class Person {
     }
   }
 
-  /** @returns {Record<string, string>} what names this page in requests */
+  /** @returns {Record<string, string>} headers that identify this page in requests */
   get headers() {
     return { 'X-Crgame-Key': this.#key };
   }
@@ -42,7 +42,7 @@ class Person {
       }
     }
     this.#connection.send({ type: 'person', key: this.#key, fresh: this.#fresh });
-    // From now on a connection that comes back is this tab's.
+    // From now on a restored connection belongs to this tab.
     this.#fresh = false;
   }
 
@@ -53,20 +53,20 @@ class Person {
   }
 }
 
-/** @returns {string|null} the key that the address gives */
+/** @returns {string|null} the key in the address, null if there is none */
 function givenKey() {
   const key = new URLSearchParams(window.location.search).get('key') ?? '';
   return /^[0-9a-f]{32}$/.test(key) ? key : null;
 }
 
-/** 128 random bits; randomUUID is there on safe origins alone. */
+/** Return 128 random bits; randomUUID exists on secure origins only. */
 function newKey() {
   return [...crypto.getRandomValues(new Uint8Array(16))]
     .map((byte) => byte.toString(16).padStart(2, '0')).join('');
 }
 
 /**
- * Tell the server who is back.
+ * Identify this page to the server at each connection.
  *
  * @param {HTMLElement} _ no part of the page
  * @param {Store} store

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the server says of a recorded run, as types: nothing here runs.
+ * Types of the server's answers about a recorded run: no code here.
  *
- * The other end is crgame_ros/cockpit/replay_backend.py.
+ * The server's side is crgame_ros/cockpit/replay_backend.py.
  */
 
 /** @import { AlarmsMessage, EventsMessage, Scene, SeatsMessage, SignalsMessage, Status }
@@ -19,7 +19,7 @@ export {};
  */
 
 /**
- * Documents of a recorded run over time: from which time [s] on which content holds.
+ * Documents of a recorded run over time: each content with the time [s] from which it is valid.
  *
  * @template Content
  * @typedef {[t: number, content: Content][]} Track
@@ -39,7 +39,7 @@ export {};
  */
 
 /**
- * @typedef {object} ReplayInfo what /api/replay/info says of a run
+ * @typedef {object} ReplayInfo answer of /api/replay/info
  * @property {number} epoch
  * @property {number[]} epochs of the recording
  * @property {string} recording

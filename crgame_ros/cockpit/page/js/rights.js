@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What this page's person may do, in words for the controls that they may not use. */
+/** Reasons, in words, why a person may not use a control of this page. */
 
 /** @import { RunAction } from './messages.js' */
 /** @import { Store } from './store.js' */
 
 /**
- * Say why something may not be done here; the server refuses it all the same.
+ * Return why an action is not allowed here; the server checks it too.
  *
  * @param {Store} store
  * @param {'direct'|'drive'} right that it needs
@@ -22,7 +22,7 @@ export function reasonAgainst(store, right, deed) {
 }
 
 /**
- * Say why an order cannot be given; a driver in the seat says by start that they are ready.
+ * Return why an order is not allowed; a driver in the seat uses start to report ready.
  *
  * @param {Store} store
  * @param {RunAction} action
@@ -38,7 +38,7 @@ export function reasonAgainstOrder(store, action) {
 }
 
 /**
- * Say why this person cannot do anything about a seat.
+ * Return why this person cannot act on a seat.
  *
  * @param {Store} store
  * @param {string} id of a seat that there is

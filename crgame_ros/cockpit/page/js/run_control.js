@@ -12,11 +12,11 @@ import { reasonAgainst, reasonAgainstOrder } from './rights.js';
 /** @import { Recording, RequestMessage, RunAction, Status } from './messages.js' */
 /** @import { Store } from './store.js' */
 
-// In which states of the run an order makes sense, its key, and what it says.
+// The states of the run in which an order applies, its key and its text.
 /**
  * @typedef {object} Order
  * @property {string} label
- * @property {string} [key] by its place on the keyboard
+ * @property {string} [key] code of the key on the keyboard
  * @property {string[]} in which states of the run
  * @property {string} title
  * @property {[question: string, consequence: string]} [confirm]
@@ -109,7 +109,7 @@ class RunControl {
   }
 
   /**
-   * List the usual factors, and the present one where it is another.
+   * List the usual factors, and the present one if it differs.
    *
    * @param {number} present
    */
@@ -151,7 +151,7 @@ class RunControl {
   #key(event) {
     if (event.repeat || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)
         || document.querySelector('dialog[open]') || this.#root.hidden
-        // Somebody who drives may press a key by mistake: the experiment is the director's.
+        // A driver may press a key by mistake; only a director controls the experiment.
         || reasonAgainst(this.#store, 'direct', 'pause') !== '') {
       return;
     }
@@ -210,7 +210,7 @@ function buildLamp(node) {
 }
 
 /**
- * What is known of the recording: nothing without a connection, unless the run was over before.
+ * Return the state of the recording, unknown without a connection unless the run was over.
  *
  * @param {Status} status
  * @param {boolean} connected

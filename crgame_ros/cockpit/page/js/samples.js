@@ -18,7 +18,7 @@ export class SampleRing {
 
   /**
    * @param {number} capacity how many samples are kept
-   * @param {number} [spacing_s] samples closer than this after the one before are left out [s]
+   * @param {number} [spacing_s] samples that follow within this time are left out [s]
    */
   constructor(capacity, spacing_s = 0) {
     this.#items = new Array(capacity);
@@ -30,7 +30,7 @@ export class SampleRing {
     return this.#length;
   }
 
-  /** The newest sample, undefined when there is none. */
+  /** Return the newest sample, undefined if there is none. */
   get newest() {
     return this.at(this.#length - 1);
   }
@@ -70,7 +70,7 @@ export class SampleRing {
     return true;
   }
 
-  /** Forget everything. */
+  /** Remove all samples. */
   clear() {
     this.#items.fill(undefined);
     this.#start = 0;
@@ -87,7 +87,7 @@ export class SampleRing {
     return countWhile(this.#length, (index) => this.#kept(index).t <= t) - 1;
   }
 
-  /** All samples, oldest first, in a new array. */
+  /** Return all samples, oldest first, in a new array. */
   toArray() {
     return Array.from({ length: this.#length }, (_, index) => this.#kept(index));
   }

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Searching what is in the order of its time. */
+/** Binary search in ordered lists. */
 
 /**
- * Count those at the beginning of an ordered list for which something holds.
+ * Count the items at the beginning of an ordered list that satisfy a condition.
  *
  * @param {number} length of the list
  * @param {(index: number) => boolean} holds true up to some place and false from there on
- * @returns {number} that place: the index of the first for which it does not hold
+ * @returns {number} index of the first item for which it is false
  */
 export function countWhile(length, holds) {
   let low = 0;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The seats in the Drive panel: who drives what, taking a seat and passing it on. */
+/** The seats in the Drive panel: their drivers, and taking and handing over a seat. */
 
 import { element, setAttribute, setText } from './dom.js';
 import { NameField } from './driving/name_field.js';
@@ -13,7 +13,7 @@ import { reasonAgainstSeat } from './rights.js';
 /** @import { Store } from './store.js' */
 
 /**
- * What a row of the list says.
+ * The facts of a row of the list.
  *
  * @typedef {object} Facts
  * @property {string} id
@@ -42,7 +42,7 @@ class Seats {
   #shown = '';
   /** @type {Record<string, Seat>} */
   #before = {};
-  // After a broken connection the seats are what they were before, until they are told anew.
+  // After a broken connection, the seats stay as they were until new ones arrive.
   #stale = false;
   #live;
   #replay;
@@ -114,7 +114,7 @@ class Seats {
     return {
       id, role, connected, mine: connected && seat.holder === me.id && me.id !== '',
       holder: seat.holder,
-      // A seat that the game itself leaves to a cockpit has nobody to be given back to.
+      // A seat that the game assigns to a cockpit cannot be given back to another driver.
       left: seat.holder === null && seat.source === 'cockpit' && seat.driver !== 'cockpit',
       requests: seat.requests ?? [],
       others: seat.others ?? [],
@@ -214,7 +214,7 @@ class Seats {
   }
 
   /**
-   * A choice of those who have not asked.
+   * Return a selection of the persons that have not asked for the seat.
    *
    * @param {string} id
    * @param {Person[]} others
@@ -263,7 +263,7 @@ class Seats {
   }
 
   /**
-   * Say what changed for this person since the last document.
+   * Show what changed for this person since the last document.
    *
    * @param {Record<string, Seat>} seats
    */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The last seconds once more, at will slowed, from the states that this page has kept. */
+/** Instant replay of the last seconds, optionally slowed, from the states that this page keeps. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { clockTime } from '../panels/format.js';
@@ -12,7 +12,7 @@ export const REPLAYED_S = 10;
 const SPEEDS = [1, 0.5, 0.25, 0.1];
 const DRAWN_EVERY_MS = 100;
 
-/** The bar over the map and the time that is shown while it is open; one per page. */
+/** The bar over the map and the time shown while it is open; one per page. */
 export class InstantReplay {
   #root;
   #store;
@@ -59,12 +59,12 @@ export class InstantReplay {
     return !this.#root.hidden;
   }
 
-  /** Return whether there is a past to show, and no present that it would hide. */
+  /** Return whether there is a past to show and no running present that it would hide. */
   get isPossible() {
     return this.#store.samples.length > 1 && this.#store.status?.run !== 'running';
   }
 
-  /** The time that is shown [s]. */
+  /** Return the time that is shown [s]. */
   get t() {
     return this.#t;
   }
@@ -97,7 +97,7 @@ export class InstantReplay {
   /** @param {boolean} open */
   #setOpen(open) {
     setAttribute(this.#root, 'hidden', !open);
-    // What speaks of the present gives way.
+    // Parts that describe the present are hidden.
     setAttribute(document.body, 'data-past', open);
   }
 
@@ -150,7 +150,7 @@ export class InstantReplay {
 }
 
 /**
- * Make the bar, closed.
+ * Create the bar, closed.
  *
  * @param {HTMLElement} root #last-seconds
  * @param {Store} store

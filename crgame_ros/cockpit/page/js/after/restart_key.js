@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** R held begins the run anew; R tapped is the reverse gear. */
+/** The R key: holding it restarts the run, tapping it selects the reverse gear. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { isTyping } from '../driving/focus.js';
@@ -9,9 +9,9 @@ import { reasonAgainstOrder } from '../rights.js';
 /** @import { Connection } from '../connection.js' */
 /** @import { Store } from '../store.js' */
 
-/** So long the key is held until the run begins anew [ms]. */
+/** How long the key is held until the run restarts [ms]. */
 export const HELD_MS = 800;
-// A tap shows nothing [ms].
+// A shorter press is a tap and shows no hint [ms].
 const SHOWN_AFTER_MS = 250;
 const KEY = 'KeyR';
 const HINT = 'Hold R to begin anew';

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The server's part in past runs; every refusal becomes an Error with one line. */
+/** Requests to the server about past runs; every refusal becomes an Error with one line. */
 
 import { ask, OWN } from '../panels/scenario_api.js';
 import { oneLine } from '../panels/format.js';

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The panel of past runs: pictures to choose from, to replay, compare, fetch and delete. */
+/** The panel of past runs: pictures, with replay, comparison, download and deletion. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { confirm } from '../panels/confirm.js';
@@ -27,7 +27,7 @@ class RunList {
   'Compare the chosen runs');
   /** @type {Set<string>} */
   #chosen = new Set();
-  // By id, as they are shown: pictures are not asked for again.
+  // By id, as shown, so that pictures are not requested again.
   /** @type {Map<string, {text: string, node: HTMLElement}>} */
   #items = new Map();
 
@@ -55,7 +55,7 @@ class RunList {
     }
   }
 
-  /** Ask the server what there is. */
+  /** Fetch the list of runs from the server. */
   async refresh() {
     try {
       const runs = await api.fetchRuns();
@@ -209,7 +209,7 @@ function button(action, text, act) {
 }
 
 /**
- * Make the panel; what there is is asked for when it is seen.
+ * Create the panel, which fetches the list when it is shown.
  *
  * @param {HTMLElement} root #panel-runs
  * @param {Store} store

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How well everybody drove, in numbers that the server makes from the recording. */
+/** The scores of the driven vehicles, which the server computes from the recording. */
 
 import { element } from '../dom.js';
 import { fixed } from '../panels/format.js';
@@ -10,7 +10,7 @@ import { fixed } from '../panels/format.js';
 const KMH = 3.6;
 
 /**
- * What is known of a score: that it is being made, it, or why there is none.
+ * The state of a score: being computed, the score, or why there is none.
  *
  * @typedef {{state: 'waiting'}|{state: 'told', score: Score}|{state: 'none', why: string}} Scored
  */
@@ -42,7 +42,7 @@ export function scoreBlock(scored, mine) {
 
 /**
  * @param {VehicleScore} scored
- * @param {boolean} open whether its parts are to be seen at once
+ * @param {boolean} open whether its parts are shown at once
  */
 function vehicleScore({ vehicle, role, score, parts, distance, fastest, remarks }, open) {
   const points = score === null ? '–' : fixed(100 * score, 0);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The dialog that finds out which axes of a device steer, and how far they go. */
+/** The dialog that measures which axes of a device steer, and their range. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { CalibrationRun, STEPS } from './calibration_run.js';
@@ -59,7 +59,7 @@ export class CalibrationDialog {
 
   /**
    * @param {(index: number, profile: Profile|null) => void} save
-   *   told the new mapping of the device with this index, null for its default
+   * called with the index of the device and its new mapping, null for the default
    */
   constructor(save) {
     this.#save = save;

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * The measuring behind the calibration dialog: which axis or button a person moves, how far.
+ * The measurement behind the calibration dialog: the axis or button that is moved, and how far.
  *
- * It has no clock and no page: samples and times are handed to it.
+ * It uses no clock and no page: the caller passes samples and times.
  */
 
 import { LIGHT_BUTTONS } from '../lights.js';
@@ -29,13 +29,13 @@ export const STEPS = Object.freeze(/** @type {CalibrationStep[]} */ ([
   'test',
 ]));
 
-// A smaller movement of an axis or button is none that was asked for.
+// A smaller movement of an axis or button does not count.
 const LEAST_SPAN = 0.3;
-// A control is back once it has left less than this share of its span, and stays.
+// A control is back once it rests within this share of its span.
 const BACK_SHARE = 0.25;
 const BACK_FOR_MS = 500;
 const DEADZONE = 0.03;
-// A first change from 0 beyond this is no movement but the axis's first true value.
+// A first change from 0 beyond this is the axis's first true value, not a movement.
 const MADE_UP = 0.5;
 
 /** One run through the steps. */
@@ -57,14 +57,14 @@ export class CalibrationRun {
   #backSince_ms = NaN;
 
   /**
-   * @param {Profile} profile what is kept where a step is skipped
+   * @param {Profile} profile profile that skipped steps keep
    */
   constructor(profile) {
     this.profile = structuredClone(profile);
     this.step = STEPS[0];
   }
 
-  /** @returns {(Place & {span: number})|null} what is moved in this step */
+  /** @returns {(Place & {span: number})|null} the control that is moved in this step */
   get found() {
     return this.#sample && this.#asksForMovement ? this.#largest() : null;
   }
@@ -74,7 +74,7 @@ export class CalibrationRun {
   }
 
   /**
-   * Take a sample in; a step ends by itself when what was moved is back at rest.
+   * Add a sample; a step ends by itself when the moved control is back at rest.
    *
    * @param {Sample} sample
    * @param {number} now_ms
@@ -120,7 +120,7 @@ export class CalibrationRun {
     return true;
   }
 
-  /** Leave what this step asks for as it was. */
+  /** Skip this step and keep its control as it was. */
   skip() {
     // Left and right are one measurement.
     if (this.step === 'left') {
@@ -161,7 +161,7 @@ export class CalibrationRun {
   }
 
   /**
-   * Take a button away from whatever it did: a button that was asked for does that alone.
+   * Remove a button from its other functions: a calibrated button has only one.
    *
    * @param {number} index
    */
@@ -244,7 +244,7 @@ export class CalibrationRun {
   }
 
   /**
-   * Where a control stands when nobody touches it.
+   * Return where a control stands at rest.
    *
    * @param {Kind} kind
    * @param {number} index

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The last step of the calibration: what the mapping makes of the device, with fine tuning. */
+/** The last step of the calibration: a test of the mapping, with fine tuning. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { gearAfter, pedalValue, steeringValue } from './gamepad_profile.js';
@@ -16,7 +16,7 @@ const NAMES = { steering: 'Steering', throttle: 'Throttle', brake: 'Brake' };
 const CONTROLS = /** @type {ControlName[]} */ (Object.keys(NAMES));
 const MOST_DEADZONE = 0.3;
 
-/** Shows a profile at work; `node` goes into the dialog. */
+/** A view of a profile at work; `node` goes into the dialog. */
 export class CalibrationTest {
   /** @type {Profile|null} */
   #profile = null;
@@ -40,7 +40,7 @@ export class CalibrationTest {
   }
 
   /**
-   * Show what a sample means.
+   * Show the effect of a sample.
    *
    * @param {Profile|null} profile null hides this view
    * @param {Sample} [sample]

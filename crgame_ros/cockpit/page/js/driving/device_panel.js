@@ -57,7 +57,7 @@ export class DevicePanel {
 }
 
 /**
- * Shorten the name that browsers give a gamepad.
+ * Shorten the name of a gamepad in browsers.
  *
  * @param {string} id such as 'Wheel (Vendor: 046d Product: c24f)'
  * @returns {string}

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Driving from the page: seats, hands and instruments put together. */
+/** Driving from the page: seats, inputs and instruments. */
 
 import { part } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
@@ -19,10 +19,10 @@ import { InputSender } from './sender.js';
 /** @import { Hands, Reply } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-// So long the button asks; a moving vehicle may leave a place free meanwhile [ms].
+// How long the button keeps asking: a moving vehicle may free a place meanwhile [ms].
 const PUT_BACK_MS = 500;
 
-/** What a page does with its hands; in `window.crgame.driving`. */
+/** The driving part of a page; in `window.crgame.driving`. */
 export class Driving {
   #store;
   #connection;
@@ -30,9 +30,9 @@ export class Driving {
   /** @type {DevicePanel|null} */
   #devicePanel = null;
   #reverse = false;
-  // After the device that drove was unplugged nothing moves before a person moves something.
+  // After the driving device was unplugged, nothing moves before the driver moves a control.
   #unplugged = false;
-  // What the instruments say while there is no connection.
+  // Text of the instruments while there is no connection.
   #lost = '';
   #toldDevice = '';
   #putBackNotice;
@@ -81,12 +81,12 @@ export class Driving {
     return this.#sender?.seat ?? null;
   }
 
-  /** @returns {string|null} why the hands are off the controls, null while they are on */
+  /** @returns {string|null} why the controls are released, null while they are in use */
   get away() {
     return this.focus.reason ?? (this.#unplugged ? 'unplugged' : null);
   }
 
-  /** @returns {Hands} what the hands do, as an input message says it */
+  /** @returns {Hands} the driver's inputs, as in an input message */
   get hands() {
     if (this.away !== null) {
       return { away: true };
@@ -106,7 +106,7 @@ export class Driving {
   }
 
   /**
-   * Take a seat, giving back the one held before.
+   * Take a seat and give back the former one.
    *
    * @param {string} seat
    * @returns {Promise<Reply>}
@@ -119,7 +119,7 @@ export class Driving {
   }
 
   /**
-   * Let go of the controls at once, and give the seat back.
+   * Release the controls at once, and give the seat back.
    *
    * @returns {Promise<Reply>}
    */
@@ -131,19 +131,19 @@ export class Driving {
     return reply;
   }
 
-  /** Ask that the vehicle is put back on its lane, as its key does. */
+  /** Request that the vehicle is put back on its lane, as its key does. */
   putBack() {
     this.keyboard.press('Backspace');
     setTimeout(() => this.keyboard.lift('Backspace'), PUT_BACK_MS);
   }
 
-  /** What the hands are on, as the recording names it. */
+  /** Return the input device, as the recording names it. */
   get device() {
     const active = this.gamepads?.active;
     return active ? shortName(active.id).slice(0, 60) : 'Keyboard';
   }
 
-  /** @param {boolean} [anew] also if the server has heard it before */
+  /** @param {boolean} [anew] send it even if the server has it already */
   #tellDevice(anew = false) {
     if (anew || this.device !== this.#toldDevice) {
       this.#toldDevice = this.device;
@@ -156,7 +156,7 @@ export class Driving {
     if (connected) {
       this.#lost = '';
     } else if (this.#lost === '') {
-      // Told again at each vain attempt to connect.
+      // Called again at each failed attempt to connect.
       this.#lost = this.#store.status?.run === 'ended' ? ''
         : this.seat === null ? 'Connection lost: this is how it was last seen.'
           : `Connection lost: ${this.seat} brakes by itself.`;
@@ -181,7 +181,7 @@ export class Driving {
     this.keyboard.release();
     this.#sender.seat = seat;
     window.crgame?.world?.follow?.(seat, true);
-    // A focused button would show its ring on, and widgets might take the keys.
+    // A focused button would keep its focus ring, and widgets might take the keys.
     if (document.activeElement instanceof HTMLElement) {
       document.activeElement.blur();
     }
@@ -198,7 +198,7 @@ export class Driving {
   }
 
   /**
-   * Whoever takes over a vehicle keeps its gear.
+   * Return the gear of a vehicle, which a new driver keeps.
    *
    * @param {string} seat
    */
@@ -225,7 +225,7 @@ export class Driving {
 
   /** @param {boolean} reverse */
   #setReverse(reverse) {
-    // A lever that is moved while the page has no focus counts; what calibration presses doesn't.
+    // A lever moved while the page has no focus counts; buttons pressed in calibration do not.
     if (this.seat !== null && this.focus.reason !== 'dialog' && reverse !== this.#reverse) {
       this.#reverse = reverse;
       this.#moved(true);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Whether a person's hands can be on the controls of this page right now. */
+/** The check whether the driver's inputs can act on this page right now. */
 
 /** @import { Store } from '../store.js' */
 
@@ -8,7 +8,7 @@ const EDITABLE = 'input:not([type=checkbox]):not([type=radio]):not([type=button]
   + 'select, textarea, [contenteditable=""], [contenteditable=true]';
 
 /**
- * Return whether keys pressed at this element belong to it.
+ * Return whether an element uses the keys that are pressed at it.
  *
  * @param {EventTarget|null} target
  * @returns {boolean}
@@ -17,7 +17,7 @@ export function isTyping(target) {
   return target instanceof Element && target.closest(EDITABLE) !== null;
 }
 
-/** Watches focus, visibility, dialogs and the connection. */
+/** A watch on focus, visibility, dialogs and the connection. */
 export class Focus {
   #store;
   #changed;

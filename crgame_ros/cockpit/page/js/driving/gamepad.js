@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Gamepads and wheels of the Gamepad API: which one drives, and what it asks for. */
+/** Gamepads and wheels of the Gamepad API: the active device and its inputs. */
 
 import { LIGHT_BUTTONS } from '../lights.js';
 import {
@@ -9,10 +9,10 @@ import {
 
 /** @import { Control, Profile } from './gamepad_profile.js' */
 
-// Beyond this change of any axis or button a person means it, and not a trembling sensor.
+// A larger change of any axis or button is intended and not sensor noise.
 const MEANT = 0.2;
-// A pedal counts only after it was seen at rest: browsers report 0, half of a wheel's pedal
-// travel, for axes that have not moved since the device was plugged in.
+// A pedal counts only after it was seen at rest: for axes that have not moved since the device
+// was plugged in, browsers report 0, which is half of a wheel's pedal travel.
 const AT_REST = 0.1;
 const STEPS = 1000;
 const PEDALS = /** @type {const} */ (['throttle', 'brake']);
@@ -32,7 +32,7 @@ class Device {
   }
 
   /**
-   * Take the values of this frame.
+   * Read the values of this frame.
    *
    * @param {Gamepad} pad
    */
@@ -43,7 +43,7 @@ class Device {
     }
   }
 
-  /** Return whether somebody moved something clearly since the device was connected. */
+  /** Return whether a control was clearly moved since the device was connected. */
   get moved() {
     /** @type {(values: number[], base: number[]) => boolean} */
     const differs = (values, base) => values.some((v, i) => Math.abs(v - (base[i] ?? 0)) > MEANT);
@@ -51,7 +51,7 @@ class Device {
       || differs(this.sample.buttons, this.baseline.buttons);
   }
 
-  /** Throttle, brake and steering after calibration. */
+  /** Return throttle, brake and steering after calibration. */
   get axes() {
     const { throttle, brake, steering } = this.profile;
     /** @type {(name: 'throttle'|'brake', control: Control) => number} */
@@ -76,9 +76,9 @@ export class Gamepads {
 
   /**
    * @param {{changed: () => void, gear: (change: (reverse: boolean) => boolean) => void,
-   *   unplugged: () => void, listed: () => void}} report `changed` when the active device asks
-   *   for something else, `gear` when one of its gear buttons changed, `unplugged` when it is
-   *   gone, `listed` when the list or the choice of devices changed
+   *   unplugged: () => void, listed: () => void}} report `changed` when the inputs
+   *   of the active device change, `gear` when one of its gear buttons changed, `unplugged` when
+   *   it is gone, `listed` when the list or the choice of devices changed
    */
   constructor(report) {
     this.#report = report;
@@ -121,19 +121,19 @@ export class Gamepads {
   /**
    * Choose the device that drives.
    *
-   * @param {number|null} index of the device; null leaves the keyboard alone
+   * @param {number|null} index of the device; null leaves only the keyboard
    */
   choose(index) {
     const device = index === null ? null : this.#devices.get(index) ?? null;
     for (const other of this.#devices.values()) {
-      // From here on only a new movement brings another device in.
+      // From here on only a new movement activates another device.
       other.baseline = other.sample;
     }
     this.#activate(device);
   }
 
   /**
-   * Keep a mapping for a device, or forget it and take the default again.
+   * Save a mapping for a device, or delete it and use the default again.
    *
    * @param {number} index of the device
    * @param {Profile|null} profile
@@ -149,7 +149,7 @@ export class Gamepads {
     }
   }
 
-  /** Take the mappings anew that this browser keeps. */
+  /** Reload the mappings that this browser keeps. */
   reload() {
     for (const pad of connectedPads()) {
       Object.assign(this.#devices.get(pad.index) ?? {}, loadProfile(pad));

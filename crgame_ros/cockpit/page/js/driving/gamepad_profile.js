@@ -3,7 +3,7 @@
 import { LIGHT_BUTTONS } from '../lights.js';
 
 /**
- * Which axis or button of a gamepad or wheel does what, and over which range.
+ * The mapping of a gamepad's or wheel's axes and buttons to functions, with their ranges.
  *
  * @typedef {{kind: 'axis'|'button', index: number, min: number, max: number, invert: boolean,
  *   deadzone: number, centre?: number}} Control  `centre` only for the steering; the raw value
@@ -29,7 +29,7 @@ export function sampleOf(pad) {
 }
 
 /**
- * Return the mapping that fits a device which nobody has calibrated.
+ * Return the default mapping of a device that is not calibrated.
  *
  * @param {Gamepad} pad in its first state: Logitech pedals rest at +1.
  * @returns {Profile}
@@ -130,7 +130,7 @@ export function loadProfile(pad) {
     try {
       const profile = JSON.parse(text);
       if (isProfile(profile)) {
-        // What was kept before there were indicators, or a button to be put back, has none.
+        // Old profiles have no indicators and no button to be put back.
         const { lights, put_back } = defaultProfile(pad);
         return { profile: { ...profile, lights: isLights(profile.lights) ? profile.lights : lights,
           put_back: Array.isArray(profile.put_back) ? profile.put_back : put_back },
@@ -144,7 +144,7 @@ export function loadProfile(pad) {
 }
 
 /**
- * Keep a calibrated mapping in this browser.
+ * Save a calibrated mapping in this browser.
  *
  * @param {string} id of the gamepad.
  * @param {Profile|null} profile null forgets it.
@@ -158,7 +158,7 @@ export function saveProfile(id, profile) {
 }
 
 /**
- * Keep mappings that another page of this machine has kept; what is none is left out.
+ * Save the mappings of another page of this machine; invalid ones are left out.
  *
  * @param {Record<string, unknown>} profiles JSON of each, by the gamepad's id
  */
@@ -176,7 +176,7 @@ export function keepProfiles(profiles) {
 }
 
 /**
- * @param {any} profile as somebody's storage has it
+ * @param {any} profile from storage
  * @returns {profile is Profile}
  */
 function isProfile(profile) {
@@ -200,7 +200,7 @@ function isLights(lights) {
  *
  * @param {Sample} sample
  * @param {Pick<Control, 'kind'|'index'>} control
- * @returns {number} NaN if the device has none such.
+ * @returns {number} NaN if the device has no such control.
  */
 export function rawValue(sample, control) {
   const values = control.kind === 'axis' ? sample.axes : sample.buttons;
@@ -220,7 +220,7 @@ export function pedalValue(sample, control) {
 }
 
 /**
- * Return the steering.
+ * Return the steering of a sample.
  *
  * @param {Sample} sample
  * @param {Control} control
@@ -239,7 +239,7 @@ export function steeringValue(sample, control) {
  * @param {number} deadzone
  */
 function beyond(share, deadzone) {
-  // Stretched beyond the dead zone, so that nothing jumps at its edge; no number is at rest.
+  // Stretched beyond the dead zone, so that there is no jump at its edge; NaN counts as rest.
   const size = (share - deadzone) / (1 - deadzone);
   return Number.isFinite(size) ? Math.min(1, Math.max(0, size)) : 0;
 }

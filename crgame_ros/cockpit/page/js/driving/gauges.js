@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Bars that show a command, solid, beside the raw key that it comes from, outlined. */
+/** Bars that show a command, solid, and the raw key behind it, outlined. */
 
 import { element, setAttribute, setText } from '../dom.js';
 
@@ -29,7 +29,7 @@ export class PedalBar {
   /**
    * Show the bar and the outline of its key.
    *
-   * @param {number} command 0 to 1, NaN where no command is in force
+   * @param {number} command 0 to 1, NaN if no command is in force
    * @param {boolean} key whether its key is held
    */
   show(command, key) {
@@ -46,7 +46,7 @@ export class PedalBar {
   }
 }
 
-/** A lying bar of the steering, with its zero in the middle. */
+/** A horizontal bar of the steering, with its zero in the middle. */
 export class SteeringBar {
   #fill = element('div', { class: 'bar-fill' });
   #left = element('div', { class: 'bar-key bar-left' });
@@ -60,12 +60,12 @@ export class SteeringBar {
   /**
    * Show the bar and the outlines of its keys.
    *
-   * @param {number} command -1 (right) to 1 (left), NaN where no command is in force
+   * @param {number} command -1 (right) to 1 (left), NaN if no command is in force
    * @param {boolean} left whether a left key is held
    * @param {boolean} right whether a right key is held
    */
   show(command, left, right) {
-    // The fill grows from the middle to the right; a left command turns it over.
+    // The fill grows from the middle to the right; a left command mirrors it.
     const transform = `scaleX(${scaled(-command)})`;
     if (this.#fill.style.transform !== transform) {
       this.#fill.style.transform = transform;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The instruments over the world: of the driven vehicle, or of the one that is watched. */
+/** The instruments over the world, of the driven or the watched vehicle. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
@@ -20,10 +20,10 @@ const LIMIT_EVERY_MS = 300;
 const STANDSTILL = 0.05;
 const KMH = 3.6;
 const DEGREES = 180 / Math.PI;
-// Rounding alone must not make a limit look exceeded [m/s].
+// Tolerance, so that rounding does not make a limit look exceeded [m/s].
 const LIMIT_TOLERANCE = 0.3;
 
-/** Why the hands are off, by reason. */
+/** Texts that explain why the controls are released, by reason. */
 const AWAY_TEXTS = Object.freeze(/** @type {Record<string, string>} */ ({
   hidden: 'Hands off: this page is hidden.',
   focus: 'Hands off: click into this page to drive on.',
@@ -59,9 +59,9 @@ export class Hud {
   /**
    * @param {HTMLElement} root
    * @param {Store} store
-   * @param {() => Subject} subject which vehicle to show, what the hands do, and what has gone
-   *   wrong with the connection
-   * @param {Keyboard} keyboard whose keys are drawn, and pressed by fingers
+   * @param {() => Subject} subject the vehicle to show, its inputs, and any fault of the
+   *   connection
+   * @param {Keyboard} keyboard its keys are drawn and can be pressed by touch
    */
   constructor(root, store, subject, keyboard) {
     this.#root = root;
@@ -126,7 +126,7 @@ export class Hud {
   }
 
   /**
-   * What moves: in every animation frame.
+   * Update the moving parts, in every animation frame.
    *
    * @param {Float64Array} row
    * @param {Subject} subject
@@ -138,7 +138,7 @@ export class Hud {
     p.throttle.show(row[VEHICLE.throttle], throttleKey === 1);
     p.brake.show(row[VEHICLE.brake], brakeKey === 1);
     p.steering.show(command, left === 1, right === 1);
-    // A planner gives no steering command: then the wheel shows the front wheels' angle.
+    // A planner sends no steering command: the wheel then shows the front wheels' angle.
     p.wheel.turn(Number.isFinite(command) ? command
       : row[VEHICLE.steering_angle] / (this.#vehicle?.max_steering_angle || 1));
     setAttribute(p.keycaps.node, 'hidden', !driven);
@@ -149,7 +149,7 @@ export class Hud {
   }
 
   /**
-   * What is read: now and then.
+   * Update the numbers, at a lower rate.
    *
    * @param {Float64Array} row
    * @param {Subject} subject
@@ -191,7 +191,7 @@ export class Hud {
 }
 
 /**
- * The gear that is in, and the one that is asked for: it changes only at standstill.
+ * Return the current gear and the requested one, which is engaged only at standstill.
  *
  * @param {number} speed
  * @param {number} reverse
@@ -204,7 +204,7 @@ function gears(speed, reverse) {
 }
 
 /**
- * A number with its sign, and none for what rounds to zero.
+ * Format a number with its sign, without a sign if it rounds to zero.
  *
  * @param {number} value
  * @param {number} digits

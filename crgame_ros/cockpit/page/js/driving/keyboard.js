@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The driving keys, raw: which of them are held, and each press of the gear key. */
+/** The raw driving keys: the held keys, and each tap of the gear key. */
 
 import { HELD_MS } from '../after/restart_key.js';
 import { LIGHT_BUTTONS } from '../lights.js';
@@ -11,7 +11,7 @@ import { isTyping } from './focus.js';
  *   |typeof LIGHT_BUTTONS[number]} KeyAction
  */
 
-/** What each key does, by its place on the keyboard, so that every layout drives alike. */
+/** The function of each key by its place on the keyboard, so that every layout drives alike. */
 export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefined>} */ ({
   KeyW: 'throttle', ArrowUp: 'throttle',
   KeyS: 'brake', ArrowDown: 'brake', Space: 'brake',
@@ -24,13 +24,13 @@ export const ACTIONS = Object.freeze(/** @type {Record<string, KeyAction|undefin
 /** @type {KeyAction[]} */
 const ORDER = ['throttle', 'brake', 'left', 'right'];
 
-/** Listens to the driving keys while `enabled` says so. */
+/** A listener to the driving keys while `enabled` returns true. */
 export class Keyboard {
   #enabled;
   #report;
   /** @type {Set<string>} */
   #held = new Set();
-  // When R was pressed: it is told when it is let go, because held it means something else [ms].
+  // Time at which R was pressed [ms]. A tap is reported at release, because holding R restarts.
   #reverseSince_ms = NaN;
 
   /**
@@ -41,7 +41,7 @@ export class Keyboard {
   constructor(enabled, report) {
     this.#enabled = enabled;
     this.#report = report;
-    // Capturing comes before any widget, so that a focused button does not take the space bar.
+    // The capture phase precedes any widget, so that a focused button does not take the space bar.
     window.addEventListener('keydown', (event) => this.#down(event), true);
     window.addEventListener('keyup', (event) => this.#up(event), true);
     document.addEventListener('focusin', (event) => {
@@ -80,7 +80,7 @@ export class Keyboard {
   }
 
   /**
-   * Press a key as a finger does on the page.
+   * Press a key by touch.
    *
    * @param {string} code place of a key
    */
@@ -91,7 +91,7 @@ export class Keyboard {
   }
 
   /**
-   * Let a key go that `press` has pressed.
+   * Release a key that `press` has pressed.
    *
    * @param {string} code place of a key
    */
@@ -99,7 +99,7 @@ export class Keyboard {
     this.#leave(code, performance.now());
   }
 
-  /** Let go of everything; a key that is still down must be pressed anew. */
+  /** Release all keys; a key that is still down must be pressed again. */
   release() {
     this.#reverseSince_ms = NaN;
     if (this.#held.size > 0) {
@@ -116,7 +116,7 @@ export class Keyboard {
 
   /** @param {KeyboardEvent} event */
   #down(event) {
-    // While the command key is held, macOS tells no key's release.
+    // While the command key is held, macOS reports no key releases.
     if (event.key === 'Meta') {
       this.release();
       return;

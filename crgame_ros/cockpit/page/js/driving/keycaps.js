@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The driving keys as they lie on the keyboard, lit while they are held; fingers press them. */
+/** The driving keys as they lie on the keyboard, lit while held; they can be pressed by touch. */
 
 import { element, setAttribute, setText } from '../dom.js';
 
 /** @import { Keyboard } from './keyboard.js' */
 
-// The place of a key, what it reads, the other key that does the same, and a sign beside it.
+// The place of a key, its label, the other key with the same function, and a sign beside it.
 /** @type {[code: string, text: string, twin: string|null, title: string, sign?: string][]} */
 const CAPS = [
   ['KeyW', 'W', 'ArrowUp', 'Throttle'], ['KeyR', 'R', null, 'Reverse gear'],
@@ -21,7 +21,7 @@ export class Keycaps {
   /** @type {Map<string, HTMLElement>} */
   #caps = new Map();
 
-  /** @param {Pick<Keyboard, 'press'|'lift'>} keyboard is pressed by fingers */
+  /** @param {Pick<Keyboard, 'press'|'lift'>} keyboard receives touch presses */
   constructor(keyboard) {
     for (const [code, text, , title, sign] of CAPS) {
       const lift = () => keyboard.lift(code);
@@ -29,7 +29,7 @@ export class Keycaps {
         text: sign === undefined ? text : `${text} ${sign}`, on: {
         pointerdown: (event) => {
           event.preventDefault();
-          // A finger that slides off still holds the key.
+          // A finger that slides off the key still holds it.
           /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId);
           keyboard.press(code);
         },
@@ -49,7 +49,7 @@ export class Keycaps {
    * Light the held keys.
    *
    * @param {Keyboard} keyboard
-   * @param {boolean} reverse whether the reverse gear is asked for
+   * @param {boolean} reverse whether the reverse gear is requested
    */
   show(keyboard, reverse) {
     for (const [code, , twin] of CAPS) {
@@ -67,7 +67,7 @@ export class Keycaps {
     return /** @type {HTMLElement} */ (this.#caps.get(code));
   }
 
-  /** Write what the keys read on this person's keyboard, where the browser knows it. */
+  /** Write the labels of the user's keyboard layout, if the browser knows it. */
   async #takeLayout() {
     const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => undefined);
     for (const [code, text, , , sign] of CAPS) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The signs of indicators and horn over the speed, lit as the vehicle shows them. */
+/** The signs of indicators and horn over the speed, lit like the vehicle's. */
 
 import { element, setAttribute } from '../dom.js';
 import { LIGHT, shining } from '../lights.js';
@@ -21,7 +21,7 @@ export class LightSigns {
   }
 
   /**
-   * Light what shines now.
+   * Update the signs.
    *
    * @param {number} lights as the vehicle's state has them
    * @param {number} t simulation time [s]
@@ -29,7 +29,7 @@ export class LightSigns {
   show(lights, t) {
     const shines = shining(lights, t);
     for (const { name, title, node } of this.#signs) {
-      // What is on is said once, and not at each blink.
+      // Screen readers are told once, not at each blink.
       setAttribute(node, 'aria-label', `${title} ${(lights & LIGHT[name]) > 0 ? 'on' : 'off'}`);
       setAttribute(node, 'data-on', shines[name]);
     }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The name under which the others see this person; kept in this browser. */
+/** The field with the name that others see; kept in this browser. */
 
 import { element } from '../dom.js';
 
@@ -28,7 +28,7 @@ export class NameField {
       element('label', { for: 'my-name', text: 'You are' }), this.#input);
     this.node.addEventListener('submit', (event) => {
       event.preventDefault();
-      // Leaving the field gives the keys back to the vehicle.
+      // Leaving the field returns the keys to the vehicle.
       this.#input.blur();
     });
     this.#input.addEventListener('change', () => this.#rename());

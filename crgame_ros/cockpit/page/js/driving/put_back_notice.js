@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Tells a driver who asks to be put back on the lane that nothing has come of it. */
+/** A notice for a driver whose request to be put back on the lane had no effect. */
 
 /** @import { FiredEvent } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-// A vehicle is put back within a step; the event's way to the page takes longer [ms].
+// Time after which the request has failed: a vehicle is put back within a step, but the event
+// takes longer to reach the page [ms].
 const IN_VAIN_MS = 1000;
 export const IN_VAIN = 'Not put back: no place is free on the lane, or the contact is more than '
   + '20 m away. Keep Backspace held until there is one.';
@@ -22,10 +23,10 @@ export class PutBackNotice {
   }
 
   /**
-   * Take what the hands do; holding on asks once.
+   * Update with the driver's input; holding the control requests once.
    *
    * @param {string|null} seat
-   * @param {boolean} asked whether the vehicle is to be put back
+   * @param {boolean} asked whether the driver requests to be put back
    */
   take(seat, asked) {
     const begins = asked && !this.#asked;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Live bars of everything that a device reports, before any mapping. */
+/** Live bars of all raw values of a device, before any mapping. */
 
 import { element, setAttribute, setText } from '../dom.js';
 
@@ -14,7 +14,7 @@ export class RawBars {
   /** @type {Record<Kind, Row[]>} */
   #rows = { axis: [], button: [] };
 
-  /** @param {Sample} sample of the device, for how much it has */
+  /** @param {Sample} sample of the device, for its number of axes and buttons */
   constructor(sample) {
     const axes = sample.axes.map((_, i) => this.#row('axis', `Axis ${i}`));
     const buttons = sample.buttons.map((_, i) => this.#row('button', `${i}`));
@@ -28,7 +28,7 @@ export class RawBars {
    * Show a sample.
    *
    * @param {Sample} sample
-   * @param {Place|null} found what the person moves, marked
+   * @param {Place|null} found the moved control, which is marked
    */
   show(sample, found) {
     this.#showAll('axis', sample.axes, found);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Who drives a seat, in words. */
+/** Texts that say what drives a seat. */
 
 /** @import { Seat } from '../messages.js' */
 
@@ -15,7 +15,7 @@ const GAME_DRIVERS = {
 };
 
 /**
- * Describe who drives a seat.
+ * Return a text that says what drives a seat.
  *
  * @param {Pick<Seat, 'source'|'driver'|'holder'|'holder_name'|'kept'>} seat
  * @param {string|undefined} role 'human' or 'autonomous'

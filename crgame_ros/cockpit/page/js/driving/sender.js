@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Sends what the hands do for the held seat: at once at each change, and again and again. */
+/** The sender of the driver's inputs for the held seat: at each change and periodically. */
 
 /** @import { Connection } from '../connection.js' */
 /** @import { Hands } from '../messages.js' */
 
-// The server lets go of the controls after 200 ms of silence.
+// The server releases the controls after 200 ms of silence.
 const REPEAT_MS = 50;
 
 /** The stream of input messages of one seat. */
@@ -18,7 +18,7 @@ export class InputSender {
 
   /**
    * @param {Connection} connection
-   * @param {() => Hands} hands what the hands do now
+   * @param {() => Hands} hands returns the current inputs
    */
   constructor(connection, hands) {
     this.#connection = connection;
@@ -26,12 +26,12 @@ export class InputSender {
     setInterval(() => this.#repeat(), REPEAT_MS);
   }
 
-  /** @returns {string|null} the seat that gets the input */
+  /** @returns {string|null} the seat that receives the inputs */
   get seat() {
     return this.#seat;
   }
 
-  /** @param {string|null} seat the seat that is held from now on, or none */
+  /** @param {string|null} seat the seat that is held from now on, or null */
   set seat(seat) {
     if (seat !== this.#seat) {
       this.#seat = seat;
@@ -40,7 +40,7 @@ export class InputSender {
     }
   }
 
-  /** Send at once if the hands do something else than before. */
+  /** Send at once if the inputs have changed. */
   update() {
     if (this.#seat === null) {
       return;
@@ -58,7 +58,7 @@ export class InputSender {
       return;
     }
     const input = this.#hands();
-    // Hands off is said once: silence then means the same.
+    // A release is sent once: silence then means the same.
     if (!('away' in input)) {
       this.#last = JSON.stringify(input);
       this.#send(this.#seat, input);

@@ -11,7 +11,7 @@ import { boxOf, contains, outlineOf } from '../outline.js';
  *   one_way: boolean, ring: number[], box: Box}} Lane
  */
 
-/** Finds the lanelet under a point. */
+/** A lookup of the speed limit under a point. */
 export class SpeedLimits {
   /** @type {Lane[]} */
   #lanes = [];
@@ -30,7 +30,7 @@ export class SpeedLimits {
   }
 
   /**
-   * Let events that have fired set limits, the latest last.
+   * Apply the limits of fired events, the latest last.
    *
    * @param {FiredEvent[]} fired
    */
@@ -50,13 +50,13 @@ export class SpeedLimits {
   }
 
   /**
-   * Return the limit of the lane that is driven on; at a crossing, of the one that leads the
-   * vehicle's way.
+   * Return the limit of the lane under a vehicle; at a crossing, of the lane that fits its
+   * heading.
    *
    * @param {number} x of the vehicle [m]
    * @param {number} y of the vehicle [m]
    * @param {number} yaw of the vehicle [rad]
-   * @returns {number|null} [m/s], null where none is known
+   * @returns {number|null} [m/s], null if none is known
    */
   at(x, y, yaw) {
     let best = null;

@@ -4,7 +4,7 @@
 
 import { setAttribute, svg } from '../dom.js';
 
-// Half a turn would look the same to both sides; with 150 degrees at full lock none is alike.
+// Half a turn would look the same on both sides; with 150 degrees at full lock, they differ.
 const FULL_LOCK_DEG = 150;
 
 /** One drawing; `node` goes into the page. */

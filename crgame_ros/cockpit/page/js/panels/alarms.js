@@ -21,9 +21,9 @@ const KINDS = {
   late: ['Running late', false],
   late_traffic: ['Traffic late', false],
 };
-// Nobody is late in a pause.
+// In a pause, nothing is late.
 const WHILE_RUNNING = ['late', 'late_traffic'];
-// So long an alarm stays to be seen after it has ended [ms].
+// How long an alarm stays visible after it has ended [ms].
 const LINGERS_MS = 4000;
 const CONNECTS_WITHIN_MS = 3000;
 
@@ -107,8 +107,8 @@ export function createAlarms(root, store) {
 }
 
 /**
- * Whether an alarm is about what this page drives or, while it drives nothing, follows; whatever
- * is not about a vehicle concerns everybody.
+ * Return whether an alarm concerns the vehicle that this page drives or, without one, follows.
+ * An alarm that is not about a vehicle concerns every page.
  *
  * @param {Alarm} alarm
  * @param {Store} store
@@ -122,13 +122,13 @@ function concerns({ subject }, { scene, seats, me }) {
 }
 
 /**
- * What only the page can know: that it hears nothing from the server any more.
+ * Return the page's own alarms: that the server has become silent.
  *
  * @param {Store} store
  * @returns {Alarm[]}
  */
 function ownAlarms(store) {
-  // After the end of a run the program may well be ended, too.
+  // After the end of a run the program may have ended too.
   return store.connected || store.status?.run === 'ended' ? [] : [{
     id: 'page-connection', kind: 'connection', subject: '',
     text: 'This page has lost its connection to the simulation and tries to get it back.',
@@ -159,20 +159,20 @@ function describe(entry, scene) {
   const since = Number.isFinite(entry.since_t) ? ` (since ${clockTime(entry.since_t)})` : '';
   entry.chip.title = `${oneLine(entry.text)}${since}${entry.known ? '' : ': click if you know'}`;
   setText(entry.says, word);
-  // Which vehicle it is must be said; that the recorder records need not.
+  // The text names the vehicle, but not the recorder.
   const isVehicle = scene?.vehicles.some((vehicle) => vehicle.id === entry.subject);
   setText(entry.whom, isVehicle ? entry.subject : '');
 }
 
 /**
- * Leave out words, those of minor and ended alarms first, until all alarms are to be seen.
+ * Hide words, those of minor and ended alarms first, until all alarms fit.
  *
  * @param {HTMLElement} root
  */
 function fitWords(root) {
   for (const words of ['all', 'urgent', 'none']) {
     root.dataset.words = words;
-    // One pixel for rounding: the title gives way almost, not wholly, alone.
+    // One pixel of tolerance for rounding.
     if (root.scrollWidth <= root.clientWidth + 1) {
       return;
     }

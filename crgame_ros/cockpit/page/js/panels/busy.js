@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** A bar that moves while something takes long, with words and the seconds it has taken. */
+/** A moving bar during a long task, with a text and the elapsed seconds. */
 
 import { element, setText } from '../dom.js';
 
@@ -20,7 +20,7 @@ export class Busy {
   }
 
   /**
-   * Begin, or go on with other words; the seconds are counted from the first.
+   * Start, or change the text; the seconds count from the first call.
    *
    * @param {string} words what is being done
    */

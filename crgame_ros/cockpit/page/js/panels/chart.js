@@ -9,7 +9,7 @@ import { fixed } from './format.js';
 /** @import { Quantity, Trace } from './quantities.js' */
 
 const CONFIG = { displayModeBar: false, doubleClick: 'reset', showTips: false };
-// While it scrolls nothing can be pointed at, which saves setting up handlers at each redrawing.
+// A scrolling plot has no hover, which saves setting up handlers at each redrawing.
 const SCROLLING = { ...CONFIG, staticPlot: true };
 const HOVER_DIGITS = 3;
 
@@ -51,17 +51,17 @@ export class Chart {
         element('h3', { text: quantity.title }),
         element('span', { class: 'dim', text: quantity.unit }), ...lines, this.#values),
       this.#plot);
-    // Asking for the size at each redrawing would make the browser lay out the page.
+    // Reading the size at each redrawing would force a layout of the page.
     new ResizeObserver(([entry]) => { this.#box = entry.contentRect; }).observe(this.#plot);
   }
 
-  /** The element in which Plotly has drawn. */
+  /** Return the element that Plotly draws in. */
   get plot() {
     return this.#plot;
   }
 
   /**
-   * What was drawn last, a row for each point: quantity, unit, line, time [s], value.
+   * Return the points drawn last, one row each: quantity, unit, line, time [s], value.
    *
    * @returns {(string|number)[][]}
    */

@@ -29,7 +29,7 @@ export async function picturesOf(charts) {
     const { title, unit } = chart.quantity;
     const address = await library.toImage(chart.plot, {
       format: 'svg', width: WIDTH_PX, height: HEIGHT_PX });
-    // Put together as text: read into this page its inline styles would be refused.
+    // Joined as text: parsed in this page, its inline styles would be refused.
     const drawn = decodeURIComponent(address.slice(address.indexOf(',') + 1));
     rows.push(`<text x="8" y="${i * row_px + 18}" fill="${themeColor('text')}" font-size="14" `
       + `font-family="sans-serif">${escaped(unit ? `${title} [${unit}]` : title)}</text>`,
@@ -47,7 +47,7 @@ function escaped(text) {
 }
 
 /**
- * Make pixels of a picture.
+ * Convert a picture to pixels.
  *
  * @param {Picture} picture
  * @returns {Promise<Blob>} PNG

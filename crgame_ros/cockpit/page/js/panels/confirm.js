@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The dialog that asks before something is done that cannot be undone. */
+/** The dialog that asks before an action that cannot be undone. */
 
 import { element, setText } from '../dom.js';
 
@@ -12,7 +12,7 @@ let dialog = null;
  *
  * @param {string} question
  * @param {string} consequence
- * @param {string} verb on the button that agrees
+ * @param {string} text of the button that confirms
  * @returns {Promise<boolean>}
  */
 export function confirm(question, consequence, verb) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What is left to the vehicles: now, at worst, and over time beside what counts as critical. */
+/** The panel of criticality: measures now, at worst, and over time with their thresholds. */
 
 import { limitsOf } from '../criticality.js';
 import { element, setAttribute, setText } from '../dom.js';
@@ -133,7 +133,7 @@ class VehicleTable {
 }
 
 /**
- * Of a live run the node tells what was worst, from before this page was opened too.
+ * Return the worst value; of a live run as the node reports it, from its start on.
  *
  * @param {Store} store
  * @param {Criticality|undefined} told

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Files dropped anywhere on the page. */
+/** Handling of files that are dropped anywhere on the page. */
 
 /**
- * Take files that are dropped on the page; none of them replaces the page.
+ * Accept files that are dropped on the page, so that the browser does not open them.
  *
- * @param {HTMLElement} zone shows by data-over that a drop will be taken
+ * @param {HTMLElement} zone gets data-over while a drop would be accepted
  * @param {(files: File[]) => void} taken gets the files
  */
 export function acceptDrops(zone, taken) {
@@ -23,7 +23,7 @@ export function acceptDrops(zone, taken) {
   };
   /** @param {DragEvent} event */
   const leave = (event) => {
-    // Each element tells of leaving it; only leaving the page has nowhere to go.
+    // Every element fires dragleave; only leaving the page has no related target.
     if (event.relatedTarget === null) {
       delete zone.dataset.over;
     }

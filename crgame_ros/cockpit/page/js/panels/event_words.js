@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What an event of a game does, and when it happens by itself, in words. */
+/** Texts that describe an event of a game and the condition under which it fires. */
 
 import { fixed, NONE } from './format.js';
 
@@ -42,7 +42,7 @@ const TITLES = {
 
 /**
  * @param {GameEvent} event an entry of scene.events
- * @returns {string} its kind, for people
+ * @returns {string} its kind in words
  */
 export function eventKind(event) {
   return Object.hasOwn(TITLES, event.kind) ? TITLES[event.kind]
@@ -66,7 +66,7 @@ export function eventWords(event) {
 
 /**
  * @param {EventCondition|null|undefined} when the condition of an event
- * @returns {string} under which it fires by itself; empty if only the button does
+ * @returns {string} the condition in words; empty if only the button fires it
  */
 export function conditionWords(when) {
   if (!when) {

@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Numbers, times and lists as people read them. */
+/** Readable formats of numbers, times and lists. */
 
-/** What stands where there is no value. */
+/** Placeholder for a missing value. */
 export const NONE = '–';
 
 /**
  * @param {number|null|undefined} value
  * @param {number} digits after the point
- * @returns {string} with a true minus sign; NONE when it is no number
+ * @returns {string} with a true minus sign; NONE if it is not a number
  */
 export function fixed(value, digits) {
   if (value === null || value === undefined || !Number.isFinite(Number(value))) {
@@ -47,17 +47,17 @@ export function plural(number, one, many = `${one}s`) {
 
 /**
  * @param {unknown} error what was thrown
- * @returns {string} what it says
+ * @returns {string} its message
  */
 export function errorText(error) {
   return error instanceof Error ? error.message : String(error);
 }
 
-// What is written from right to left, or turns what stands beside it around.
+// Characters written from right to left, or that change the direction of their neighbours.
 const TURNING = /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069]/;
 
 /**
- * Keep a text that a person or a file gave from turning around what stands beside it.
+ * Isolate a foreign text, so that its direction does not affect its neighbours.
  *
  * @param {string} text
  * @returns {string} the same, or between the signs that isolate it (Unicode's FSI and PDI)
@@ -67,7 +67,7 @@ export function isolated(text) {
 }
 
 /**
- * Make one readable line of whatever a server or an exception said.
+ * Convert the text of a server or an exception to one readable line.
  *
  * @param {unknown} text
  * @returns {string}

@@ -20,8 +20,8 @@ import { HealthLog } from './series.js';
 
 const WINDOWS_S = [10, 30, 120];
 const KEPT_S = 120;
-// Each visible plot is redrawn so often [ms]; only one of them in an animation frame, because
-// drawing all at once would take the time of several.
+// Interval at which each visible plot is redrawn [ms]. Only one is redrawn in an animation
+// frame, because drawing all at once would take the time of several frames.
 const PERIOD_MS = 400;
 // The share of a replay's window that lies after the shown time.
 const AHEAD = 0.35;
@@ -33,7 +33,7 @@ const COLOURS = {
 const THEME = [...COLOURS.human, ...COLOURS.autonomous, 'accent', 'border', 'text-dim', 'surface',
   'alarm'];
 
-/** The panel's parts and what is chosen in it. */
+/** The panel's parts and choices. */
 export class HistoryPanel {
   /** Script time of the last redrawing of one plot [ms]. */
   cost_ms = 0;
@@ -118,12 +118,12 @@ export class HistoryPanel {
     return [...this.#charts.values()].filter((chart) => chart.rows.length > 0);
   }
 
-  /** What the plots show, as `Chart.rows`. */
+  /** Return the points of all plots, as `Chart.rows`. */
   get rows() {
     return this.charts.flatMap((chart) => chart.rows);
   }
 
-  /** @param {boolean} on whether the plots stand still, to be looked at closely */
+  /** @param {boolean} on whether the plots stand still for inspection */
   freeze(on) {
     this.#frozen = on ? this.#now() : null;
     setAttribute(this.#freeze, 'aria-pressed', String(on));
@@ -166,7 +166,7 @@ export class HistoryPanel {
     this.#makeChips();
   }
 
-  /** Until somebody chooses, the vehicle is shown that this page drives, or the first. */
+  /** Select the vehicle that this page drives, or the first, until the user chooses. */
   #selectOwn() {
     const vehicles = this.#store.scene?.vehicles ?? [];
     const own = vehicles.find(
@@ -200,7 +200,7 @@ export class HistoryPanel {
     }
   }
 
-  /** Colours cost a style calculation each, so they are read when they change. */
+  /** Read the colours; each costs a style calculation, so this is done only at a change. */
   #readTheme() {
     this.#theme = Object.fromEntries(THEME.map((name) => [name, themeColor(name)]));
     this.#showChips();
@@ -325,7 +325,7 @@ export class HistoryPanel {
   }
 
   /**
-   * What all plots of one round are made from.
+   * Return the data of all plots of one round.
    *
    * @returns {PlotData['vehicles']}
    */
@@ -341,7 +341,7 @@ export class HistoryPanel {
 
 /**
  * @param {HTMLElement} root
- * @returns {HTMLElement} what is hidden and scrolled together with it
+ * @returns {HTMLElement} the element that is hidden and scrolled together with it
  */
 function panelOf(root) {
   return root.closest('.panel') ?? root;

@@ -4,7 +4,7 @@
 
 import { svg } from '../dom.js';
 
-// Every alarm has its own silhouette, so that none is told by its colour alone.
+// Every alarm has its own silhouette, so that none depends on its colour alone.
 /** @type {Record<string, string>} */
 const PATHS = {
   collision: 'M12 1.5l2.6 5.4 5.7-2-2 5.7 4.2 2.9-5 2.1 1 5.9-5.6-2.2-3.6 4.2-1.9-5.6-5.9.6'

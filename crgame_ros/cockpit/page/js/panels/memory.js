@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the page keeps on this machine between visits: preferences, nothing about a run. */
+/** Preferences that the page keeps on this machine between visits; nothing about a run. */
 
 const PREFIX = 'crgame.';
 

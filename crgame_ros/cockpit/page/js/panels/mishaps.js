@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a driver is told of at once: contacts, and where the vehicle left the road. */
+/** Mishaps that a driver is told of at once: contacts, and departures from the road. */
 
 import { clockTime, oneLine } from './format.js';
 
@@ -9,7 +9,7 @@ import { clockTime, oneLine } from './format.js';
 /** @typedef {{t: number, touched: boolean, text: string}} Mishap */
 
 /**
- * What a vehicle has hit and where it left the road, in the order of time.
+ * Return the contacts and road departures of a vehicle, in the order of time.
  *
  * @param {Store} store
  * @param {string} mine the vehicle

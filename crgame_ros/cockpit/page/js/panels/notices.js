@@ -9,7 +9,7 @@ import { icon } from './icons.js';
 /** @import { NoticeLevel } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-// How long a message stays [ms]; an error stays until it is closed or many came after it.
+// How long a message stays [ms]; an error stays until it is closed or many have followed.
 /** @type {Record<NoticeLevel, number>} */
 const STAYS_MS = { info: 5000, warn: 9000, error: 0 };
 const MOST = 4;

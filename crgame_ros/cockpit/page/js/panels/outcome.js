@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What stands over the world: how a run went or goes, or whom the next awaits. */
+/** The card over the world: the result or state of a run, or the driver that it awaits. */
 
 import { scoreBlock } from '../after/score.js';
 import { element, setAttribute } from '../dom.js';
@@ -17,19 +17,18 @@ import { RunResult } from './run_result.js';
 /** @import { Result } from './outcome_card.js' */
 /** @import { Store } from '../store.js' */
 
-// So long a page tells its driver of a mishap while the run goes on [ms].
+// How long a mishap is shown to its driver while the run continues [ms].
 const MISHAP_MS = 10000;
 
 /**
- * Why this person cannot do each of these; empty where they can.
+ * Why this person cannot do each of these; empty if they can.
  *
  * @typedef {Record<'start'|'pause'|'stop'|'reset'|'choose', string>} Against
  */
 
 /**
- * What is to be said, by phase: that the run is over or held for a look at it, that this was
- * closed, that a driver is awaited, that everything is ready, that this page's driver has hit
- * something or left the road.
+ * The content by phase: the run is over or held for inspection, the card was closed, a driver
+ * is awaited, everything is ready, or this page's driver had a contact or left the road.
  *
  * @typedef {{phase: 'over'|'held', connected: boolean, against: Against} & Result} Card
  * @typedef {{phase: 'driver', seat: string, run: RunState, holder: string|null,
@@ -49,7 +48,7 @@ class Outcome {
   #result;
   #shown = '';
   #closedEpoch = -1;
-  // Whether the run is held for a look at how it goes; mishaps of this run that have been told.
+  // Whether the run is held for inspection; mishaps of this run that have been shown.
   #held = false;
   #told = 0;
   #mishapTimer = 0;
@@ -76,7 +75,7 @@ class Outcome {
       this.#held &&= run !== 'running';
     });
     store.on('events', ({ fired }) => {
-      // Back on the lane: the notice of the contact has served.
+      // Back on the lane: the notice of the contact is no longer needed.
       const last = fired.at(-1);
       if (last?.by === 'driver' && last.name.endsWith(` ${window.crgame.driving?.seat}`)) {
         this.#dismiss();
@@ -86,7 +85,7 @@ class Outcome {
     this.#show();
   }
 
-  /** Built anew only where something has changed: somebody may be about to press a button. */
+  /** Rebuild the card only if it has changed: the user may be about to press a button. */
   #show() {
     const facts = this.#facts();
     const text = JSON.stringify(facts);
@@ -217,7 +216,7 @@ class Outcome {
     }
   }
 
-  /** @returns {Promise<boolean>} whether this run stands now, paused if it went on */
+  /** @returns {Promise<boolean>} whether this run stands still now, paused if necessary */
   async #still() {
     const { epoch, status } = this.#store;
     if (status?.run === 'running' && !await this.#order('pause')) {
@@ -307,7 +306,7 @@ class Outcome {
     return element('button', { type: 'button', class: kind, 'data-action': action,
       title: refused || title, disabled: refused !== '',
       'aria-label': text || title, on: { click: (event) => {
-        // A button that kept the focus would be pressed by the space bar, which brakes.
+        // A focused button would be pressed by the space bar, which brakes.
         /** @type {HTMLElement} */ (event.currentTarget).blur();
         act();
       } } }, action === 'close' ? icon('close') : document.createTextNode(text));

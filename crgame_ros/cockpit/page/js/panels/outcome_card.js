@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How a run went, in words: why it ended, who touched whom, its planners, timing and files. */
+/** The result of a run in words: why it ended, its contacts, planners, timing and files. */
 
 import { fileAddress, replayAddress, zipAddress } from '../after/run_api.js';
 import { element } from '../dom.js';
@@ -9,12 +9,12 @@ import { clockTime, NONE, oneLine, plural } from './format.js';
 /** @import { Scored } from '../after/score.js' */
 /** @import { Contact, Files, Recording, Status } from '../messages.js' */
 
-// More of a kind are counted.
+// Further entries of a kind are only counted.
 const MOST_TOLD = 5;
 const REPORT = 'report.html';
 
 /**
- * How a run went.
+ * The result of a run.
  *
  * @typedef {object} Result
  * @property {{title: string, text: string}} why
@@ -73,7 +73,7 @@ export function table(facts) {
 }
 
 /**
- * Which side of whom it was and who could have avoided it, once the timing report says so.
+ * Return the side of the contact and who could have avoided it, if the timing report says so.
  *
  * @param {Contact} contact
  * @param {Files|null} files
@@ -111,7 +111,7 @@ export function figures(items) {
 }
 
 /**
- * What can be looked at and fetched.
+ * Return the list of files to view and download.
  *
  * @param {Result & {connected: boolean}} facts
  */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How each AV's planner does, and the switch that stops it and lets it go on. */
+/** The status of each AV's planner, and the switch that stops and restarts it. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { countText } from '../perception/unseen.js';
@@ -13,7 +13,7 @@ import { icon } from './icons.js';
 /** @import { PlannerStatus } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-/** @typedef {Partial<PlannerStatus>} Planner as far as anything is known of it */
+/** @typedef {Partial<PlannerStatus>} Planner the known part of it */
 
 /**
  * @type {[name: string, explanation: string, text: (planner: Planner) => string,
@@ -124,7 +124,7 @@ function makeRow(av, connection) {
       const stopped = planner.running === false;
       wanted.run = stopped;
       setText(name, baseName(planner.planner || store.scene?.planners?.[av]));
-      // While it is stopped a plan grows old because nobody asks for another.
+      // A stopped planner's plan gets old because no new one is requested.
       const word = stopped ? 'stopped' : planner.stale ? 'stale' : 'running';
       setText(state, word);
       setAttribute(state, 'data-state', word);

@@ -1,17 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The Plotly library, which the server has: loaded when a plot is first wanted. */
+/** Loader of the Plotly library from the server, at the first plot. */
 
 /**
- * What is used of it; traces and layouts are described at plotly.com/javascript/reference.
+ * The functions in use; traces and layouts are described at plotly.com/javascript/reference.
  *
  * @typedef {{react: (node: HTMLElement, traces: object[], layout: object, config: object) =>
  *   unknown, toImage: (node: HTMLElement, options: object) => Promise<string>}} Plotly
  */
 
 const ADDRESS = '/plotly.js';
-// An element with this id tells Plotly's maps, which are not used, that their styles are there:
-// it would add them inline, which the page does not allow.
+// An element with this id makes Plotly believe that the styles of its maps, which are not used,
+// exist. It would add them inline, which the page does not allow.
 const MAP_STYLES = '9f215cf04c5486422605d13261cb87401f4e7763b6296af81e98efbc0130da53';
 
 /** @type {Promise<Plotly>|null} */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the history panel plots, and how it is made from what the page received. */
+/** The quantities of the history panel, and how they are derived from received data. */
 
 import { thin, unwrap } from './series.js';
 
@@ -16,7 +16,7 @@ const DASHES = ['solid', 'dot'];
 
 /**
  * A line: a column of vehicles' states, a figure of the run's health, the latency of planners,
- * what is left to vehicles, or a limit.
+ * the criticality of vehicles, or a limit.
  *
  * @typedef {object} ColumnLine
  * @property {keyof typeof VEHICLE} column

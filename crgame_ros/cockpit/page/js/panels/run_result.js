@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How a run went, as far as is known: from its status, its files and its score. */
+/** The known result of a run, from its status, its files and its score. */
 
 import { fetchScore } from '../after/run_api.js';
 import { errorText } from './format.js';
@@ -12,7 +12,7 @@ import { TABLE_I, valueOf } from './timing.js';
 /** @import { Result } from './outcome_card.js' */
 /** @import { Store } from '../store.js' */
 
-// In which words a figure of table I is said of a run that is over.
+// Names of figures of table I for a run that is over.
 /** @type {Record<string, string>} */
 const FINAL_NAMES = { final_error_ms: 'Lag at the end' };
 
@@ -22,7 +22,7 @@ export class RunResult {
   #changed;
   /** @type {Files|null} */
   #files = null;
-  // As far as it was asked for, by run.
+  // The requested scores, by run.
   /** @type {Map<string, Scored>} */
   #scores = new Map();
 
@@ -40,7 +40,7 @@ export class RunResult {
   }
 
   /**
-   * Return it.
+   * Return the result.
    *
    * @param {Status} status
    * @param {Scene} scene
@@ -70,7 +70,7 @@ export class RunResult {
   }
 
   /**
-   * Return the score of the run, once its recording is closed and the server has told it.
+   * Return the score of the run, once its recording is closed and the server has sent it.
    *
    * @param {Status} status
    * @param {Files|null} files

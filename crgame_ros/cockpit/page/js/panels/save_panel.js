@@ -85,7 +85,7 @@ function saveTables(panel, name) {
 }
 
 /**
- * In a group of its own: others are hidden where there is nothing for them to do.
+ * In its own group, because other groups are hidden if they do not apply.
  *
  * @param {Store} store
  */

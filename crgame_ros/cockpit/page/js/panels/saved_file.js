@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Giving people files that the page has made: tables as CSV, pictures. */
+/** Files that the page creates for saving: tables as CSV, pictures. */
 
 import { element } from '../dom.js';
 
-// What a spreadsheet would take for a formula.
+// Text that a spreadsheet would read as a formula.
 const FORMULA = /^[=+\-@\t]/;
 const NUMBER = /^[+-]?[\d.]+(e[+-]?\d+)?$/i;
 
@@ -37,7 +37,7 @@ export function rowsOf(table) {
 }
 
 /**
- * Let the browser keep a file.
+ * Save a file through the browser.
  *
  * @param {string} name
  * @param {Blob} content
@@ -46,12 +46,12 @@ export function save(name, content) {
   const href = URL.createObjectURL(content);
   const link = element('a', { href, download: name });
   link.click();
-  // Only when the browser has begun to read it.
+  // Only after the browser has begun to read it.
   setTimeout(() => URL.revokeObjectURL(href), 10000);
 }
 
 /**
- * Name a file by the run and the moment.
+ * Return a file name from the run and the time.
  *
  * @param {string} what
  * @param {string} ending

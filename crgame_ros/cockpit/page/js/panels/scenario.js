@@ -18,19 +18,19 @@ import { ScenarioPreview } from './scenario_preview.js';
 /** @import { Entry, Offer, Preview } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-// What the server refuses anyway is not even sent [bytes].
+// A larger file is not sent, because the server would refuse it [bytes].
 const LARGEST_FILE = 64 * 1024 * 1024;
-// After this the page no longer waits for the loaded run to begin [ms].
+// Longest wait for the loaded run to begin [ms].
 const BEGINS_WITHIN_MS = 60000;
 
-/** The panel's parts and what is chosen in it. */
+/** The panel's parts and choices. */
 class ScenarioPanel {
   #store;
   #connection;
   /** @type {Offer} */
   #offered = { folders: [], planners: [], drivers: [] };
   #chosen = '';
-  // What was started last here.
+  // The entry that was started last here.
   #begun = '';
   /** @type {AbortController|null} */
   #abort = null;
@@ -96,7 +96,7 @@ class ScenarioPanel {
     });
   }
 
-  /** Ask the server what there is. */
+  /** Fetch the list of scenarios from the server. */
   async refresh() {
     try {
       this.#offered = await fetchScenarios();
@@ -135,7 +135,7 @@ class ScenarioPanel {
   }
 
   /**
-   * Upload a file that somebody chose or dropped.
+   * Upload a chosen or dropped file.
    *
    * @param {File[]} files
    */
@@ -223,7 +223,7 @@ class ScenarioPanel {
     }
   }
 
-  /** Before it happens, say whose run it ends. */
+  /** Warn in advance whose run will end. */
   #warn() {
     const run = this.#store.status?.run;
     const goesOn = run === 'running' || run === 'paused';
@@ -257,7 +257,7 @@ class ScenarioPanel {
       };
       ends.push(() => clearTimeout(timer), this.#store.on('status', look));
     });
-    // When loading fails nobody waits for it any more.
+    // When loading fails, it is no longer awaited.
     promise.catch(() => {});
     return { promise, cancel };
   }
@@ -288,7 +288,7 @@ class ScenarioPanel {
 }
 
 /**
- * Return whether several people are to say that they are ready.
+ * Return whether several drivers have to report that they are ready.
  *
  * @param {Store} store
  */
@@ -313,7 +313,7 @@ function wrongFiles(files) {
 }
 
 /**
- * Make the panel. What there is to choose is asked for when the panel is first seen.
+ * Create the panel, which fetches its list when it is first shown.
  *
  * @param {HTMLElement} root #panel-scenario
  * @param {Store} store

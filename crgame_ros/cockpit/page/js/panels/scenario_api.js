@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The server's part in choosing a scenario; every refusal becomes an Error with one line. */
+/** Requests to the server about scenarios; every refusal becomes an Error with one line. */
 
 import { oneLine } from './format.js';
 
 /** @import { Choice, Offer, Preview } from '../messages.js' */
 
-/** Sent with all that changes something: no page of another site can add it unasked. */
+/** Header of all requests that change something: a page of another site cannot add it. */
 export const OWN = { 'X-Crgame': '1' };
 
-/** Names this page, so that the others are told who has done it. */
+/** Return the header with this page's key, so that others see who did it. */
 function own() {
   return { ...OWN, ...window.crgame?.person?.headers };
 }
@@ -21,7 +21,7 @@ export function fetchScenarios() {
 
 /**
  * @param {string} id of an entry
- * @param {AbortSignal} signal ends it
+ * @param {AbortSignal} signal aborts it
  * @returns {Promise<Preview>}
  */
 export function fetchPreview(id, signal) {
@@ -68,8 +68,8 @@ export async function load(choice) {
  *
  * @param {string} path
  * @param {RequestInit} [options]
- * @returns {Promise<any>} what the server sent, of the type that this path gives
- * @throws {Error} with one line for people
+ * @returns {Promise<any>} the server's answer, of the type of this path
+ * @throws {Error} with one readable line
  */
 export async function ask(path, options = {}) {
   let response;
@@ -86,7 +86,7 @@ export async function ask(path, options = {}) {
   try {
     content = JSON.parse(text);
   } catch {
-    // A refusal by the web server itself is plain text, and the text is its reason.
+    // A refusal by the web server itself is plain text with the reason.
     content = { error: response.ok ? 'The server sent no JSON.' : text.slice(0, 200) };
   }
   if (!response.ok || content.error || content.ok === false) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Who drives what in the chosen scenario. */
+/** The choice of drivers and planners in the chosen scenario. */
 
 import { element, setText } from '../dom.js';
 import { baseName } from './event_words.js';
@@ -27,7 +27,7 @@ export class ScenarioForm {
   }
 
   /**
-   * @param {Preview} preview as /api/preview gives it
+   * @param {Preview} preview answer of /api/preview
    * @param {string[]} drivers that can be chosen
    * @param {string[]} planners that can be chosen
    */
@@ -50,13 +50,13 @@ export class ScenarioForm {
     this.root.replaceChildren(...nodes);
   }
 
-  /** Forget everything. */
+  /** Clear the form. */
   clear() {
     this.#rows.clear();
     this.root.replaceChildren();
   }
 
-  /** The choices: humans [{id, driver}], avs [{id, planner}]. */
+  /** Return the choices: humans [{id, driver}], avs [{id, planner}]. */
   get choices() {
     /** @param {string} id */
     const value = (id) => this.#rows.get(id)?.select.value ?? '';
@@ -67,7 +67,7 @@ export class ScenarioForm {
   }
 
   /**
-   * Put an error beside the vehicle that it names.
+   * Show an error beside the vehicle that it names.
    *
    * @param {string} text the error; empty removes all
    * @returns {boolean} false if it names no vehicle here

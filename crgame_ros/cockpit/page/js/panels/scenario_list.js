@@ -14,7 +14,7 @@ const KINDS = { game: 'game', scenario: 'CommonRoad', upload: 'uploaded' };
 const isGame = (entry) => entry.kind === 'game';
 
 /**
- * Games are made to be driven; a bare scenario comes after them.
+ * Sort games before bare scenarios, because games are made to be driven.
  *
  * @param {Entry[]} entries
  */
@@ -33,8 +33,8 @@ export class ScenarioList {
   #entries = new Map();
 
   /**
-   * @param {(entry: Entry) => void} chosen gets the entry that somebody chose
-   * @param {(entry: Entry) => void} unwanted gets the upload that somebody wants deleted
+   * @param {(entry: Entry) => void} chosen called with the chosen entry
+   * @param {(entry: Entry) => void} unwanted called with the upload to delete
    */
   constructor(chosen, unwanted) {
     this.#chosen = chosen;
@@ -48,7 +48,7 @@ export class ScenarioList {
   }
 
   /**
-   * @param {Offer['folders']} folders as /api/scenarios gives them
+   * @param {Offer['folders']} folders folders of /api/scenarios
    * @param {string} chosen id of the entry that is marked, empty for none
    */
   show(folders, chosen) {

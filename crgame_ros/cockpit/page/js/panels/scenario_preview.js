@@ -9,14 +9,14 @@ import { onThemeChange, themeColor } from '../world/palette.js';
 /** @import { ColorName } from '../world/palette.js' */
 
 const MARGIN_PX = 8;
-// What would be smaller is drawn this large, so that it is seen on a long road [px].
+// Least drawn size, so that vehicles are visible on a long road [px].
 const SMALLEST_PX = 7;
-// From this size of a car on, the whole map is drawn at once [m, px].
+// From this size of a car on, one drawing shows the whole map [m, px].
 const CAR_M = 4.5;
 const CAR_PX = 6;
 const LANE_M = 3;
 const LANE_PX = 4;
-// Shown around the vehicles where that is not so [m], and the overview's share of the height.
+// Else: margin around the vehicles [m], and the overview's share of the height.
 const AROUND_M = 30;
 const OVERVIEW = 0.25;
 const VULNERABLE = new Set(['pedestrian', 'bicycle', 'motorcycle']);
@@ -33,7 +33,7 @@ const VULNERABLE = new Set(['pedestrian', 'bicycle', 'motorcycle']);
  * @property {string|null} [edge]
  */
 
-/** Draws on a canvas whatever its size and the theme. */
+/** A drawing on a canvas, for any size and theme. */
 export class ScenarioPreview {
   #canvas;
   /** @type {Preview|null} */
@@ -46,7 +46,7 @@ export class ScenarioPreview {
     onThemeChange(() => this.#draw());
   }
 
-  /** @param {Preview|null} preview as /api/preview gives it */
+  /** @param {Preview|null} preview answer of /api/preview */
   show(preview) {
     this.#preview = preview;
     this.#draw();
@@ -154,7 +154,7 @@ function drawMarks(context, overview, whole, around) {
 /**
  * @param {(number|null)[][]} rows of vehicles or objects
  * @param {number} index of one of them
- * @returns {number[]} x, y [m], yaw [rad]; NaN where there is none
+ * @returns {number[]} x, y [m], yaw [rad]; NaN if there is none
  */
 function pose(rows, index) {
   return (rows[index] ?? []).slice(0, 3).map((value) => value ?? NaN);
@@ -211,7 +211,7 @@ function drawRoads(context, scene, scale) {
   const pixel = window.devicePixelRatio / scale;
   context.lineWidth = pixel;
   context.fillStyle = themeColor('map-road');
-  // Where lanes are thinner than their lines, the road is drawn as one line instead.
+  // If lanes are thinner than their lines, the road is drawn as one line.
   const isThin = LANE_M * scale < LANE_PX * window.devicePixelRatio;
   context.strokeStyle = themeColor(isThin ? 'map-road' : 'map-mark');
   for (const lanelet of scene.lanelets) {

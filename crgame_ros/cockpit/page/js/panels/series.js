@@ -4,13 +4,13 @@
 
 /** @import { Status } from '../messages.js' */
 
-/** At most so many points are drawn of a series. */
+/** Most points that are drawn of a series. */
 export const MOST_POINTS = 400;
 
 /**
- * Thin out a series: of each stretch of time its lowest and its highest value remain, in their
- * order. Stretches begin at multiples of their length, so that what is drawn does not tremble
- * while the window moves on.
+ * Thin out a series: the lowest and the highest value of each time interval remain, in order.
+ * Intervals begin at multiples of their length, so that the plot does not flicker while the
+ * window moves.
  *
  * @param {number[]} t increasing [s]
  * @param {number[]} values as many; NaN makes a gap
@@ -38,7 +38,7 @@ export function thin(t, values, from, to) {
     }
     return { x, y };
   }
-  // Two points from each stretch, and one stretch more where the window cuts through two.
+  // Two points from each interval, and one interval more where the window cuts through two.
   const stretch = (to - from) / (MOST_POINTS / 2 - 1);
   for (let i = first; i < end;) {
     const number = Math.floor(t[i] / stretch);
@@ -115,7 +115,7 @@ export class HealthLog {
     if (!Number.isFinite(t)) {
       return;
     }
-    // A replay may go back; what came after is then told once more.
+    // A replay may go back; the later rows then arrive once more.
     while ((this.#rows.at(-1)?.t ?? -Infinity) >= t) {
       this.#rows.pop();
     }

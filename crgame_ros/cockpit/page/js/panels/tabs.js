@@ -114,8 +114,8 @@ function addHandle(root) {
 }
 
 /**
- * Return the keys back to the car after a click: the space bar brakes, and would press a button
- * that kept the focus; arrows would move a choice. Whoever walks by keyboard keeps the focus.
+ * Return the keys to the car after a click: the space bar brakes, and would press a focused
+ * button; arrows would change a choice. Keyboard users keep the focus.
  *
  * @param {Document} scope
  */

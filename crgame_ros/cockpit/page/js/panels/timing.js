@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How true the run is to the wall clock: the live figures of the time-sync supervisor. */
+/** The run's timing against the wall clock: live figures of the time-sync supervisor. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { count, fixed, oneLine, plural } from './format.js';
@@ -8,7 +8,7 @@ import { count, fixed, oneLine, plural } from './format.js';
 /** @import { Status, Timing } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-// timesync_node calls a run late from a lag of so many steps on.
+// Lag in steps from which timesync_node calls a run late.
 const LATE_STEPS = 10;
 
 /** @typedef {(value: number) => string} Format */
@@ -116,9 +116,9 @@ export function createTiming(root, store) {
 }
 
 /**
- * @param {Timing} timing figures by key, live or as `timing.json` has them
+ * @param {Timing} timing figures by key, live or from `timing.json`
  * @param {string} key of the figure
- * @returns {number} NaN where there is none
+ * @returns {number} NaN if there is none
  */
 export function valueOf(timing, key) {
   const nested = key.match(/^(real_time_ratio)_(\w+)$/);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What is being shown, in the header and in the browser's tab. */
+/** The title of the shown run, in the header and in the browser's tab. */
 
 import { setText } from '../dom.js';
 import { isolated } from './format.js';

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Where an AV takes itself to be: an outline, and the ellipse of two standard deviations. */
+/** The estimated pose of an AV: an outline, and the ellipse of two standard deviations. */
 
 /** @import { ShownEstimate } from '../perceived.js' */
 /** @import { LiveView } from '../world/painter.js' */
@@ -18,17 +18,17 @@ const CROSS_PX = 4;
  * @typedef {{major: number, minor: number, angle: number}} Ellipse
  */
 
-/** Draws the estimate of one AV. */
+/** The layer that draws the estimate of one AV. */
 export class EstimateLayer {
   /**
-   * What was drawn last, null for nothing.
+   * The estimate drawn last, null for none.
    *
    * @type {(ShownEstimate & Partial<Ellipse>)|null}
    */
   drawn = null;
 
   /**
-   * Draw it.
+   * Draw the estimate.
    *
    * @param {CanvasRenderingContext2D} context of the world
    * @param {LiveView} view as layers get it

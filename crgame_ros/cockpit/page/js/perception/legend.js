@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the marks of perception stand for, beside the map while they are on it. */
+/** The legend of the marks of perception, beside the map while they are shown. */
 
 import { element, setAttribute, setText, svg } from '../dom.js';
 
@@ -13,7 +13,7 @@ const ENTRIES = {
   occupancy: ['M3 3h10v10H3zM15 3h10v10H15z', 'permanent obstacles'],
 };
 
-// Instead of the first while the planner has not been told of anybody for a while.
+// Replaces the first entry while the planner's knowledge is unknown.
 const UNKNOWN = 'what $ sees is not known now';
 
 /** A small table over the map. */
@@ -37,11 +37,11 @@ export class Legend {
   }
 
   /**
-   * Show the entries of what is on the map.
+   * Show the entries of the layers on the map.
    *
    * @param {string[]} names of the layers
    * @param {string} av id of the AV that is followed
-   * @param {boolean} known whether it is known whom it sees
+   * @param {boolean} known whether it is known what it sees
    */
   show(names, av, known) {
     for (const [name, { row, text }] of this.#rows) {

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Permanent obstacles: the occupied cells of the map, so that thin walls are seen from afar. */
+/** The layer of permanent obstacles: occupied cells, drawn so that thin walls stay visible. */
 
 /** @import { OccupancyFrame } from '../frames.js' */
 /** @import { View } from '../world/painter.js' */
 
-// Below this size on the screen cells are drawn by fours, and so on [px].
+// Cells smaller than this on the screen are merged by fours, repeatedly [px].
 const LEAST_PX = 0.75;
 const COARSEST = 6;
 
@@ -18,7 +18,7 @@ const COARSEST = 6;
  * @property {HTMLCanvasElement|null} picture
  */
 
-/** Draws the store's map as a picture in the theme's colour. */
+/** The layer that draws the store's map as a picture in the theme's colour. */
 export class OccupancyLayer {
   /** How many cells are occupied in the map that was drawn last. */
   drawn = 0;
@@ -29,7 +29,7 @@ export class OccupancyLayer {
   #levels = [];
 
   /**
-   * Draw it.
+   * Draw the map.
    *
    * @param {CanvasRenderingContext2D} context of the world
    * @param {View} view as layers get it
@@ -92,7 +92,7 @@ function firstLevel({ rows, columns, bits }) {
 }
 
 /**
- * Four cells become one, occupied if any of them is: no wall gets lost.
+ * Merge four cells into one, which is occupied if any of them is, so that no wall gets lost.
  *
  * @param {Level} level
  * @returns {Level}

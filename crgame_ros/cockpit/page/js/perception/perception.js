@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the followed AV perceives, over the true world: layers, their buttons and a legend. */
+/** The followed AV's perception over the true world: layers, their buttons and a legend. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
@@ -19,7 +19,7 @@ import { countText, Unseen } from './unseen.js';
 
 /** @typedef {'unseen'|'rays'|'estimate'|'occupancy'} LayerName */
 
-// name: [strokes of its button, what it shows, whether it is on at first, needs a perceiving AV]
+// name: [strokes of its button, title, whether it is on at first, needs a perceiving AV]
 /**
  * @type {Record<LayerName,
  *   [strokes: string, title: string, first: boolean, needsAv: boolean]>}
@@ -32,7 +32,7 @@ const LAYERS = {
     'Where it takes itself to be', false, true],
   occupancy: ['M3 3h8v8H3zM13 13h8v8h-8zM13 3h8v8h-8z', 'Permanent obstacles', true, false],
 };
-// Of the names of the world's layers: anybody may have one called rays.
+// Prefix of layer names: another part may have a layer called rays.
 const PREFIX = 'perception_';
 const COUNT_EVERY_MS = 200;
 const NAMES = /** @type {LayerName[]} */ (Object.keys(LAYERS));
@@ -82,7 +82,7 @@ class Perception {
     this.#load();
   }
 
-  /** Ids of those that are there and drawn as outlines. */
+  /** Return the ids of the present objects that are drawn as outlines. */
   get hollow() {
     const { shown } = this.#world;
     const { vehicles, objects } = this.#store.scene ?? { vehicles: [], objects: [] };
@@ -99,7 +99,7 @@ class Perception {
     return this.#shows('rays') ? this.#rays.drawn : 0;
   }
 
-  /** The estimate as drawn last, null for none. */
+  /** Return the estimate as drawn last, null for none. */
   get estimate() {
     return this.#shows('estimate') ? this.#estimate.drawn : null;
   }
@@ -110,7 +110,7 @@ class Perception {
   }
 
   /**
-   * Count whom the followed AV sees of those near it.
+   * Return how many of the near objects the followed AV sees.
    *
    * @returns {{seen: number, near: number, range: number|null}|null} null unless it perceives
    */
@@ -159,7 +159,7 @@ class Perception {
   }
 
   /**
-   * Whether a layer is drawn: in the 3D view not even those that are on, unless asked for there.
+   * Return whether a layer is drawn: in the 3D view only if it is requested there.
    *
    * @param {LayerName} name
    */
@@ -190,13 +190,13 @@ class Perception {
     this.#tell();
   }
 
-  /** Index of the followed vehicle if it is an AV with perception that one sees, else -1. */
+  /** Return the index of the followed AV if its perception may be shown, else -1. */
   #av() {
     const av = this.#unseen?.perceiving(this.#world.followed) ?? -1;
     return Number.isNaN(this.#world.shown?.vehicles[av * VEHICLE_WIDTH]) ? -1 : av;
   }
 
-  /** Tell the server what is wanted, if that has changed. */
+  /** Send the wanted layers to the server, if they have changed. */
   #tell() {
     const perception = this.#av() < 0 ? '' : this.#world.followed ?? '';
     const scans = Boolean(this.#on.rays);
@@ -221,7 +221,7 @@ class Perception {
   }
 
   /**
-   * In each frame: whom to draw as an outline.
+   * Choose the objects that are drawn as outlines, in each frame.
    *
    * @param {LiveView} view
    */
@@ -235,7 +235,7 @@ class Perception {
   }
 
   /**
-   * In the instruments: how much of what is near is seen.
+   * Show in the instruments how many of the near objects are seen.
    *
    * @param {HTMLElement} stage
    */

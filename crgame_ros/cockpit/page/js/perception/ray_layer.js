@@ -14,12 +14,12 @@ const FULL = 2 * Math.PI - 0.05;
 // across the rays [m].
 const TOGETHER_M = 0.6;
 const STEPS = 4;
-// What a single hit is drawn as [m].
+// Drawn length of a single hit [m].
 const DOT_M = 0.15;
 
 /** @typedef {{fan: Path2D, hits: Path2D}} Paths */
 
-/** Builds the paths of each scan once; draws those of one AV. */
+/** The layer that draws the scans of one AV, with paths built once per scan. */
 export class RayLayer {
   /** How many fans were drawn in the last frame. */
   drawn = 0;
@@ -27,7 +27,7 @@ export class RayLayer {
   #paths = new WeakMap();
 
   /**
-   * Draw the scans of an AV where their sensors were when they looked.
+   * Draw the scans of an AV at the poses of their sensors at the time of the scan.
    *
    * @param {CanvasRenderingContext2D} context of the world
    * @param {LiveView} view as layers get it
@@ -64,7 +64,7 @@ export class RayLayer {
 }
 
 /**
- * In metres around the sensor, along the axes of the map.
+ * Build the paths in metres around the sensor, along the axes of the map.
  *
  * @param {Scan} scan
  * @returns {Paths}

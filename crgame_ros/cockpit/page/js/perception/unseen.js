@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Whom an AV's planner has not been told of although they are there. */
+/** The present objects that an AV's planner has not been told of. */
 
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 
 /** @import { Scene } from '../messages.js' */
 
-/** What one AV sees of what is there, for one scene; its arrays are refilled. */
+/** The seen and unseen objects of one AV, for one scene; its arrays are refilled. */
 export class Unseen {
   #scene;
   #flags;
@@ -26,11 +26,11 @@ export class Unseen {
   }
 
   /**
-   * Mark whoever is not seen, whether present or not.
+   * Mark the objects that are not seen, whether present or not.
    *
    * @param {number} av index of the AV
-   * @param {Float64Array} columns of those who are seen
-   * @returns {Uint8Array} 1 for each vehicle, then object, that is not
+   * @param {Float64Array} columns of the seen objects
+   * @returns {Uint8Array} 1 for each vehicle, then object, that is not seen
    */
   flags(av, columns) {
     this.#flags.fill(1);
@@ -42,11 +42,11 @@ export class Unseen {
   }
 
   /**
-   * Count who is within the reach of an AV's sensors, and who of them is seen.
+   * Return how many objects are within an AV's sensor range, and how many of them are seen.
    *
    * @param {number} av index of the AV
-   * @param {Float64Array} columns of those who are seen
-   * @param {{vehicles: Float64Array, objects: Float64Array}} shown as Store.displayed gives it
+   * @param {Float64Array} columns of the seen objects
+   * @param {{vehicles: Float64Array, objects: Float64Array}} shown of Store.displayed
    * @returns {{seen: number, near: number, range: number|null}} range [m], null for no limit
    */
   count(av, columns, { vehicles, objects }) {
@@ -57,7 +57,7 @@ export class Unseen {
     const total = { seen: 0, near: 0, range };
     /** @type {(otherX: number, otherY: number, column: number) => void} */
     const add = (otherX, otherY, column) => {
-      // Not for NaN: who is absent is not near.
+      // False for NaN: an absent object is not near.
       if (column !== av && Math.hypot(otherX - x, otherY - y) <= (range ?? Infinity)) {
         total.near += 1;
         total.seen += 1 - flags[column];

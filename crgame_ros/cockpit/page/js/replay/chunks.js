@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Chunks of a recorded run: fetched when they are needed, and not all of them kept. */
+/** Chunks of a recorded run, fetched when needed; only some are kept. */
 
 import { KIND } from '../frames.js';
 
 /** @import { ReplayInfo } from '../replay_messages.js' */
 
-// A little over what two seeks and the way between them need; 5 s each.
+// Number of chunks kept: a little more than two seeks and the way between them need; 5 s each.
 const KEPT = 12;
 const LENGTH_BYTES = 4;
 const RETRY_MS = 1000;
@@ -17,7 +17,7 @@ const RETRY_MS = 1000;
  * @param {string} path below /api/replay/
  * @param {Record<string, number>} query values by name
  * @returns {Promise<Response>}
- * @throws {Error} with a text for people
+ * @throws {Error} with a readable text
  */
 export async function ask(path, query) {
   const answer = await fetch(`api/replay/${path}?${queryOf(query)}`);
@@ -34,7 +34,7 @@ function queryOf(query) {
 }
 
 /**
- * Split what the server packed.
+ * Split packed frames.
  *
  * @param {ArrayBuffer} packed frames, each after its length in bytes
  * @returns {ArrayBuffer[]}
@@ -52,7 +52,7 @@ export function unpack(packed) {
 
 /**
  * @typedef {object} Entry a frame of a chunk
- * @property {number} at from which time on it is to be seen [s]
+ * @property {number} at time from which it is shown [s]
  * @property {number} kind
  * @property {string} slot of two entries with the same slot the later replaces the earlier
  * @property {ArrayBuffer} buffer the frame
@@ -73,7 +73,7 @@ export class Chunks {
   /**
    * @param {ReplayInfo} info of the run
    * @param {() => void} loaded called after a chunk has come
-   * @param {(error: Error) => void} refused called when one cannot be had
+   * @param {(error: Error) => void} refused called if one cannot be loaded
    */
   constructor(info, loaded, refused) {
     this.#info = info;
@@ -104,7 +104,7 @@ export class Chunks {
   }
 
   /**
-   * Have a chunk and those after it come.
+   * Request a chunk and those after it.
    *
    * @param {number} number of the chunk that is shown
    * @param {number} ahead how many more
@@ -144,7 +144,7 @@ export class Chunks {
   }
 
   /**
-   * Find from when on each frame is to be seen: a plan, from the state after which it came.
+   * Return the time from which each frame is shown: a plan from the state that preceded it.
    *
    * @param {ArrayBuffer[]} frames
    * @param {number} number
@@ -163,7 +163,7 @@ export class Chunks {
 }
 
 /**
- * What a later frame takes the place of: of vehicles and sensors each has its own.
+ * Return the slot of a frame, which a later frame replaces; each vehicle and sensor has its own.
  *
  * @param {number} kind
  * @param {number} index

@@ -22,7 +22,7 @@ const STATUS_PARTS = /** @type {const} */ (
 const NO_STATUS = {
   timing: null, planners: {}, drivability: {}, seats_lost: {}, frames_skipped: false,
 };
-// The status of so long before a jump is told again, for the plots of it [s].
+// How far before a jump the status is sent again, for its plots [s].
 const PAST_STATUS_S = 120;
 const PAST_SPACING_S = 0.9;
 
@@ -32,7 +32,7 @@ const PAST_SPACING_S = 0.9;
  *   shown, and how it moves
  */
 
-/** Sets the store's documents as the time moves, forward and back. */
+/** The setter of the store's documents as the time moves, forward and back. */
 export class ReplayDocuments {
   #store;
   #info;
@@ -51,11 +51,11 @@ export class ReplayDocuments {
   }
 
   /**
-   * Set what holds at a time.
+   * Set the documents that are valid at a time.
    *
    * @param {Now} now
    * @param {number} now_ms wall time
-   * @param {boolean} jumped whether the time did not just go on
+   * @param {boolean} jumped whether the time has jumped
    */
   show(now, now_ms, jumped) {
     for (const kind of KINDS) {
@@ -75,7 +75,7 @@ export class ReplayDocuments {
   }
 
   /**
-   * Tell the past status once more, after a jump to a time.
+   * Send the past status again after a jump.
    *
    * @param {Now} now
    */
@@ -128,7 +128,7 @@ export class ReplayDocuments {
 }
 
 /**
- * Nobody on this page held a seat of a recorded run.
+ * Return the seats without holders: no client of this page held one in the recorded run.
  *
  * @param {Omit<SeatsMessage, 'type'>} document
  */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Marks of events on the time line: each kind has a shape and a colour of its own. */
+/** Marks of events on the time line; each kind has its own shape and colour. */
 
 import { element, svg } from '../dom.js';
 
@@ -27,10 +27,10 @@ const KINDS = {
 const OTHER = ['M4 0H8V12H4Z', ''];
 
 /**
- * Put an event into words.
+ * Return the text of an event.
  *
  * @param {ReplayMark} event of the replay's info
- * @returns {string} kind, whom it concerns, what was said of it, how often and when
+ * @returns {string} kind, subject, text, count and time
  */
 export function eventText({ kind, subject, text, count, t }) {
   const [, word] = KINDS[kind] ?? OTHER;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Plays a recording: the time that is shown, how it moves, and the run that it belongs to. */
+/** The player of a recording: the shown time, its motion, and the run that it belongs to. */
 
 import { ask } from './chunks.js';
 import { ReplayDocuments } from './documents.js';
@@ -14,7 +14,7 @@ import { Timeline } from './timeline.js';
 
 const SLOWEST = 0.1;
 const FASTEST = 8;
-// A frame that comes later than this was a stall: what was not seen is not skipped [s].
+// A frame later than this was a stall, over which the time does not move on [s].
 const LONGEST_FRAME_S = 0.25;
 const TINY_S = 1e-6;
 const SETTLED_MS = 300;
@@ -28,7 +28,7 @@ export class Player {
   /** @type {ReplayDocuments|null} */
   #documents = null;
   #t = 0;
-  // What the world shows: the last time whose data was there.
+  // The time that the world shows: the last one with data.
   #shown_t = 0;
   #speed = 1;
   #playing = false;
@@ -69,22 +69,22 @@ export class Player {
     open();
   }
 
-  /** What the server says of the run, null before it has. */
+  /** Return the description of the run, null before it has arrived. */
   get info() {
     return this.#feed?.info ?? null;
   }
 
-  /** Time that is shown [s], or is to be shown as soon as its data has come. */
+  /** Return the shown time, or the requested time while its data is loading [s]. */
   get t() {
     return this.#t;
   }
 
-  /** Simulation step that is shown: the last at or before the time. */
+  /** Return the shown simulation step: the last at or before the time. */
   get n() {
     return Math.floor(this.#t / this.#run.dt_s + TINY_S);
   }
 
-  /** Scenario step that is shown. */
+  /** Return the shown scenario step. */
   get k() {
     return this.#run.k0 + Math.floor(this.n / this.#run.steps_per_tick);
   }
@@ -94,12 +94,12 @@ export class Player {
     return this.#playing;
   }
 
-  /** Return whether what is to be shown has not come yet. */
+  /** Return whether the data to show is still loading. */
   get loading() {
     return this.#jumped;
   }
 
-  /** Simulated seconds per second. */
+  /** Return the simulated seconds per second. */
   get speed() {
     return this.#speed;
   }
@@ -131,7 +131,7 @@ export class Player {
     }
   }
 
-  /** Let the time move; from the beginning if it is at the end. */
+  /** Start playing, from the beginning if the time is at the end. */
   play() {
     if (this.info !== null) {
       if (this.#t >= this.info.end_s - TINY_S) {
@@ -141,7 +141,7 @@ export class Player {
     }
   }
 
-  /** Let the time stand still. */
+  /** Pause. */
   pause() {
     this.#playing = false;
   }
@@ -174,7 +174,7 @@ export class Player {
   }
 
   /**
-   * Go to the next or another scenario step, exactly; the time stands still then.
+   * Go to exactly the next or another scenario step, and pause.
    *
    * @param {number} count how many steps on, negative for back
    * @returns {Promise<void>} when it is shown
@@ -210,7 +210,7 @@ export class Player {
     return found ?? null;
   }
 
-  /** What is asked for only while a run is shown. */
+  /** Return the run; only used while one is shown. */
   get #run() {
     return /** @type {ReplayInfo} */ (this.info);
   }
@@ -246,7 +246,7 @@ export class Player {
       const before = this.#t;
       this.#t = Math.min(this.#t + passed_s * this.#speed, this.#run.end_s);
       if (!this.#update(now_ms)) {
-        // What comes next has not been fetched yet: time waits for it.
+        // The next data has not arrived yet: the time waits for it.
         this.#t = before;
       }
       this.#playing = this.#t < this.#run.end_s;
@@ -260,7 +260,7 @@ export class Player {
   }
 
   /**
-   * Bring everything to the time; tell whether its data was there.
+   * Update everything to the time, and return whether its data was there.
    *
    * @param {number} now_ms
    */
@@ -289,7 +289,7 @@ export class Player {
   }
 
   /**
-   * Say once what is wrong.
+   * Show an error once.
    *
    * @param {unknown} error
    */
@@ -303,7 +303,7 @@ export class Player {
 }
 
 /**
- * Make the player; it shows itself when the page shows a recording.
+ * Create the player, which becomes visible when the page shows a recording.
  *
  * @param {HTMLElement} root footer#timeline
  * @param {Store} store

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Feeds the store with a recorded run, as the connection does with a live one. */
+/** The feed of the store with a recorded run, as the connection feeds a live one. */
 
 import { CriticalityLog } from '../criticality.js';
 import { decodeFrame, KIND } from '../frames.js';
@@ -15,19 +15,19 @@ import { ask, Chunks, unpack } from './chunks.js';
 /** @import { Entry } from './chunks.js' */
 
 const AHEAD = 2;
-// After a jump the states of so long before it are given to the store [s].
+// After a jump, the store gets the states of this time before it [s].
 const BEFORE_S = 0.5;
-// A longer way forward is a jump [s].
+// A longer step forward is a jump [s].
 const LONGEST_WAY_S = 1;
 const SAME_TIME_S = 1e-9;
 // How much of the future is in the plots [s]: their window reaches beyond the shown time.
 const FUTURE_S = 60;
 
-/** One run of a recording; the store gets what is to be seen at the time that is shown. */
+/** One run of a recording, from which the store gets the data of the shown time. */
 export class ReplayFeed {
   #store;
   #chunks;
-  // The chunk and the place in it of what is to be given next.
+  // The chunk and the position in it of the next entry.
   #next = { number: 0, place: 0 };
   /** @type {Entry|null} */
   #early = null;
@@ -35,14 +35,14 @@ export class ReplayFeed {
   /** @type {StateFrame[]} */
   #outline = [];
 
-  /** What the server says of the run. */
+  /** The server's description of the run. */
   info;
 
   /**
    * @param {Store} store
    * @param {ReplayInfo} info of the run
    * @param {{loaded: () => void, refused: (error: Error) => void}} told `loaded` after new data
-   *   has come, `refused` when it cannot be had
+   *   has come, `refused` if it cannot be loaded
    */
   constructor(store, info, { loaded, refused }) {
     this.#store = store;
@@ -62,7 +62,7 @@ export class ReplayFeed {
   }
 
   /**
-   * Have the criticality of the whole run come; it takes a while where nobody recorded it.
+   * Request the criticality of the whole run; it takes a while if it was not recorded.
    *
    * @param {CriticalityLog} log gets it
    * @param {(error: Error) => void} refused
@@ -81,11 +81,11 @@ export class ReplayFeed {
   }
 
   /**
-   * Return the store what is to be seen at a time.
+   * Feed the store with the data of a time.
    *
    * @param {number} t simulation time [s]
-   * @returns {number} the time that is shown: that of a state that is as good as there, else t;
-   *   NaN while the data for it has not come
+   * @returns {number} the shown time: that of a state close to t, else t; NaN while its data is
+   *   loading
    */
   show(t) {
     const number = this.#chunks.numberAt(t);
@@ -133,7 +133,7 @@ export class ReplayFeed {
   }
 
   /**
-   * Begin anew shortly before a time: of each kind of frame only what still counts then.
+   * Restart shortly before a time, with the frames of each kind that are still valid then.
    *
    * @param {Entry[]} entries
    * @param {number} number
@@ -155,7 +155,7 @@ export class ReplayFeed {
   }
 
   /**
-   * Go on to a time, and one state beyond it: between the two is interpolated.
+   * Advance to a time and one state beyond it, between which the page interpolates.
    *
    * @param {number} t
    */

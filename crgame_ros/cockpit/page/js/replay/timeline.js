@@ -17,7 +17,7 @@ const ICONS = {
   previous: 'M12 5V19L3 12ZM21 5V19L12 12Z', next: 'M12 5V19L21 12ZM3 5V19L12 12Z',
 };
 
-/** What a player is steered with. */
+/** The controls of a player. */
 export class Timeline {
   #root;
   #player;
@@ -35,7 +35,7 @@ export class Timeline {
 
   /**
    * @param {HTMLElement} root footer#timeline; hidden until there is a recording
-   * @param {Player} player what is steered
+   * @param {Player} player that is controlled
    */
   constructor(root, player) {
     this.#root = root;
@@ -72,7 +72,7 @@ export class Timeline {
   }
 
   /**
-   * Take a run on.
+   * Start showing a run.
    *
    * @param {ReplayInfo} info of the run
    */
@@ -93,7 +93,7 @@ export class Timeline {
     setText(this.#told, info.events.length === 0 ? 'No events in this run' : '');
   }
 
-  /** Show the player's time and what it does. */
+  /** Show the player's time and state. */
   update() {
     const { t, n, k, playing, loading } = this.#player;
     const info = this.#info;
@@ -115,7 +115,7 @@ export class Timeline {
   }
 
   /**
-   * Say which event has been jumped to.
+   * Show the event that was jumped to.
    *
    * @param {ReplayMark} event of the run's info
    */
@@ -123,13 +123,13 @@ export class Timeline {
     setText(this.#told, eventText(event));
   }
 
-  /** What is asked for only while a run is shown: everything is hidden before. */
+  /** Return the run's description; only used while a run is shown. */
   get #info() {
     return /** @type {ReplayInfo} */ (this.#player.info);
   }
 
   /**
-   * On the slider the arrows move by scenario steps, not by its own.
+   * Move by scenario steps when arrow keys are pressed on the slider.
    *
    * @param {KeyboardEvent} event
    */
@@ -165,7 +165,7 @@ export class Timeline {
       ArrowLeft: () => player.step(-1), ArrowRight: () => player.step(1),
       '[': () => player.jump(-1), ']': () => player.jump(1), ' ': () => player.toggle(),
     };
-    // On a button the space bar presses it, in a list of tabs the arrows choose.
+    // The space bar presses a focused button, and arrows choose in a list of tabs.
     const own = target instanceof HTMLElement && (
       event.key === ' ' && target.matches('button, summary, a')
       || event.key.startsWith('Arrow') && target.matches('[role="tab"], [role="radio"]'));
