@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real-time, human-in-the-loop driving simulation on CommonRoad and ROS 2."""
 
-# Importing this package loads nothing more: each name below is loaded when somebody asks for it.
+# Importing this package loads nothing more: each name below is loaded at its first use.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from crgame_ros.errors import CrgameError, InputError, PlanningError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from crgame_ros.python_interface.run_functions import export, measure, report
     from crgame_ros.version import __version__ as __version__
 else:
-    # Type checkers are not shown this: to them a name that is not imported above is an error.
+    # Hidden from type checkers, for which a name that is not imported above is then an error.
     def __getattr__(name: str) -> object:
         if name not in _PLACES:
             raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The `crgame` command: runs, their recordings, what came of them, and tools for files."""
+"""The `crgame` command: runs, recordings, their analysis, and tools for files."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -18,11 +18,11 @@ from crgame_ros.errors import CrgameError, InputError
 
 class _Tool(NamedTuple):
     """
-    A command whose module declares its options (`add_arguments`) and what it does.
+    A command whose module declares its options (`add_arguments`) and its action.
 
     :param name: of the command.
-    :param does: for people, in a few words.
-    :param module: that is loaded when the command line is read; it loads all else when it runs.
+    :param does: its purpose, in a few words.
+    :param module: loaded when the command line is read; it loads everything else when it runs.
     """
 
     name: str
@@ -92,7 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # Nobody reads on: `crgame offline | head`. Python's own last flush has to find an end.
+        # The reader has gone, as in `crgame offline | head`; Python's last flush must still
+        # succeed.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except CrgameError as error:
@@ -106,7 +107,7 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
     """
     Build the parser of all commands.
 
-    :param chosen: the one command whose module is loaded, for its options; its name may be wrong.
+    :param chosen: the only command whose module is loaded, for its options; its name may be wrong.
     """
     parser = _Parser(prog='crgame', description=DESCRIPTION, formatter_class=partial(
         argparse.RawDescriptionHelpFormatter, max_help_position=20))

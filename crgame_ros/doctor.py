@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is missing on this machine, and the remedy for each: the checks of `crgame doctor`."""
+"""The checks of `crgame doctor`: problems of this machine, with a remedy for each."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ from crgame_ros.ros.environment import (
 )
 from packaging.requirements import Requirement
 
-# The pins of the source tree: of every run, and of planners that CommonRoad's packages serve.
+# The pins of the source tree: for every run, and for planners of CommonRoad's packages.
 PINS, PLANNER_PINS = 'requirements.txt', 'requirements-planners.txt'
 
 
@@ -43,13 +43,13 @@ def read_pins(folder: Path) -> Iterator[Requirement]:
 
 def needed(folder: Path, *, wheels: bool) -> list[Requirement]:
     """
-    List what this installation needs to run.
+    Return the packages that this installation needs to run.
 
-    These are the pins where scripts/env.sh has made the environment, or where the package is not
-    installed; elsewhere what the installed package asks for.
+    These are the pins if scripts/env.sh has created the environment, or if the package is not
+    installed; otherwise the requirements of the installed package.
 
     :param folder: with the files of pins.
-    :param wheels: whether ROS comes from wheels, which are then needed, too.
+    :param wheels: whether ROS comes from wheels, which are then needed too.
     """
     try:
         declared = requires('crgame_ros') or []
@@ -72,9 +72,9 @@ MODULES = (
     'commonroad_clcs.clcs', 'commonroad_dc.pycrcc', 'commonroad_idm_planner.idm_planner',
     'commonroad_rp.reactive_planner', 'mcap.writer', 'rosbags.highlevel', 'zstandard',
 )
-# For polygon3, which is compiled and which only the planners of CommonRoad's packages need.
+# For polygon3, which must be compiled and is needed only by planners of CommonRoad's packages.
 COMPILE_FIX = 'apt install gcc python3-dev, remove .venv and start again'
-# What only those planners need.
+# Packages needed by those planners only.
 OF_SOME_PLANNERS = {'Polygon', *PACKAGES}
 PROBE_TIMEOUT_S = 60.0
 JITTER_SLEEPS = 200
@@ -90,8 +90,8 @@ class Check:
     """
     One line of the report.
 
-    :param detail: what was found.
-    :param remedy: what to do about it; empty where nothing is to be done.
+    :param detail: the finding.
+    :param remedy: what to do about it; empty if nothing is to be done.
     """
 
     name: str
@@ -101,7 +101,10 @@ class Check:
 
 
 def run_checks(runs: Path | None = None) -> list[Check]:
-    """Check everything, in some seconds; recordings go to `runs`, by default ./runs."""
+    """
+    Return the results of all checks, after some seconds; recordings go to `runs`, by default
+    ./runs.
+    """
     prepare_environment()
     return [check_python(), *check_packages(share_directory()),
             check_imports(), check_page_libraries(), check_ros(), check_profile(), check_devices(),
@@ -110,7 +113,7 @@ def run_checks(runs: Path | None = None) -> list[Check]:
 
 
 def format_checks(checks: list[Check]) -> str:
-    """Lay the checks out as text, each remedy under its check."""
+    """Return the checks as text, each remedy under its check."""
     lines = []
     width = max((len(check.name) for check in checks), default=0)
     for check in checks:
@@ -160,7 +163,7 @@ def check_packages(folder: Path) -> list[Check]:
 
 
 def check_imports(modules: tuple[str, ...] = MODULES) -> Check:
-    """Import what the programs import, in a process of its own."""
+    """Import the programs' modules in a separate process."""
     code = ('import importlib, json, sys\n'
             'errors = {}\n'
             'for name in sys.argv[1:]:\n'
@@ -193,7 +196,7 @@ def check_page_libraries() -> Check:
 
 
 def check_ros() -> Check:
-    """Check where ROS comes from and which middleware it takes."""
+    """Check the origin of ROS and its middleware."""
     middleware = os.environ.get('RMW_IMPLEMENTATION') or 'the default middleware'
     if ros_wheels_prefix() is not None:
         return Check('ROS 2', 'ok', f'Jazzy from wheels, {middleware}')
@@ -221,7 +224,7 @@ def check_profile() -> Check:
 
 
 def _is_ours(profile: str | None) -> bool:
-    """Return whether a profile is that of the package, be it of another copy of it."""
+    """Return whether a profile is that of the package, or of another copy of it."""
     try:
         return Path(profile or '').read_bytes() == loopback_profile().read_bytes()
     except OSError:
@@ -242,7 +245,7 @@ def check_devices(directory: Path = Path('/dev/input')) -> Check:
 
 
 def check_priority() -> Check:
-    """Try to take real-time priority, and give it back."""
+    """Check that real-time priority can be set, and restore the priority."""
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
@@ -255,7 +258,7 @@ def check_priority() -> Check:
 
 
 def check_discovery() -> list[Check]:
-    """Start two ROS processes of our own, let them find each other and exchange messages."""
+    """Check that two ROS processes discover each other and exchange messages."""
     environment = dict(os.environ, ROS_DOMAIN_ID=str(free_domain_id()))
     environment['PYTHONPATH'] = os.pathsep.join(
         [str(Path(__file__).parents[1]), environment.get('PYTHONPATH', '')]).rstrip(os.pathsep)
@@ -306,7 +309,7 @@ def check_processors(devices: Path = Path('/sys/devices/system/cpu')) -> Check:
 
 
 def check_clock(sleeps: int = JITTER_SLEEPS) -> Check:
-    """Sleep to absolute deadlines and see how late the host wakes us."""
+    """Measure how late the host wakes a sleep to absolute deadlines."""
     late_ms = []
     deadline = time.monotonic_ns()
     for _ in range(sleeps):
@@ -324,7 +327,7 @@ def check_clock(sleeps: int = JITTER_SLEEPS) -> Check:
 
 def _run(command: list[str],
          environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end, which a time-out makes a failure."""
+    """Run a command to its end; a time-out is a failure."""
     try:
         return subprocess.run(command, env=environment, capture_output=True, text=True,
                               timeout=PROBE_TIMEOUT_S, check=False)

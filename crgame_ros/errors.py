@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The exceptions of the package: each says what was wrong, where, and how to mend it."""
+"""The exceptions of the package: each message says what is wrong, where, and what to do."""
 
 import reprlib
 from typing import Any
 
-# A message is read in a terminal, a log or a small window [characters].
+# Messages are shown in a terminal, a log or a small window [characters].
 LONGEST = 480
-# Values in messages: YAML aliases can make a short file a huge value.
+# For values in messages: with YAML aliases a short file can hold a huge value.
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel = 2
 
@@ -20,7 +20,7 @@ class CrgameError(Exception):
 
 class InputError(CrgameError):
     """
-    Something the user gave (file, parameter, argument, topic) cannot be used.
+    An error in the user's input (file, parameter, argument, topic).
 
     :param what: what is wrong, in a few words.
     :param where: the file, element, topic or parameter in which it is wrong.
@@ -37,24 +37,24 @@ class InputError(CrgameError):
         if len(what) + len(where) + len(remedy) > LONGEST:
             what, remedy = _cut(what, LONGEST // 3), _cut(remedy, LONGEST // 3)
             room = LONGEST - len(what) - len(remedy)
-            # What names a file and a place in it is of most use at its end.
+            # The end of a file name with a place in it is the most useful part.
             where = where if len(where) <= room else f'…{where[1 - room:]}'
         text = f'{where}: {what}' if where else what
         super().__init__(f'{text}; {remedy}' if remedy else text)
 
 
 def short(value: Any) -> str:
-    """Write a value for a message, cut where it is long."""
+    """Return a value as text for a message, shortened if it is long."""
     return _SHORT.repr(value)
 
 
 def one_line(text: str) -> str:
-    """Return a remark in a line that any terminal takes, cut where nobody would read on."""
+    """Return a remark as one printable line, shortened if it is long."""
     return _cut(_plain(text), LONGEST)
 
 
 def _plain(text: str) -> str:
-    """Return text that any terminal and any file takes: one line, what cannot be shown escaped."""
+    """Return text as one line for any terminal or file, with unprintable characters escaped."""
     return ''.join(character if character.isprintable() else ascii(character)[1:-1]
                    for character in ' '.join(text.split()))
 
@@ -64,4 +64,4 @@ def _cut(text: str, longest: int) -> str:
 
 
 class PlanningError(CrgameError):
-    """A planner found no plan; its adapter answers with a braking plan instead."""
+    """The failure of a planner to find a plan; its adapter answers with a braking plan instead."""

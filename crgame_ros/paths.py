@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the package's data files (config, scenarios, contract) are; what files are good for."""
+"""The paths of the package's data files (config, scenarios, contract), and checks of files."""
 
 from collections.abc import Iterator
 import errno
@@ -34,14 +34,14 @@ def share_directory() -> Path:
 
 
 def numbered(wanted: Path) -> Iterator[Path]:
-    """Yield a name, then the same with _2, _3, …: what is there already stays as it is."""
+    """Yield a name, then the same with _2, _3, …, so that existing files stay as they are."""
     yield wanted
     for number in count(2):
         yield wanted.with_name(f'{wanted.name}_{number}')
 
 
 def irregular(mode: int) -> str | None:
-    """Return what a file is, by its mode, that is nothing to read from: a pipe may never end."""
+    """Return the kind of a file that is not to be read, by its mode: a pipe may never end."""
     if stat.S_ISDIR(mode):
         return 'a directory'
     return None if stat.S_ISREG(mode) else 'no regular file'
@@ -49,16 +49,16 @@ def irregular(mode: int) -> str | None:
 
 def check_room(folder: Path, size: int = 1 << 20) -> None:
     """
-    See that something can be stored in a folder, before the work that makes it.
+    Check that data can be stored in a folder, before the work that produces them.
 
-    :param size: of what is tried [bytes]
+    :param size: of the trial file [bytes]
     :raises OSError: if the disk is full, a quota is used up or the folder cannot be written.
     """
     with tempfile.TemporaryFile(dir=folder) as stream:
         try:
             os.posix_fallocate(stream.fileno(), 0, size)
         except OSError as error:
-            # Some file systems cannot promise room.
+            # Some file systems cannot reserve space.
             if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS):
                 raise
 

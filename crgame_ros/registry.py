@@ -16,10 +16,10 @@ from typing import Any, get_args, get_origin, get_type_hints, Literal, Union
 from crgame_ros.errors import InputError, short
 from crgame_ros.paths import share_directory
 
-# Of requirements-planners.txt: pip does not bring them with this package.
+# From requirements-planners.txt: pip does not install them with this package.
 PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
             'commonroad_rp': 'commonroad-reactive-planner'}
-# Before FILE.py:load, where a planner or a driver is named: a trained policy drives.
+# Prefix of FILE.py:load in the name of a planner or driver: a trained policy drives.
 POLICY = 'policy:'
 
 
@@ -28,14 +28,14 @@ class ModelRegistry:
     The classes of one kind that a game may name.
 
     A name is a built-in one, one of the entry-point group `crgame_ros.<group>`, `module:Class` or
-    `path/to/file.py:Class`. Built-in classes are imported when asked for: the packages behind
-    some of them cost seconds.
+    `path/to/file.py:Class`. Built-in classes are imported at their use: the packages of some take
+    seconds to load.
 
     :param group: last part of the entry-point group, e.g. `planners`
-    :param kind: what one of them is called in messages, e.g. `planner`
+    :param kind: their name in messages, e.g. `planner`
     :param built_in: `module:Class` by name
     :param base: the class that all of them derive from
-    :param document: the page of the documentation that tells how to write one
+    :param document: the page of the documentation on writing one
     """
 
     def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type,
@@ -47,21 +47,21 @@ class ModelRegistry:
         self._remedy = f'see {document}' if document else 'define it'
 
     def names(self) -> tuple[str, ...]:
-        """List the registered names: built-in ones first, then those of entry points."""
+        """Return the registered names: built-in ones first, then those of entry points."""
         others = {point.name for point in entry_points(group=self.entry_point_group)}
         return (*self.built_in, *sorted(others - self.built_in.keys()))
 
     def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
                **given: Any) -> Any:
         """
-        Make one.
+        Create an object of a named class.
 
         :param name: a registered name, `module:Class` or `path/to/file.py:Class`
-        :param options: keyword arguments of its constructor, as the user gave them
+        :param options: keyword arguments of its constructor, from the user
         :param where: the file and key that named it, for messages
-        :param given: keyword arguments that the program supplies; no options of the user
-        :raises InputError: if there is none of that name, or an option is unknown, missing or of
-            the wrong type.
+        :param given: keyword arguments from the program, not options of the user
+        :raises InputError: if there is no class of that name, or an option is unknown, missing or
+            of the wrong type.
         """
         found = self.find(name, where)
         label = self.label(name, where)
@@ -99,10 +99,10 @@ class ModelRegistry:
 
     def resolve(self, name: str, where: str, label: str) -> Any:
         """
-        Find what a name stands for, whatever it is.
+        Return the object that a name stands for, of any kind.
 
         :param where: as for `find`.
-        :param label: which one a message is about.
+        :param label: description of the object in messages.
         :raises InputError: if there is none of that name.
         """
         found: Any
@@ -123,7 +123,7 @@ class ModelRegistry:
         return found
 
     def label(self, name: str, where: str = '') -> str:
-        """Return which one a message is about, and where it was named."""
+        """Return the description of an object in messages, with the place that names it."""
         return f'{where}: {self.kind} {name}' if where else f'{self.kind} {name}'
 
     def _from_file(self, path: Path, attribute: str, label: str) -> Any:
@@ -143,12 +143,12 @@ def module_of_file(path: Path, name: str) -> types.ModuleType:
     Run a file as a module.
 
     :param name: of the module.
-    :raises Exception: whatever the file raises; nothing is left of it then.
+    :raises Exception: any exception of the file; the module is then removed.
     """
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    # Dataclasses and pickling look their module up by name.
+    # Dataclasses and pickling find their module by name.
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
@@ -164,7 +164,7 @@ def _from_module(target: str, label: str) -> Any:
         module = importlib.import_module(module_name)
     except Exception as error:
         if isinstance(error, ImportError) and error.name == 'Polygon':
-            # The packages behind two planners import it; it has no wheels.
+            # The packages of two planners import it; it has no wheels.
             raise InputError('needs the package polygon3, which did not compile', label,
                              'apt install gcc python3-dev, then delete .venv') from error
         package = isinstance(error, ImportError) and PACKAGES.get((error.name or '').split('.')[0])
@@ -177,7 +177,7 @@ def _from_module(target: str, label: str) -> Any:
 
 
 def planner_packages_install() -> str:
-    """Return the command that installs the packages behind some planners."""
+    """Return the command that installs the packages of some planners."""
     return ('pip install --no-deps --ignore-requires-python -r '
             f'{share_directory() / "requirements-planners.txt"}')
 

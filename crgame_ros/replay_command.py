@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command `crgame replay`: the recorded human against other planners."""
+"""The command `crgame replay`: a repetition of the recorded human against other planners."""
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from typing import Any, TYPE_CHECKING
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import numbered
 
-if TYPE_CHECKING:  # A command that needs no engine starts without it.
+if TYPE_CHECKING:  # Not loaded at the start: other commands do not need the engine.
     from crgame_ros.analysis.counterfactual import Alternative
     from crgame_ros.recording.run_trajectories import RunTrajectories
 
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def replay(values: argparse.Namespace) -> int:
-    """Drive against every planner, write the runs and print the comparison."""
+    """Replay against every planner, write the runs and print the comparison."""
     from crgame_ros.analysis.criticality.recorded import measure_log
     from crgame_ros.planner.registry import planner_class
     from crgame_ros.recording.run_folder import recording_in
@@ -67,7 +67,7 @@ def replay(values: argparse.Namespace) -> int:
     recorded = read_trajectories(bag)
     if not recorded.game.humans or not recorded.game.avs:
         raise InputError('has no human and an AV', str(bag), 'give a run in which both drive')
-    # Every planner is known before the first of them drives.
+    # Check every planner before the first one drives.
     for name in values.planner:
         planner_class(name)
     drive = _live if values.live else _offline
@@ -76,10 +76,11 @@ def replay(values: argparse.Namespace) -> int:
     folder, runs = drive(values, bag, recorded)
     for alternative in runs:
         found.append(alternative.as_dict())
-        # After each, so that one that fails costs none of the others.
+        # Written after each, so that a failure loses none of the others.
         (folder / 'comparison.json').write_text(
             json.dumps(found, indent=2) + '\n', encoding='utf-8')
-    # What planners hold in circles compiled packages would complain of at the end.
+    # Free the planners' reference cycles, which compiled packages would report as leaks at the
+    # end.
     gc.collect()
     print('\n'.join(_table(found)))
     print(f'files are in {folder}')
@@ -87,7 +88,7 @@ def replay(values: argparse.Namespace) -> int:
 
 
 def _check(values: argparse.Namespace) -> None:
-    """Refuse what does not go together."""
+    """Check that the arguments fit together."""
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     if values.live and (values.latency or values.human != 'inputs'):
@@ -98,7 +99,7 @@ def _check(values: argparse.Namespace) -> None:
 
 
 def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') -> _Runs:
-    """Drive against each planner as fast as it goes, and write the runs as scenarios."""
+    """Replay against each planner as fast as possible, and write the runs as scenarios."""
     from crgame_ros.analysis.counterfactual import drive_against
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup
@@ -120,7 +121,7 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
 
 
 def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') -> _Runs:
-    """Drive against each planner in real time, one graph after the other."""
+    """Replay against each planner in real time, one graph after the other."""
     from crgame_ros.analysis.counterfactual import driven_live
     folder = _make_folder(values.out, values.run)
     duration_s = (len(recorded.ks) - 1) * recorded.game.scheduler.time_step_s
@@ -141,7 +142,7 @@ def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') ->
 
 
 def _make_folder(out: Path | None, run: Path) -> Path:
-    """Make a new folder: what is there already stays as it is."""
+    """Create a new folder; existing files stay as they are."""
     wanted = out or (run if run.is_dir() else run.parent) / FOLDER
     folder = wanted
     try:
@@ -155,14 +156,14 @@ def _make_folder(out: Path | None, run: Path) -> Path:
 
 
 def _file_name(planner: str, among: Sequence[str] | Mapping[str, Any]) -> str:
-    """Name a planner's file, apart from those of planners in other folders."""
+    """Return the name of a planner's file, distinct from those of planners in other folders."""
     name = re.sub(r'\W+', '_', Path(planner).name)
     same = [each for each in among if re.sub(r'\W+', '_', Path(each).name) == name]
     return name if len(same) == 1 else f'{name}_{same.index(planner) + 1}'
 
 
 def _table(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Lay the comparison out in columns."""
+    """Yield the lines of the comparison, in columns."""
     from crgame_ros.analysis.replay_rows import HEAD, replay_rows
     rows = [HEAD, *replay_rows(found)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]

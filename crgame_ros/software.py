@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""With which programs something was computed, and on which machine."""
+"""The software and the machine of a computation, for reports."""
 
 from importlib.metadata import PackageNotFoundError, version
 import os
@@ -10,13 +10,13 @@ import subprocess
 
 from crgame_ros import __version__
 
-# Of those that compute what a report tells.
+# The packages that compute the contents of a report.
 _PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker')
 _GIT_S = 10.0
 
 
 def software() -> tuple[tuple[str, str], ...]:
-    """Name the software and the machine: nothing that changes from one minute to the next."""
+    """Return the software and the machine, without values that change from minute to minute."""
     found = [('crgame_ros', __version__), ('Python', platform.python_version())]
     for name in _PACKAGES:
         try:
@@ -38,12 +38,12 @@ def _processor() -> str:
 
 
 def software_with_commit() -> dict[str, str | None]:
-    """Name versions, machine and commit: nothing that changes from one minute to the next."""
+    """Return versions, machine and commit, without values that change from minute to minute."""
     return dict(software()) | {'commit': _commit()}
 
 
 def _commit() -> str | None:
-    """Name the commit of this program, with a + if it was changed since; None if installed."""
+    """Return the commit of this program, with a + if it was changed since; None if installed."""
     root = Path(__file__).resolve().parents[1]
     if not (root / '.git').exists():
         return None

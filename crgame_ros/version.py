@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The version of the package; package.xml is the one place that has it."""
+"""The version of the package, which only package.xml states."""
 
 from xml.etree import ElementTree
 

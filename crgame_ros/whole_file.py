@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are there whole or not at all, whatever ends the process or the machine."""
+"""Writing files that are complete or absent, even if the process or the machine stops."""
 
 import os
 from pathlib import Path
@@ -8,9 +8,9 @@ from pathlib import Path
 
 def write_whole(content: bytes, path: Path) -> None:
     """
-    Write a file under another name, and give it its own once the disk has all of it.
+    Write a file under another name, and rename it once all of it is on the disk.
 
-    :raises OSError: if it cannot be written; a file that was there before is unchanged.
+    :raises OSError: if it cannot be written; an existing file is unchanged.
     """
     temporary = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
@@ -26,7 +26,7 @@ def write_whole(content: bytes, path: Path) -> None:
 
 def sync_folder(folder: Path) -> None:
     """
-    Let the disk have the names of the files in a folder: without it a power cut may take them.
+    Write the names of the files in a folder to the disk, as a power cut may lose them otherwise.
 
     :raises OSError: if the folder cannot be read.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading YAML that anybody may have written: what it gives is small, plain and printable."""
+"""Reading YAML of any origin: the result is small, plain and printable."""
 
 from pathlib import Path
 import re
@@ -13,23 +13,23 @@ import yaml
 MAX_BYTES = 1 << 20
 # rosbag2's metadata is the deepest and needs 6.
 MAX_DEPTH = 20
-# Aliases multiply what they name: a few lines can stand for billions of values.
+# Aliases multiply values: a few lines can stand for billions of them.
 MAX_VALUES = 1_000_000
-# No number that anybody wrote by hand is longer, and int() of a long one takes minutes.
+# No number written by hand is longer, and int() of a long one takes minutes.
 MAX_DIGITS = 60
 MAX_INTEGER = 2 ** 64
 
 _PLAIN_TAGS = frozenset(f'tag:yaml.org,2002:{name}'
                         for name in ('str', 'int', 'float', 'bool', 'null', 'map', 'seq'))
 _TIMESTAMP = 'tag:yaml.org,2002:timestamp'
-# Half characters cannot be written to any file, and NUL is in no file's name.
+# Lone surrogates cannot be written to any file, and NUL is in no file's name.
 UNPRINTABLE = re.compile('[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff]')
-# PyYAML has it in C where libyaml was there to build with: a fifth of the time.
+# PyYAML built with libyaml has this loader in C, which takes a fifth of the time.
 _FASTEST: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 class _Loader(_FASTEST):
-    """Builds mappings, lists, text, numbers, truth values and nothing: no dates, no classes."""
+    """A loader of mappings, lists, text, numbers, booleans and null: no dates, no classes."""
 
     yaml_implicit_resolvers = {
         first: [(tag, pattern) for tag, pattern in resolvers if tag != _TIMESTAMP]
@@ -57,9 +57,9 @@ def read_yaml(path: Path, what: str, remedy: str = 'mend the file',
     """
     Read a YAML file safely.
 
-    :param what: what the file is, for the message.
-    :param remedy: what to do about a file that is none, for the message.
-    :param max_bytes: the largest that such a file can be.
+    :param what: kind of the file, for the message.
+    :param remedy: what to do about an invalid file, for the message.
+    :param max_bytes: largest size of such a file.
     :return: as of `parse_yaml`
     :raises InputError: if it is missing, too large or no YAML.
     """
@@ -69,7 +69,7 @@ def read_yaml(path: Path, what: str, remedy: str = 'mend the file',
 def read_text(path: Path, what: str, remedy: str = 'mend the file',
               max_bytes: int = MAX_BYTES) -> str:
     """
-    Read a file of text in UTF-8; nothing but a regular file is opened.
+    Read a text file in UTF-8; only a regular file is opened.
 
     :param what: as of `read_yaml`, like the others
     :raises InputError: if it is missing, too large or no text.
@@ -101,11 +101,11 @@ def parse_yaml(text: str, where: str, remedy: str = 'mend the file',
     Read YAML text safely.
 
     :param where: the file's name, for messages.
-    :param max_characters: the longest that such a text can be.
-    :return: mappings, lists, text, finite whole numbers up to 2^64, floats, truth values or None;
-        a date is text.
-    :raises InputError: if it is no YAML, nested deeper than 20 levels, expands its aliases beyond
-        measure, or names other types.
+    :param max_characters: largest length of such a text.
+    :return: mappings, lists, text, finite whole numbers up to 2^64, floats, booleans or None; a
+        date is text.
+    :raises InputError: if it is no YAML, nested deeper than 20 levels, expands its aliases to too
+        many values, or names other types.
     """
     if len(text) > max_characters:
         raise InputError(f'is longer than {max_characters} characters', where, remedy)
@@ -122,11 +122,11 @@ def parse_yaml(text: str, where: str, remedy: str = 'mend the file',
 
 def _refuse_wild(text: str) -> None:
     """
-    Refuse by the stream of events, before anything is built, what would be large or no plain data.
+    Check the stream of events for large or non-plain data, before anything is built.
 
-    Building in C has no limit of depth but the stack.
+    The depth of building in C is limited by the stack only.
     """
-    # How many values each open collection holds, aliases written out; and each anchor's.
+    # Numbers of values in each open collection, with aliases expanded, and in each anchor.
     open_values: list[int] = [0]
     open_anchors: list[str | None] = [None]
     anchors: dict[str, int] = {}
@@ -135,7 +135,7 @@ def _refuse_wild(text: str) -> None:
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in open_anchors:
                 raise _refusal(event, f'the alias *{event.anchor} stands inside of what it names')
-            # One that names nothing is refused when values are built.
+            # An alias without an anchor is refused when values are built.
             values = anchors.get(str(event.anchor), 1)
         elif isinstance(event, yaml.CollectionStartEvent):
             _refuse_tag(event)

@@ -44,6 +44,7 @@ if ! uv=$(command -v uv); then
             fail "$python cannot make environments: apt install python3-venv, or install uv"
         "$venv/uv/bin/python" -m pip --disable-pip-version-check --quiet install uv==0.13.9 ||
             fail 'uv, which installs packages, cannot be installed: check the network, or install uv'
+        "$venv/uv/bin/python" -m pip uninstall --quiet --yes setuptools pip 2>/dev/null || true
     fi
 fi
 site=() without='^$'
@@ -64,8 +65,13 @@ pins=$root/requirements.txt
 sed -e ':a' -e '/\\$/{N;ba}' "$pins" | grep -v "$without" >"$venv/requirements.txt"
 install -r "$venv/requirements.txt" ||
     fail 'the packages are not installed: see above; check network, disk and the settings of pip'
-# ROS headers: nothing is compiled against them.
+# 45 MB that are never used: ROS headers, as nothing is compiled against them, and tests of packages.
 rm -rf "$venv/include"
+for package in "$venv"/lib/python*/site-packages/{numba,networkx,numpy,pyarrow,scipy}; do
+    find "$package" -type d -name tests -prune -exec rm -rf {} +
+done
+# 70 MB that wheels contain several times, since they cannot hold links.
+hardlink --content --quiet --minimum-size 64KiB "$venv" 2>/dev/null || true
 ln -sf ../../crgame "$venv/bin/crgame"
 ln -sf "$uv" "$venv/bin/uv"
 

@@ -27,7 +27,7 @@ WHERE = 'options of tracker lqr'
 # Speeds of the gain table [m/s]; linear between them, held beyond.
 TABLE_SPEEDS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.5, 15.0, 17.5, 20.0, 25.0,
                 30.0, 35.0, 40.0, 45.0, 50.0, 60.0)
-# However large the offset, the vehicle approaches its path under no larger angle [rad].
+# Largest angle of approach to the path, however large the offset [rad].
 LARGEST_APPROACH = 0.3
 
 
@@ -43,7 +43,7 @@ class LqrTracker(Tracker):
         e' = v psi,  psi' = (G_s v / L) d,  d' = (u - d) / T_delta
 
     with the input u = delta_c - delta_c,ref. The feed-forward
-    delta_c,ref = delta_ref + T_delta delta_ref' is delta_ref a lag ahead of now. Discretised
+    delta_c,ref = delta_ref + T_delta delta_ref' is delta_ref one lag ahead. Discretised
     exactly for a held input, u = -K(v) (e, psi, d) minimises the sum of
     (e / lateral_error)^2 + (psi / heading_error)^2 + (u / u_max)^2, where u_max is the smaller of
     `steering_correction` and the angle whose lateral acceleration at v is `correction`. K comes
@@ -59,12 +59,12 @@ class LqrTracker(Tracker):
     :param correction: lateral acceleration of a steering correction that costs 1 [m/s^2]
     :param steering_correction: steering correction that costs 1 at low speed [rad]
     :param feed_forward: steer the plan's curvature ahead of any error
-    :param slip: G_s that the controller reckons with [-]
-    :param steering_lag: T_delta that the controller reckons with [s]
+    :param slip: G_s that the controller assumes [-]
+    :param steering_lag: T_delta that the controller assumes [s]
     :param speed_gain: k_v of speed control [1/s]
     :param integral_gain: k_i of speed control [1/s^2]
     :param position_gain: k_s of speed control [1/s]
-    :param acceleration_lag: T_a that speed control reckons with [s]
+    :param acceleration_lag: T_a that speed control assumes [s]
     """
 
     def __init__(
@@ -88,15 +88,15 @@ class LqrTracker(Tracker):
         self._gains = gain_table(vehicle.wheelbase, dt_s, self.settings, self.dynamics)
 
     def reset(self) -> None:
-        """Forget what was tracked before."""
+        """Reset the state of earlier tracking."""
         self._speed.reset()
 
     def control(self, pose: VehicleState, reference: Reference) -> Control:
-        """Command one step."""
+        """Compute the command of one step."""
         track = reference.track
         position = track.position(pose, reference.since_s)
         acceleration = self._speed.command(pose, reference, position.s)
-        # Whose plan is over does not turn the wheels of a vehicle that stands.
+        # At the end of its plan, a standing vehicle does not turn its wheels.
         if abs(pose.speed) < REST and not track.moves_after(reference.since_s):
             return Control(pose.steering_angle, acceleration)
         forward = deviation_from = 0.0
@@ -116,19 +116,20 @@ class LqrTracker(Tracker):
 
     def largest_correction(self, speed: float) -> float:
         """
-        Bound the feedback, so that the limited steering rate can undo it in time [rad].
+        Return the bound of the feedback, so that the limited steering rate can undo it in time
+        [rad].
 
         Large errors would otherwise end in a limit cycle. Turning the wheels back from delta at
         the rate r takes delta / r, in which the heading goes on by v delta^2 / (2 r L). The
-        feedback begins with it where (1 + K_d) delta / K_psi are left: twice as much as needed
-        for delta = r L (1 + K_d) / (v K_psi).
+        feedback begins to do so at a heading error of (1 + K_d) delta / K_psi, which is twice the
+        needed one for delta = r L (1 + K_d) / (v K_psi).
         """
         _, heading_gain, steering_gain = self.gain(speed)
         return self.vehicle.max_steering_rate * self.vehicle.wheelbase * (1.0 + steering_gain) \
             / (max(abs(speed), TABLE_SPEEDS[0]) * heading_gain)
 
     def gain(self, speed: float) -> tuple[float, float, float]:
-        """Return K at a speed: of e [rad/m], of psi [-] and of d [-]."""
+        """Return K at a speed: for e [rad/m], psi [-] and d [-]."""
         magnitude = min(max(abs(speed), TABLE_SPEEDS[0]), TABLE_SPEEDS[-1])
         i = min(bisect_right(TABLE_SPEEDS, magnitude), len(TABLE_SPEEDS) - 1) - 1
         f = (magnitude - TABLE_SPEEDS[i]) / (TABLE_SPEEDS[i + 1] - TABLE_SPEEDS[i])
@@ -136,7 +137,7 @@ class LqrTracker(Tracker):
         return a + f * (d - a), b + f * (e - b), c + f * (g - c)
 
     def _steady_angle(self, curvature: float) -> float:
-        # Without grip (G_s = 0) no angle bends the path.
+        # Without grip (G_s = 0) no steering angle curves the path.
         slip = max(self.dynamics.slip, 1e-3)
         return clipped(atan(self.vehicle.wheelbase * curvature / slip),
                        self.vehicle.max_steering_angle)
@@ -149,7 +150,7 @@ def error_model(speed: float, wheelbase: float, dt_s: float,
 
     :param speed: absolute speed [m/s]
     :param wheelbase: L [m]
-    :return: A (3, 3) and B (3, 1) over e [m], psi [rad] and d [rad]
+    :return: A (3, 3) and B (3, 1) for e [m], psi [rad] and d [rad]
     """
     lag = dynamics.steering_lag
     system = np.zeros((4, 4))
@@ -178,7 +179,7 @@ def gain_table(wheelbase: float, dt_s: float, settings: LqrSettings,
     """
     Solve the discrete Riccati equation at each speed of the table.
 
-    :return: K for each of `TABLE_SPEEDS`: of e [rad/m], psi [-] and d [-]
+    :return: K for each of `TABLE_SPEEDS`: for e [rad/m], psi [-] and d [-]
     """
     rows = []
     for speed in TABLE_SPEEDS:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A plan between its states: what is planned for a time, and where beside it a vehicle is."""
+"""A plan as a continuous track: the planned state at a time, and the offset of a vehicle."""
 
 from bisect import bisect_left
 from math import cos, sin
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-# A plan that ends faster than this has not stopped, and goes on in its curve [m/s].
+# A plan with a higher final speed has not stopped, and continues along its curve [m/s].
 BENDING_SPEED = 1.0
-# Displacements shorter than this between two states say nothing about curvature [m].
+# Shorter displacements between two states give no curvature [m].
 SHORTEST_STEP = 0.02
 
 
@@ -25,10 +25,10 @@ class TrackPoint(NamedTuple):
 
     :param x: rear axle [m]
     :param y: rear axle [m]
-    :param yaw: continuous, so not normalised [rad]
+    :param yaw: continuous, so it is not normalised [rad]
     :param speed: signed [m/s]
     :param acceleration: signed along the heading [m/s^2]
-    :param s: way from the first state, growing in reverse too [m]
+    :param s: arc length from the first state, growing in reverse too [m]
     """
 
     x: float
@@ -41,12 +41,12 @@ class TrackPoint(NamedTuple):
 
 class TrackPosition(NamedTuple):
     """
-    Where a vehicle is beside a plan.
+    The position of a vehicle relative to a plan.
 
-    :param s: way of the nearest planned point from the first state [m]
+    :param s: arc length of the nearest planned point from the first state [m]
     :param lateral: offset from there, positive to the left of the heading [m]
     :param yaw: planned heading there, continuous [rad]
-    :param time_s: for when that point is planned, from the first state [s]
+    :param time_s: planned time of that point, from the first state [s]
     """
 
     s: float
@@ -96,11 +96,11 @@ class PlannedTrack:
                        if abs(speed) <= PLANNED_REST]
 
     def at(self, time_s: float) -> TrackPoint:
-        """Return what is planned for a time from the first state [s], held beyond both ends."""
+        """Return the planned state at a time from the first state [s], held beyond both ends."""
         i, f = self._locate(time_s)
         v, w = self._speeds[i], self._speeds[i + 1]
         x, y = self._point(i, f)
-        # The share of the segment's way that linear speeds cover in the share f of its time.
+        # The share of the segment's length that linear speeds cover in the share f of its time.
         both = v + w
         share = f * (2.0 * v + f * (w - v)) / both if abs(both) > PLANNED_REST else f
         return TrackPoint(x, y, self._yaws[i] + f * (self._yaws[i + 1] - self._yaws[i]),
@@ -108,7 +108,7 @@ class PlannedTrack:
                           self._ways[i] + min(1.0, max(0.0, share)) * self._lengths[i])
 
     def curvature(self, time_s: float) -> float:
-        """Return the curvature planned for a time [1/m]."""
+        """Return the planned curvature at a time [1/m]."""
         i, f = self._locate(time_s)
         return self._curvatures[i] + f * (self._curvatures[i + 1] - self._curvatures[i])
 
@@ -123,9 +123,9 @@ class PlannedTrack:
 
     def next_stop(self, time_s: float) -> tuple[float, float] | None:
         """
-        Find where the vehicle next comes to rest; in a rest, that place.
+        Find the next place of rest; during a rest, the present place.
 
-        :return: time [s] and way [m] from the first state; None where the plan ends in motion.
+        :return: time [s] and arc length [m] from the first state; None if the plan ends in motion.
         """
         i, _ = self._locate(time_s)
         if abs(self._speeds[i]) <= PLANNED_REST and abs(self._speeds[i + 1]) <= PLANNED_REST:
@@ -140,9 +140,9 @@ class PlannedTrack:
         """
         Project a pose onto the plan.
 
-        The search starts from where the vehicle should be and ends where the plan rests or turns
-        back, so that a plan that comes by the same place again is no trap. Beyond the ends the
-        track goes straight on.
+        The search starts at the planned position and ends where the plan rests or reverses, so
+        that a plan that passes the same place again does not mislead it. Beyond the ends the track
+        continues straight.
 
         :param pose: rear axle
         :param time_s: time from the first state [s]
@@ -164,7 +164,8 @@ class PlannedTrack:
         c, s = cos(yaw), sin(yaw)
         along = sign * ((x - px) * c + (y - py) * s)
         way = self._ways[i] + f * self._lengths[i]
-        # Within a segment what is left along it is of second order; beyond an end it is the way.
+        # Within a segment the remainder along it is of second order; beyond an end it is the
+        # distance.
         beyond = along if f != share or self._lengths[i] < SHORTEST_STEP else 0.0
         return TrackPosition(way + beyond, (y - py) * c - (x - px) * s, yaw,
                              (i + f) * self.time_step_s)
@@ -173,9 +174,9 @@ class PlannedTrack:
         """
         Find the point of the plan at a distance from the rear axle, in the direction of travel.
 
-        Beyond the end of the motion the track goes on, in the curve that it ends in.
+        Beyond the end of the motion the track continues with its final curvature.
 
-        :param time_s: where the search starts, from the first state [s]
+        :param time_s: start of the search, from the first state [s]
         :param distance: look-ahead distance [m]
         :return: x, y [m]
         """
@@ -204,7 +205,7 @@ class PlannedTrack:
 
     def _locate(self, time_s: float) -> tuple[int, float]:
         position = time_s / self.time_step_s
-        # A time that is a multiple of the step within rounding is that state.
+        # A time that is a multiple of the step within rounding means that state.
         i = int(position + 1e-9)
         if i > self.last:
             return self.last, 1.0
@@ -213,7 +214,7 @@ class PlannedTrack:
         return i, max(0.0, position - i)
 
     def _share(self, i: int, x: float, y: float, otherwise: float) -> float:
-        """Project a point onto a segment's chord; in a segment at rest there is no answer."""
+        """Return the share of a segment's chord at a point's projection; `otherwise` at rest."""
         length = self._lengths[i]
         if length < 1e-6:
             return otherwise
@@ -222,7 +223,7 @@ class PlannedTrack:
         return ((x - px) * dx + (y - py) * dy) / (length * length)
 
     def _point(self, i: int, f: float) -> tuple[float, float]:
-        """Evaluate a segment's cubic Hermite polynomial at the share f of its time."""
+        """Return the point of a segment's cubic Hermite polynomial at the share f of its time."""
         (x, y), (dx, dy) = self._positions[i], self._steps[i]
         (vx, vy), (wx, wy) = self._velocities[i], self._velocities[i + 1]
         g = 1.0 - f
@@ -243,7 +244,7 @@ def _signs(speeds: Array) -> Array:
 
 
 def _curvatures(yaws: Array, ways: Array) -> Array:
-    """Find the curvature at each state from the headings and the signed ways between them."""
+    """Return the curvature at each state from the headings and the signed lengths between them."""
     moving = np.flatnonzero(np.abs(ways) >= SHORTEST_STEP)
     if not len(moving):
         return np.zeros(len(yaws))
@@ -253,7 +254,7 @@ def _curvatures(yaws: Array, ways: Array) -> Array:
 
 def _leaving(px: float, py: float, dx: float, dy: float, square: float,
              largest: float = 1.0) -> float | None:
-    """Find the share of a step after which it leaves a circle around the origin; None if not."""
+    """Return the share of a step after which it leaves a circle around the origin; None if not."""
     a = dx * dx + dy * dy
     b = px * dx + py * dy
     c = px * px + py * py - square

@@ -12,7 +12,7 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 
 WHERE = 'options of tracker pure-pursuit'
-# The look-ahead distance is at least so many times the offset: 18 degrees to the path [-].
+# Least ratio of look-ahead distance to offset: an approach of 18 degrees to the path [-].
 SHALLOW = 3.0
 
 
@@ -20,17 +20,18 @@ class PurePursuitTracker(Tracker):
     """
     Geometric path tracking, CMU-RI-TR-09-08, section 2.2.
 
-    The rear axle's arc that starts along the heading and meets the plan's point at the distance
-    l_d under the angle alpha has the curvature 2 sin(alpha) / l_d, so that
-    delta = atan(2 L sin(alpha) / l_d), with l_d = k v between its bounds. In reverse the point
-    lies behind, and the same arc leads to it.
+    An arc of the rear axle starts along the heading and meets the plan's point at the distance l_d
+    and the angle alpha. Its curvature is 2 sin(alpha) / l_d, so that delta = atan(2 L sin(alpha) /
+    l_d), with l_d = k v between its bounds. In reverse the point lies behind, and the same arc
+    leads to it.
 
     Beyond the report, because the steering rate is limited and large errors would end in a limit
     cycle: l_d grows with the offset, and the correction of the plan's own curvature is bounded by
-    r l_d / (2 v), half of what the rate r can undo within the heading that is left.
+    r l_d / (2 v), half of the correction that the rate r can undo within the remaining heading
+    error.
 
-    The controller knows neither slip nor lag: with FS 2 on a circle of radius R it settles on
-    sqrt(R^2 + l_d^2 (1 / G_s - 1)).
+    The controller models neither slip nor lag: with FS 2 on a circle of radius R it settles at a
+    radius of sqrt(R^2 + l_d^2 (1 / G_s - 1)).
 
     Options that are None come from `config/control.yaml`.
 
@@ -42,7 +43,7 @@ class PurePursuitTracker(Tracker):
     :param speed_gain: k_v of speed control [1/s]
     :param integral_gain: k_i of speed control [1/s^2]
     :param position_gain: k_s of speed control [1/s]
-    :param acceleration_lag: T_a that speed control reckons with [s]
+    :param acceleration_lag: T_a that speed control assumes [s]
     """
 
     def __init__(
@@ -60,16 +61,16 @@ class PurePursuitTracker(Tracker):
             position_gain=position_gain, acceleration_lag=acceleration_lag)
 
     def reset(self) -> None:
-        """Forget what was tracked before."""
+        """Reset the state of earlier tracking."""
         self._speed.reset()
 
     def control(self, pose: VehicleState, reference: Reference) -> Control:
-        """Command one step."""
+        """Compute the command of one step."""
         track = reference.track
         position = track.position(pose, reference.since_s)
         distance = hypot(self.look_ahead(pose.speed), SHALLOW * position.lateral)
         x, y = track.ahead(pose, position.time_s, distance)
-        # What the path asks for is never cut, only the correction.
+        # Only the correction is limited, never the steering that the path needs.
         planned = atan(self.vehicle.wheelbase * track.curvature(position.time_s))
         limit = self.vehicle.max_steering_rate * distance / (2.0 * max(abs(pose.speed), 0.1))
         correction = steering_angle_to(pose, x, y, self.vehicle.wheelbase) - planned

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Speed along a plan: feed-forward and PI between stops, a law of its own into each stop."""
+"""Speed control along a plan: feed-forward and PI between stops, a separate law into each stop."""
 
 from math import exp
 
@@ -10,39 +10,40 @@ from crgame_ros.vehicle.models import clipped
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STANDING, VehicleState
 
-# The stop's own law takes over so many acceleration lags before it.
+# The stopping law takes over this many acceleration lags before the stop.
 STOPPING_LAGS = 2.0
-# Nearer to its place than this, a stop is reached [m].
+# Within this distance a stop counts as reached [m].
 STOP_TOLERANCE = 0.005
-# With which a vehicle that should stop and nearly does is held by its brakes [m/s^2].
+# Braking that holds a vehicle that has nearly stopped, as it should [m/s^2].
 HOLDING_DECELERATION = 1.0
-# Faster than this backwards is a motion to brake, slower the noise of an estimate [m/s].
+# A faster backward motion is braked; a slower one is noise of the estimate [m/s].
 ROLLING_BACK = 0.15
-# Beyond its place the vehicle brakes at least so hard [m/s^2], and to stop within so much [m].
+# Beyond the stop's place the vehicle brakes at least this hard [m/s^2], to stop within this
+# distance [m].
 FIRM_DECELERATION = 4.0
 OVERRUN = 0.25
 
 
 class SpeedController:
     """
-    Commands the acceleration that keeps a vehicle at its planned place and speed.
+    The controller of the acceleration that keeps a vehicle at its planned place and speed.
 
     Between stops, along the direction of travel: v_t = v_ref + k_s (s_ref - s) and
     a_c = a_ref(t + T_a) + k_v (v_t - v) + k_i integral(v_t - v) dt. The planned acceleration is
-    taken T_a ahead, because the vehicle answers so much later. The integral is bounded and stands
-    still while the command is at a limit and the error would push it further (anti-windup). With
-    d left to a stop, the vehicle brakes harder by no less than v^2 / (2 d) exceeds the plan's
-    v_ref^2 / (2 d_ref).
+    that of T_a ahead, because the vehicle reacts with that lag. The integral is bounded, and is
+    held while the command is at a limit and the error would push it further (anti-windup). With d
+    left to a stop, the vehicle brakes harder by at least the difference of v^2 / (2 d) and the
+    plan's v_ref^2 / (2 d_ref).
 
-    Into a stop a proportional law would creep. There the acceleration to reach is the constant one
+    A proportional law would creep into a stop. There the target acceleration is the constant one
     that ends at its place, n = -v^2 / (2 d). With the lag a' = (a_c - a) / T_a, where a is
-    computed from past commands, n' = (n - a) v / d, so that a_c = n + T_a (v / d) (n - a) lets
-    n - a decay with T_a whatever remains of the way.
+    computed from past commands, n' = (n - a) v / d, so that with a_c = n + T_a (v / d) (n - a) the
+    difference n - a decays with T_a at any remaining distance.
 
     :param vehicle: parameters of the vehicle
     :param dt_s: time between calls [s]
     :param settings: the gains
-    :param acceleration_lag: T_a that the controller reckons with [s]
+    :param acceleration_lag: T_a that the controller assumes [s]
     """
 
     def __init__(self, vehicle: VehicleParameters, dt_s: float, settings: SpeedSettings,
@@ -55,18 +56,18 @@ class SpeedController:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the integral and the expected acceleration."""
+        """Reset the integral and the expected acceleration."""
         self._integral = 0.0
         self._expected: float | None = None
         self._rolls_back = False
 
     def command(self, pose: VehicleState, reference: Reference, s: float) -> float:
         """
-        Command the acceleration of one step.
+        Compute the commanded acceleration of one step.
 
         :param pose: the state that the controller believes
         :param reference: the plan
-        :param s: way of the pose along the plan [m]
+        :param s: arc length of the pose along the plan [m]
         :return: signed along the heading, within the vehicle's limits [m/s^2]
         """
         track, now_s = reference.track, reference.since_s
@@ -81,7 +82,7 @@ class SpeedController:
             wanted = self._following(speed, direction, reference, s,
                                      None if stop is None else stop[1])
         command = direction * clipped(wanted, self._limit)
-        # At rest the brakes hold the vehicle, and the lag starts anew.
+        # At rest the brakes hold the vehicle, and the lag starts afresh.
         expected = 0.0 if pose.speed == 0.0 and wanted <= 0.0 else expected
         self._expected = expected + self._answer * (command - expected)
         return command
@@ -108,7 +109,7 @@ class SpeedController:
         return wanted
 
     def _stopping(self, speed: float, acceleration: float, way: float) -> float:
-        """Brake; never a push, because an estimated speed is not exactly 0 at rest."""
+        """Return the braking into a stop; never a push, as an estimated speed is not exactly 0."""
         self._rolls_back = speed < -ROLLING_BACK or (self._rolls_back and speed < 0.0)
         if self._rolls_back:
             return FIRM_DECELERATION
@@ -121,7 +122,7 @@ class SpeedController:
 
 
 def _needed(speed: float, way: float) -> float:
-    """Return the constant acceleration that ends at rest after a way [m/s^2]."""
+    """Return the constant acceleration that ends at rest after a distance [m/s^2]."""
     if way > STOP_TOLERANCE:
         return -0.5 * speed * speed / way
     return -max(FIRM_DECELERATION, 0.5 * speed * speed / OVERRUN)
@@ -132,7 +133,7 @@ def make_speed_controller(
     integral_gain: float | None, position_gain: float | None, acceleration_lag: float | None,
 ) -> SpeedController:
     """
-    Make a speed controller from a tracker's options; None is the value of `config/control.yaml`.
+    Create a speed controller from a tracker's options; None is the value of `config/control.yaml`.
 
     :param where: the tracker, for messages
     :raises InputError: if an option is out of bounds.

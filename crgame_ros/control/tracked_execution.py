@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""An AV that tracks its plan with a controller and a vehicle instead of being on it (FS II-C)."""
+"""An AV that tracks its plan with a controller and a vehicle model (FS II-C)."""
 
 from collections import deque
 from math import cos, sin, sqrt
@@ -14,15 +14,15 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 from crgame_ros.vehicle.stopping import braking_acceleration
 
-# Age of the plan against which errors are measured [s]. The newest one starts at the vehicle ten
-# times a second, so that nobody is ever far from it.
+# Age of the plan against which errors are measured [s]. The newest plan starts at the vehicle ten
+# times a second, so the errors against it are always small.
 ERROR_PLAN_AGE_S = 1.0
 _ROUNDING_S = 1e-9
 
 
 class TrackingErrors(NamedTuple):
     """
-    The true state against what a plan of at least `ERROR_PLAN_AGE_S` wanted for the same time.
+    The deviation of the true state from a plan aged at least `ERROR_PLAN_AGE_S`, at the same time.
 
     :param lateral: positive to the left of the plan [m]
     :param along: positive ahead of the plan, along its heading [m]
@@ -41,8 +41,8 @@ class TrackedExecution:
     One AV's tracking controller and vehicle.
 
     :param vehicle: parameters of the vehicle
-    :param tracker: the controller, which belongs to this vehicle alone
-    :param model: the vehicle's motion, which belongs to it alone too
+    :param tracker: the controller, used by this vehicle alone
+    :param model: the vehicle's motion model, also used by it alone
     :param dt_s: simulation step [s]
     """
 
@@ -57,9 +57,9 @@ class TrackedExecution:
 
     def reset(self, state: VehicleState) -> None:
         """
-        Begin anew: a new run, or a vehicle that comes back from somebody who drove it.
+        Reset for a new run, or for a vehicle that returns from another driver.
 
-        :param state: where the vehicle is, rear axle
+        :param state: of the vehicle, rear axle
         """
         self.tracker.reset()
         self.model.gear = -1 if state.speed < 0.0 else 1
@@ -91,17 +91,17 @@ class TrackedExecution:
 
     @property
     def errors(self) -> TrackingErrors | None:
-        """Errors at the end of the last step; None if it followed no plan."""
+        """Return the errors at the end of the last step; None if it followed no plan."""
         return self._errors
 
     @property
     def worst(self) -> TrackingErrors:
-        """Largest absolute errors since the last reset."""
+        """Return the largest absolute errors since the last reset."""
         return TrackingErrors(*self._worst)
 
     @property
     def rms(self) -> TrackingErrors:
-        """Root of the mean squared errors since the last reset."""
+        """Return the root mean square of the errors since the last reset."""
         count = max(1, self._count)
         return TrackingErrors(*(sqrt(total / count) for total in self._squares))
 
@@ -114,7 +114,7 @@ class TrackedExecution:
         self._count = 0
 
     def _braking(self, state: VehicleState) -> Control:
-        # What the tracker expected of the vehicle ends here.
+        # The tracker's expectations of the vehicle end here.
         self.tracker.reset()
         return Control(state.steering_angle, braking_acceleration(state.speed))
 
@@ -123,10 +123,10 @@ class TrackedExecution:
 
     def _remember(self, reference: Reference) -> None:
         """
-        Let plans grow older by a step, and forget those that are not measured against any more.
+        Age the plans by a step, and discard those no longer used for errors.
 
-        The first is the youngest that is old enough, at the start the oldest there is; it has not
-        come to its end, or there would be nothing to compare with.
+        The first one is the youngest that is old enough; at the start, the oldest one. It has not
+        ended, because otherwise there would be nothing to compare with.
         """
         plans = self._plans
         if not plans or plans[-1][0] is not reference.track:

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, eq=False)
 class Reference:
     """
-    Planned states and where in them now is.
+    Planned states, and the present time within them.
 
     :param states: (S, 8) planned rear-axle states, S >= 2, columns as in `StateColumn`, rows
         `time_step_s` apart
     :param time_step_s: Delta t_c [s]
     :param since_s: time since the first state [s]
-    :param track: the states as a curve; made once for a plan and shared by `at`
+    :param track: the states as a curve; built once for a plan and shared by `at`
     :raises InputError: if `states` has another shape.
     """
 
@@ -33,23 +33,23 @@ class Reference:
     track: PlannedTrack = field(default=None, repr=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Make the curve."""
+        """Build the curve."""
         if self.track is None:
             object.__setattr__(self, 'track', PlannedTrack(self.states, self.time_step_s))
 
     def at(self, since_s: float) -> 'Reference':
-        """Return the same plan at another time, without making the curve anew [s]."""
+        """Return the same plan at another time [s], without rebuilding the curve."""
         return replace(self, since_s=since_s)
 
     @property
     def used_up(self) -> bool:
-        """Return whether now is at or beyond the last state."""
+        """Return whether the present time is at or beyond the last state."""
         return self.since_s >= self.track.end_s - 1e-9
 
 
 class Control(NamedTuple):
     """
-    What a tracker commands.
+    The command of a tracker.
 
     :param steering_angle: front wheels, positive to the left [rad]
     :param acceleration: signed along the heading [m/s^2]
@@ -61,7 +61,7 @@ class Control(NamedTuple):
 
 class Tracker(ABC):
     """
-    A controller that keeps a vehicle on its plan; one vehicle has one of its own.
+    A controller that keeps a vehicle on its plan; each vehicle has its own.
 
     :param vehicle: parameters of the vehicle
     :param dt_s: time between calls of `control` [s]
@@ -73,15 +73,15 @@ class Tracker(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """Forget what was tracked before."""
+        """Reset the state of earlier tracking."""
 
     @abstractmethod
     def control(self, pose: VehicleState, reference: Reference) -> Control:
         """
-        Command one step.
+        Compute the command of one step.
 
         :param pose: the state that the controller believes, rear axle
-        :param reference: the plan, not used up; may be another one than at the last call
+        :param reference: the plan, not used up; it may differ from that of the last call
         """
 
 

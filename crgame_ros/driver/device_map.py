@@ -80,7 +80,7 @@ class AxisEntry:
             raise InputError(f'"rest" is {self.rest:g}', '', 'let it lie between min and max')
 
     def binding(self, axis: int, centred: bool, deadzone: float) -> AxisBinding:
-        """Return it as the program has it."""
+        """Return the binding of the axis."""
         return AxisBinding(axis, self.min, self.max, self.rest, self.inverted, centred, deadzone)
 
 

@@ -176,9 +176,7 @@ class EvdevDevice:
 
     @property
     def joy(self) -> JoyState:
-        """
-        Return the device as the `joy` node would publish it; a keyboard's driving keys as buttons.
-        """
+        """Return the message of a `joy` node; a keyboard's driving keys are its buttons."""
         if self.device_map is not None and self.device_map.keys is not None:
             return JoyState((), tuple(map(int, self.keys)))
         rests = {axis.code: axis.rest for axis in self.layout.ranges} if self.layout else {}

@@ -45,7 +45,7 @@ class TorqueLimiter:
         """
         Move towards a torque.
 
-        :param wanted: of the simulated steering [N m]; NaN or infinity counts as 0.
+        :param wanted: of the simulated steering [N m]; NaN counts as 0.
         :param dt_s: since the last step [s]
         :return: torque of the motor, positive to the left [N m]
         """

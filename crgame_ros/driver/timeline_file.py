@@ -51,13 +51,13 @@ class Span:
     end: Annotated[Time, Called('to')]
 
     def check(self) -> None:
-        """Check that the interval does not end before it starts."""
+        """Check that the interval ends after its start."""
         if round(self.start * 1e9) >= round(self.end * 1e9):
             raise InputError(f'ends at {self.end:g} s, not after its start at {self.start:g} s',
                              '', 'let "from" be less than "to"')
 
     def interval(self, keys: tuple[str, ...]) -> KeyInterval:
-        """Return it as the program has it."""
+        """Return the interval with its keys."""
         return KeyInterval(round(self.start * 1e9), round(self.end * 1e9), keys)
 
 
@@ -103,9 +103,7 @@ class JoyEntry:
     put_back: Annotated[tuple[Span, ...], LeftOut()] = ()
 
     def check(self) -> None:
-        """
-        Check that no axis is listed twice, and that the points fit the axes and rise in time.
-        """
+        """Check that axes are listed once, and that points fit them and rise in time."""
         for axis in self.axes:
             if self.axes.count(axis) > 1:
                 raise InputError(f'"{axis}" is doubled', 'axes', 'name each axis once')
@@ -128,7 +126,7 @@ class JoyEntry:
                              place, 'let the times rise')
 
     def timeline(self) -> JoyTimeline:
-        """Return it as the program has it."""
+        """Return the timeline of the entry."""
         at = [dict(zip(self.axes, point[1:], strict=True)) for point in self.points]
         return JoyTimeline(
             tuple(point[0] for point in self.points),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One run of an evaluation, and the key that names everything it depends on."""
+"""One run of an evaluation, with a key over everything that it depends on."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -12,30 +12,31 @@ from typing import Any
 from crgame_ros.evaluation.content import digests_in
 
 KEY_DIGITS = 32
-# Columns that tell cells apart, in every table.
+# Columns that identify cells, in every table.
 FACTORS = ('scenario', 'game', 'human', 'planner', 'perception', 'traffic', 'seed')
 
 
 @dataclass(frozen=True)
 class Cell:
     """
-    A run to compute, whole: who has this and its contents needs nothing else.
+    The complete description of a run to compute: with its contents, nothing else is needed.
 
     :param scenario: benchmark id.
     :param game: name of the game's file, or empty.
     :param human: name of the recorded run whose humans drive, or empty.
-    :param planner: label of who drives the AVs.
-    :param perception: label of how they perceive.
+    :param planner: label of the AVs' planner.
+    :param perception: label of the AVs' perception.
     :param traffic: label of the traffic.
-    :param seed: of everything random.
-    :param values: of the game; files are references to contents.
-    :param inputs: digest of what recorded humans did, or empty.
-    :param planner_choice: `planner` and `options` of all AVs; None leaves the game's.
-    :param perception_values: of all AVs, as a game has them; None is perfect, `own` the game's.
-    :param traffic_values: likewise.
-    :param duration_s: simulated; None as the game says [s]
+    :param seed: seed of all random values.
+    :param values: values of the game; files are references to contents.
+    :param inputs: digest of the recorded humans' inputs, or empty.
+    :param planner_choice: `planner` and `options` of all AVs; None keeps the game's.
+    :param perception_values: perception of all AVs, as in a game; None is perfect, `own` keeps
+        the game's.
+    :param traffic_values: likewise for traffic.
+    :param duration_s: simulated duration; None for the game's [s]
     :param latency_steps: simulation steps between a request and its plan.
-    :param commonroad_scores: whether CommonRoad's tools judge it, too.
+    :param commonroad_scores: whether CommonRoad's tools score it, too.
     :param code: digests of the engine's and the planners' code.
     """
 
@@ -58,34 +59,34 @@ class Cell:
 
     @cached_property
     def text(self) -> str:
-        """Return all of it as JSON, the same for equal cells."""
+        """Return the cell as JSON, the same for equal cells."""
         return json.dumps({item.name: getattr(self, item.name) for item in fields(self)},
                           sort_keys=True, separators=(',', ':'), allow_nan=True)
 
     @cached_property
     def key(self) -> str:
-        """Name it by a hash of everything that its results depend on."""
+        """Return the key: a hash over everything that the results depend on."""
         return hashlib.sha256(self.text.encode()).hexdigest()[:KEY_DIGITS]
 
     @property
     def contents(self) -> set[str]:
-        """Name the contents that it needs."""
+        """Return the digests of the contents that it needs."""
         return digests_in(self.text) | ({self.inputs} if self.inputs else set())
 
     @property
     def factors(self) -> dict[str, Any]:
-        """Return what tells it apart."""
+        """Return the values of the columns that identify it."""
         return {name: getattr(self, name) for name in FACTORS}
 
     @property
     def label(self) -> str:
-        """Name it for people."""
+        """Return a name for people."""
         place = self.human or self.game or self.scenario
         more = [text for text in (self.perception, self.traffic) if text != 'own']
         return ' · '.join((place, self.planner, *more, f'seed {self.seed}'))
 
 
 def cell_of(text: str) -> Cell:
-    """Return the cell of its JSON."""
+    """Build the cell from its JSON."""
     values = json.loads(text)
     return Cell(**values | {'code': tuple(values['code'])})

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All cells of an evaluation, one after the other, none held."""
+"""The grid of an evaluation, which yields its cells one by one without storing them."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -32,11 +32,11 @@ from crgame_ros.simulation.av_assignment import OWN
 @dataclass(frozen=True)
 class GridPlanner:
     """
-    Who drives all AVs.
+    A planner for all AVs.
 
-    :param label: by which tables name it.
-    :param choice: its name and options; None leaves each game's own planners.
-    :param digest: of its code.
+    :param label: name in tables.
+    :param choice: its name and options; None keeps each game's own planners.
+    :param digest: digest of its code.
     """
 
     label: str
@@ -47,16 +47,16 @@ class GridPlanner:
 @dataclass(frozen=True)
 class CellGrid:
     """
-    Scenes crossed with planners, perception, traffic and seeds.
+    All combinations of scenes, planners, perception, traffic and seeds.
 
-    :param scenes: their labels differ.
-    :param planners: who drives the AVs.
+    :param scenes: scenes with different labels.
+    :param planners: planners of the AVs.
     :param perception: values by label.
     :param traffic: values by label.
-    :param seeds: of everything random.
-    :param duration_s: of each cell; None as games say [s]
-    :param latency_steps: between a request and its plan.
-    :param commonroad_scores: whether CommonRoad's tools judge each cell, too.
+    :param seeds: seeds of all random values.
+    :param duration_s: simulated duration of each cell; None for the games' [s]
+    :param latency_steps: simulation steps between a request and its plan.
+    :param commonroad_scores: whether CommonRoad's tools score each cell, too.
     :param engine: digest of the engine's code.
     """
 
@@ -95,7 +95,7 @@ class CellGrid:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """Return what `as_dict` told."""
+        """Build the grid from the dictionary of `as_dict`."""
         return cls(**values | {
             'scenes': tuple(CellScene(**scene | {'digests': tuple(scene['digests'])})
                             for scene in values['scenes']),
@@ -106,7 +106,7 @@ class CellGrid:
 def make_grid(plan: EvaluationPlan, store: ContentStore,
               progress: Callable[[float], object] = lambda _: None) -> CellGrid:
     """
-    Load and check everything that a plan names, and take its files into a store.
+    Load and check everything that a plan names, and copy its files into a store.
 
     :param progress: called with the share done so far, 0 to 1.
     :raises InputError: if anything cannot be used.
@@ -138,9 +138,10 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
 
 def _unique_names(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
     """
-    Name alike ones by more: scenarios by their files, runs by the folders that they lie in.
+    Return scenes with unique names: equal names are extended, by the file's name for scenarios
+    and by parent folders for runs.
 
-    :raises InputError: about what is still alike.
+    :raises InputError: if names are still equal.
     """
     labels = Counter(scene.label for scene in scenes)
     named = tuple(
@@ -159,7 +160,7 @@ def _unique_names(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[C
 
 
 def _longer_name(path: Path, paths: Sequence[Path]) -> str:
-    """Name a run from the folder on that it shares with those that are called alike."""
+    """Return a run's name that starts with the folder shared by the runs of equal names."""
     whole = path.resolve()
     alike = {other.resolve() for other in paths} - {whole}
     for count in range(2, len(whole.parts)):

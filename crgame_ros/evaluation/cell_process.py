@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A process of its own for cells: one that hangs, eats memory or dies takes nobody along."""
+"""Computes cells in a separate process, so that a hang, excess memory or crash affects only it."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -26,22 +26,22 @@ from crgame_ros.evaluation.source_digest import engine_digest
 from distributed import get_worker
 
 _LENGTH = struct.Struct('<Q')
-# Results do not depend on how many threads a library takes, and workers share the processors.
+# Libraries use one thread each: results do not depend on it, and workers share the processors.
 _ONE_THREAD = dict.fromkeys((
     'OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMBA_NUM_THREADS'), '1')
-# Of what a cell printed, so much is told when it died.
+# Length of the output of a cell that is reported when its process died [bytes].
 _TOLD_BYTES = 2000
 _STARTS_S, _ENDS_S = 120.0, 5.0
-# Of each thread of the worker its own: a worker of several computes several cells at once.
+# Each thread of a worker has its own process: a worker with several computes several cells at once.
 _OF_THREAD = threading.local()
 
 
 class CellProcess:
     """
-    Computes cells one after the other; a new process takes over from one that ended.
+    A process that computes cells one after the other; it is replaced by a new one if it ends.
 
-    :param contents: folder of the store with what cells name.
-    :param memory_bytes: that the process may take for data.
+    :param contents: folder of the store with the cells' contents.
+    :param memory_bytes: greatest data size of the process.
     """
 
     def __init__(self, contents: Path, memory_bytes: int) -> None:
@@ -54,14 +54,14 @@ class CellProcess:
         Compute a cell.
 
         :param cell: as JSON.
-        :param timeout_s: after which it is given up.
-        :return: its rows, as `cell_run.compute_cell` gives them; of a cell that failed the status
-            and the reason.
+        :param timeout_s: wall time after which the cell fails.
+        :return: its rows, as `cell_run.compute_cell` returns them; for a cell that failed, the
+            status and the reason.
         """
         start_s = time.perf_counter()
         rows = self._once(cell, timeout_s)
         if rows['cell']['status'] == 'died' and signal.SIGKILL.name in rows['cell']['reason']:
-            # By somebody else: what it was computing may have nothing to do with it.
+            # Another process killed it: the cell may not be the cause.
             rows = self._once(cell, timeout_s)
         rows.setdefault('work', {})['wall_s'] = time.perf_counter() - start_s
         return rows
@@ -80,7 +80,7 @@ class CellProcess:
         else:
             rows = json.loads(answer)
             if rows['cell']['status'] == 'memory':
-                # What is left of the memory is in pieces.
+                # The remaining memory is fragmented.
                 self.close()
         return dict(rows)
 
@@ -106,7 +106,7 @@ class CellProcess:
                 env=os.environ | _ONE_THREAD)
             assert self._process.stdout is not None
             with suppress(OSError, EOFError, TimeoutError):
-                # It says when it has loaded everything, so that no cell's time counts it.
+                # The process reports when it has loaded all modules, which no cell's time includes.
                 _read(self._process.stdout, _STARTS_S)
         return self._process
 
@@ -114,7 +114,7 @@ class CellProcess:
         try:
             code = process.wait(_ENDS_S)
         except subprocess.TimeoutExpired:
-            # It has closed its pipes, and goes on without them.
+            # It has closed its pipes, but still runs.
             process.kill()
             code = process.wait()
         said = ''
@@ -141,8 +141,8 @@ def _read(stream: Any, timeout_s: float) -> bytes:
     """
     Read a message.
 
-    :raises TimeoutError: if it is not there in time.
-    :raises EOFError: if there will be none.
+    :raises TimeoutError: if it does not arrive in time.
+    :raises EOFError: if the stream has ended.
     """
     end_s = time.monotonic() + timeout_s
     data, wanted = b'', _LENGTH.size
@@ -159,12 +159,12 @@ def _read(stream: Any, timeout_s: float) -> bytes:
 
 
 def main() -> NoReturn:
-    """Compute cells that standard input names until it ends; answers go to standard output."""
+    """Compute the cells from standard input until it ends; write results to standard output."""
     contents, memory_bytes = Path(sys.argv[1]), int(sys.argv[2])
-    # Whoever started it is told to stop by a person; it ends when that one does.
+    # Ctrl-C is for the parent process; this one ends together with it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), 'wb')
-    # What planners print is for nobody.
+    # Output of planners must not mix with the results.
     os.dup2(2, 1)
     from crgame_ros.evaluation.cell import cell_of
     from crgame_ros.evaluation.cell_run import compute_cell
@@ -183,14 +183,14 @@ def main() -> NoReturn:
             rows = _failed('error', str(error))
         except Exception as error:
             rows = _failed('error', f'{type(error).__name__}: {error}', traceback.format_exc())
-        # Where the files lie is another place on every machine.
+        # The folder of the files differs between machines.
         here = json.dumps(f'{contents}/')[1:-1]
         _write(answers, json.dumps(rows).replace(here, PREFIX).encode())
     sys.exit(0)
 
 
 def _messages() -> Any:
-    """Yield the texts of cells; when nobody is left who asks, the process ends at once."""
+    """Yield the texts of cells; end the process at once when the parent is gone."""
     waiting: list[str] = []
     there = threading.Semaphore(0)
 
@@ -213,16 +213,16 @@ if __name__ == '__main__':
 
 
 def dask_setup(_worker: Any) -> None:
-    """Let Ctrl-C be for the command alone, which ends its workers."""
+    """Ignore Ctrl-C in the worker: the command handles it, and ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 class Limits(NamedTuple):
     """
-    What a cell may take.
+    The limits of a cell.
 
-    :param timeout_s: of wall time.
-    :param memory_bytes: of data.
+    :param timeout_s: wall time [s]
+    :param memory_bytes: size of data.
     """
 
     timeout_s: float
@@ -230,7 +230,7 @@ class Limits(NamedTuple):
 
 
 def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
-    """Return a content: as a task, so that workers hand it on and lost ones come back."""
+    """Return a content; as a Dask task, so that workers share it and lost ones are recomputed."""
     return packed
 
 
@@ -240,9 +240,9 @@ def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
     Compute a cell in the process of this worker's thread.
 
     :param text: the cell as JSON.
-    :param contents: what it names, packed, by digest.
+    :param contents: its contents, packed, by digest.
     :return: its rows.
-    :raises CrgameError: if this worker has another version than who asked.
+    :raises CrgameError: if this worker's version differs from the client's.
     """
     worker = get_worker()
     if cell_of(text).code[0] != engine_digest():
@@ -260,5 +260,5 @@ def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
         kept[place] = CellProcess(*place)
     rows = kept[place].compute(text, limits.timeout_s)
     rows['work']['worker'] = worker.address
-    # Text is small on its way, and no object of ours has to be known to the scheduler.
+    # Text is small to transfer, and the scheduler needs none of the project's classes.
     return {'rows': json.dumps(rows)}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Computing one cell: an offline run, and its measures."""
+"""Computes one cell: an offline run, and its measures."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,7 +31,7 @@ from crgame_ros.simulation.offline import OfflineResult, PlannerRecord, run_offl
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
 
-# How a planner's reason begins when its code failed: by the name of the exception.
+# A planner's reason begins with the name of an exception if its code failed.
 _CODE_FAILED = re.compile(r'(setup failed: )?(\w*(Error|Exception|Interrupt|Iteration))\b')
 
 
@@ -39,8 +39,8 @@ def run_cell(cell: Cell, contents: Path) -> OfflineResult:
     """
     Run a cell offline.
 
-    :param contents: folder of the store that holds what it names.
-    :raises InputError: if something of it cannot be used.
+    :param contents: folder of the store with its contents.
+    :raises InputError: if a part of it cannot be used.
     """
     setup = cell_setup(cell, contents)
     inputs = _inputs(cell, contents)
@@ -51,9 +51,9 @@ def run_cell(cell: Cell, contents: Path) -> OfflineResult:
 
 def cell_setup(cell: Cell, contents: Path) -> Setup:
     """
-    Load and place what a cell says.
+    Build the setup of a cell.
 
-    :raises InputError: if something of it cannot be used.
+    :raises InputError: if a part of it cannot be used.
     """
     game = parse_game(_resolved(cell.values, contents), cell.label, contents)
     loaded = load_scenario(game.scenario)
@@ -61,7 +61,7 @@ def cell_setup(cell: Cell, contents: Path) -> Setup:
 
 
 def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> Game:
-    """Let a game's AVs and traffic be those of the cell."""
+    """Return a game with the cell's AVs and traffic."""
     choice: dict[str, Any] = {'planner': OWN, 'options': None} \
         if cell.planner_choice is None else _resolved(cell.planner_choice, contents)
 
@@ -92,7 +92,7 @@ def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
 
 
 def measured(cell: Cell, result: OfflineResult) -> TableRun:
-    """Measure a run, as a run to tabulate."""
+    """Return a measured run to tabulate."""
     record = run_record_of(result)
     run = TableRun(cell.key, record, offline=offline_outcome(result))
     found = measure_log(record.log)
@@ -105,8 +105,8 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
     """
     Run and measure a cell.
 
-    :return: its rows as JSON has them: `cell`, `vehicles`, `work`.
-    :raises InputError: if something of it cannot be used.
+    :return: its rows as JSON-compatible values: `cell`, `vehicles`, `work`.
+    :raises InputError: if a part of it cannot be used.
     """
     computed_s = time.process_time()
     result = run_cell(cell, contents)
@@ -124,7 +124,7 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
 
 
 def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
-    """Tell of planners whose code failed; the cell has failed where one never gave a plan."""
+    """Return the failures of planners' code; the cell fails if such a planner never sent a plan."""
     told: dict[str, Any] = {}
     for vehicle, record in planners.items():
         failures = _failures(record)

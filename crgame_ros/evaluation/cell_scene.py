@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a cell takes place: a game, with every file that it names, ready to travel."""
+"""The scene of a cell: a game with all files that it names, ready for transfer to workers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -27,9 +27,9 @@ from crgame_ros.schema.writing import write
 from crgame_ros.simulation.av_assignment import assign_avs
 import numpy as np
 
-# What is for people alone may look like a file's name and is none.
+# Text for people can look like a file's name without being one.
 _FOR_PEOPLE = ('title', 'label', 'name')
-# Drivers of whom nobody is asked: without a page `auto` is nobody at the wheel.
+# Drivers that need no person: without a page, `auto` is an idle driver.
 _DRIVES_ALONE = ('idle', 'auto')
 _FILE = re.compile(r'([a-z]+:)?(/[^\0]+?)(:[A-Za-z_]\w*)?')
 INPUTS = 'inputs.npz'
@@ -44,9 +44,9 @@ class CellScene:
     :param scenario: benchmark id, with the file's name where two files have that id.
     :param game: name of the game's file; empty where there is none.
     :param human: name of the recorded run whose humans drive; empty where there is none.
-    :param values: of the game, as its file would have them; files are references to contents.
-    :param inputs: digest of what the recorded humans did; empty where nobody is recorded.
-    :param digests: of the code of its AVs' planners.
+    :param values: values of the game, as in its file; files are references to contents.
+    :param inputs: digest of the recorded humans' inputs; empty without recorded humans.
+    :param digests: digests of the code of its AVs' planners.
     """
 
     scenario: str
@@ -58,13 +58,13 @@ class CellScene:
 
     @property
     def label(self) -> str:
-        """Name it for people; no other scene of an evaluation is named so."""
+        """Return a name for people, unique in an evaluation."""
         return self.human or self.game or self.scenario
 
 
 def scene_of_game(path: Path, store: ContentStore) -> CellScene:
     """
-    Take a game with its files into a store.
+    Build the scene of a game, and copy its files into a store.
 
     :raises InputError: if the game or one of its files cannot be used.
     """
@@ -81,7 +81,7 @@ def scene_of_game(path: Path, store: ContentStore) -> CellScene:
 
 def scene_of_scenario(path: Path, store: ContentStore) -> CellScene:
     """
-    Take a scenario into a store; nobody but its AVs is driven.
+    Build the scene of a scenario in which only AVs are driven, and copy its file into a store.
 
     :raises InputError: if it cannot be used.
     """
@@ -91,7 +91,7 @@ def scene_of_scenario(path: Path, store: ContentStore) -> CellScene:
 
 def scene_of_run(path: Path, store: ContentStore) -> CellScene:
     """
-    Take a recorded run into a store: its game, and what its humans did.
+    Build the scene of a recorded run: copy its game and its humans' inputs into a store.
 
     :param path: folder of the run, or its recording.
     :raises InputError: if the recording cannot be repeated.
@@ -125,10 +125,10 @@ def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name
 def values_of_game(game: Game, store: ContentStore,
                    loaded: LoadedScenario | None = None) -> dict[str, Any]:
     """
-    Put the files of a game into a store.
+    Copy the files of a game into a store.
 
-    :param loaded: its scenario, where it has been read.
-    :return: what a file of the game would have, with references instead of names of files.
+    :param loaded: its scenario, if it has been loaded already.
+    :return: the values of the game's file, with references instead of file names.
     :raises InputError: if a file cannot be read.
     """
     values = write(game, game.base)
@@ -142,7 +142,7 @@ def values_of_game(game: Game, store: ContentStore,
 
 def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:
     """
-    Put the files that values name into a store.
+    Copy the files that values name into a store.
 
     :param value: mappings, lists and texts, their file names absolute.
     :return: the same, with references instead of names of files.
@@ -164,7 +164,7 @@ def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:
 
 
 def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
-    """Yield a file, and what stands beside it that it names."""
+    """Yield a file, and the files of its folder that it names."""
     files = [file]
     if key == 'occupancy':
         image = read_map_file(file).image
@@ -190,7 +190,8 @@ def files_of(names: tuple[str, ...], base: Path, suffixes: tuple[str, ...],
     """
     Find the files that a plan names.
 
-    :param names: of files, or of folders: all in them with such a suffix, in alphabetical order.
+    :param names: names of files, or of folders: these stand for all their files with such a
+        suffix, in alphabetical order.
     :raises InputError: if there is none.
     """
     found: list[Path] = []
@@ -212,7 +213,7 @@ def runs_of(names: tuple[str, ...], base: Path) -> list[Path]:
     """
     Find the recorded runs that a plan names.
 
-    :param names: of runs' folders or recordings, or of folders of runs.
+    :param names: names of runs' folders or recordings, or of folders of runs.
     :raises InputError: if there is none.
     """
     found: list[Path] = []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files by what they hold: they travel with the cells, and nothing is read from elsewhere."""
+"""Files stored by the digest of their content; workers read no files but these."""
 
 from collections.abc import Mapping
 import hashlib
@@ -14,7 +14,7 @@ import zlib
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import write_bytes
 
-# How a game names a file of the store: its digest, and the name that it had.
+# Prefix of a reference to a file in the store, followed by its digest and its original name.
 PREFIX = 'content:'
 DIGEST_DIGITS = 32
 _DIGEST = re.compile(rf'{PREFIX}([0-9a-f]{{{DIGEST_DIGITS}}})/')
@@ -22,10 +22,10 @@ _DIGEST = re.compile(rf'{PREFIX}([0-9a-f]{{{DIGEST_DIGITS}}})/')
 
 class Content(NamedTuple):
     """
-    A file, with those beside it that it names.
+    A file, with the files of its folder that it names.
 
-    :param name: of the file that is meant.
-    :param files: what each file holds, by its name in the same folder.
+    :param name: name of the main file.
+    :param files: content of each file, by its name in the folder.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Content(NamedTuple):
 
     @property
     def digest(self) -> str:
-        """Name what it holds: SHA-256 over names and bytes, shortened."""
+        """Return the digest: SHA-256 over names and bytes, shortened."""
         total = hashlib.sha256(self.name.encode())
         for name, data in sorted(self.files.items()):
             total.update(f'\0{name}\0{len(data)}\0'.encode() + data)
@@ -41,17 +41,17 @@ class Content(NamedTuple):
 
     @property
     def reference(self) -> str:
-        """Return the text that stands for the file in a game."""
+        """Return the text that refers to the file in a game."""
         return f'{PREFIX}{self.digest}/{self.name}'
 
 
 def digests_in(text: str) -> set[str]:
-    """Find which contents a text refers to."""
+    """Return the digests of the contents that a text refers to."""
     return set(_DIGEST.findall(text))
 
 
 def resolved(text: str, folder: Path) -> str:
-    """Let a text name the files that references stand for, in the folder of a store."""
+    """Replace references in a text by the paths of the files in a store's folder."""
     return _DIGEST.sub(lambda match: f'{folder / match[1]}/', text)
 
 
@@ -59,7 +59,7 @@ class ContentStore:
     """
     A folder with contents, each in a folder named by its digest.
 
-    :param folder: is made when something is put into it.
+    :param folder: folder of the store; it is created with the first content.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -67,7 +67,7 @@ class ContentStore:
 
     def put(self, content: Content) -> str:
         """
-        Keep a content; what is there already is left.
+        Store a content; an existing one is left unchanged.
 
         :return: its digest.
         :raises InputError: if it cannot be written.
@@ -83,7 +83,7 @@ class ContentStore:
                 whole.mkdir()
                 for name, data in content.files.items():
                     write_bytes(data, whole / name)
-                # Another process may have been faster: then it is there.
+                # Another process may have stored it in the meantime.
                 if not place.is_dir():
                     _rename(whole, place)
         except OSError as error:
@@ -93,9 +93,9 @@ class ContentStore:
 
     def packed(self, digest: str) -> dict[str, bytes]:
         """
-        Return what a content holds, file by file, compressed for its way to a worker.
+        Return the files of a content, each compressed for transfer to a worker.
 
-        :raises InputError: if it is not there.
+        :raises InputError: if there is no such content.
         """
         try:
             return {path.name: zlib.compress(path.read_bytes(), 6)
@@ -106,7 +106,7 @@ class ContentStore:
                              'folder') from error
 
     def unpack(self, digest: str, packed: Mapping[str, bytes]) -> None:
-        """Keep what `packed` gave; what is there already is left."""
+        """Store the result of `packed`; an existing content is left unchanged."""
         if not (self.folder / digest).is_dir():
             files = {name: zlib.decompress(data) for name, data in packed.items()}
             found = next((Content(name, files) for name in files

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Dask: the cluster that computes, our own on this machine or somebody's elsewhere."""
+"""The Dask cluster that computes cells: started on this machine, or an existing one elsewhere."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,18 +12,18 @@ from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import extra_install
 
 INSTALL = extra_install('evaluate')
-# A cell whose worker was killed this often has something to do with it.
+# A cell whose worker was killed this often is probably the cause.
 ALLOWED_FAILURES = 5
 _CONNECT_S = 8.0
-# Our own workers load it as they start.
+# Module that workers started here load at start.
 PRELOAD = 'crgame_ros.evaluation.cell_process'
 
 
 def require_dask() -> None:
     """
-    See that Dask is there.
+    Check that Dask is installed.
 
-    :raises InputError: if it is not, with the line that installs it.
+    :raises InputError: if it is not, with the command that installs it.
     """
     try:
         import distributed  # noqa: F401
@@ -36,8 +36,8 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     """
     Connect to a scheduler, or start one with workers on this machine's loopback.
 
-    :param scheduler: address of somebody's; None starts one.
-    :param workers: processes of our own, each with one thread.
+    :param scheduler: address of an existing scheduler; None starts one.
+    :param workers: number of worker processes to start, each with one thread.
     :param dashboard: port of Dask's page, on the loopback; None for no page.
     :return: a `distributed.Client`.
     :raises InputError: if the scheduler does not answer.
@@ -45,7 +45,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     require_dask()
     import dask
     from distributed import Client, LocalCluster
-    # Of workers that end while others work, each line of log would be one of many.
+    # Suppress the many log lines about workers that end while others work.
     for name in (*logging.root.manager.loggerDict, 'tornado.application', 'asyncio'):
         if name.startswith(('distributed', 'tornado', 'asyncio')):
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -61,7 +61,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
         return
     settings = {
         'distributed.scheduler.allowed-failures': ALLOWED_FAILURES,
-        # Cells have processes and a limit of their own.
+        # Cells have their own processes and memory limit.
         'distributed.worker.memory.terminate': False, 'distributed.worker.memory.pause': False,
         'distributed.worker.memory.target': False, 'distributed.worker.memory.spill': False,
         'distributed.worker.preload': [PRELOAD],
@@ -69,7 +69,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     with dask.config.set(settings):
         cluster = LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, host='127.0.0.1',
-            # Without a page, too, the scheduler serves its health: here alone, at any port.
+            # The scheduler serves its health page in any case: on the loopback only, at any port.
             dashboard_address=f'127.0.0.1:{dashboard or 0}', worker_dashboard_address=None,
             scheduler_kwargs={'dashboard': dashboard is not None},
             silence_logs=logging.CRITICAL, memory_limit=0)
@@ -78,13 +78,13 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
 
 
 def default_workers() -> int:
-    """Return a process for each processor that this one may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
 def check_workers(client: Any) -> None:
     """
-    See that workers can compute cells.
+    Check that the workers can compute cells.
 
     :raises CrgameError: if one lacks this package.
     """

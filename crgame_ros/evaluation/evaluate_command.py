@@ -30,9 +30,9 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     """
     Run a cell again, and write its report and its scenario.
 
-    :param folder: of the evaluation.
-    :param key: of the cell, or its first digits.
-    :param say: takes a line for people.
+    :param folder: folder of the evaluation.
+    :param key: key of the cell, or its first digits.
+    :param say: called with a line of progress, for people.
     :return: the report's file.
     :raises InputError: if there is no such cell, or it cannot be run.
     """
@@ -110,7 +110,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run_command(values: argparse.Namespace) -> int:
-    """Evaluate, or look at an evaluation."""
+    """Run an evaluation, or show one."""
     from crgame_ros.evaluation.dask_cluster import require_dask
     from crgame_ros.evaluation.evaluation import evaluate
     from crgame_ros.evaluation.progress import EvaluationProgress
@@ -148,7 +148,7 @@ def _inspect(values: argparse.Namespace) -> int:
 
 
 def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
-    """Return the plan that the command line asks for, and the folder of its evaluation."""
+    """Return the plan given by the command line, and the folder of its evaluation."""
     from crgame_ros.evaluation.folder import EvaluationFolder
     from crgame_ros.evaluation.plan import parse_plan
     from crgame_ros.yaml_text import read_yaml
@@ -176,7 +176,7 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
 
 
 def _given(values: argparse.Namespace) -> dict[str, Any]:
-    """Return what of a plan the command line says."""
+    """Return the values of a plan that the command line gives."""
     given: dict[str, Any] = {
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
         if getattr(values, name)}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluating a plan: cells go out, rows come in, and nothing is done twice."""
+"""Evaluates a plan: sends cells to workers, collects their rows, and computes no cell twice."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,23 +19,23 @@ from crgame_ros.evaluation.results.cell_rows import CELLS
 from crgame_ros.evaluation.results.parts import PART_CELLS, ResultParts
 
 GIGABYTE = 1_000_000_000
-# Cells that are out for each thread that computes: enough that none waits, few enough to hold.
+# Cells submitted per computing thread: enough that none waits, few enough for memory.
 AHEAD = 4
-# So often a cell is handed out again whose worker is gone.
+# How often a cell is submitted again if its worker is gone.
 _ROUNDS = 5
 
 
 @dataclass(frozen=True)
 class Computing:
     """
-    Where and how cells are computed.
+    Settings of the computation.
 
     :param scheduler: address of a Dask scheduler; None starts workers here.
-    :param workers: processes that are started here.
-    :param dashboard: port of Dask's page on the loopback; None for none.
-    :param timeout_s: after which a cell is given up (wall time).
-    :param memory_bytes: that a cell may take.
-    :param part_cells: cells of a part of the tables.
+    :param workers: number of processes started here.
+    :param dashboard: port of Dask's page on the loopback; None for no page.
+    :param timeout_s: wall time after which a cell fails [s]
+    :param memory_bytes: greatest data size of a cell.
+    :param part_cells: number of cells in a part of the tables.
     :param retry: whether cells that failed are computed again.
     """
 
@@ -51,15 +51,15 @@ class Computing:
 @dataclass
 class EvaluationTally:
     """
-    How far an evaluation is.
+    The progress of an evaluation.
 
-    :param total: cells of the plan.
-    :param before: of these, found finished.
-    :param done: finished since, failed ones included.
-    :param failed: failed since.
-    :param put_away: cells in the folder that the plan does not have.
+    :param total: number of cells in the plan.
+    :param before: number of these that were finished before.
+    :param done: number finished since, failed ones included.
+    :param failed: number failed since.
+    :param put_away: number of cells in the folder that are not in the plan.
     :param dashboard: address of Dask's page; empty without one.
-    :param threads: that compute, at the beginning.
+    :param threads: number of computing threads at the beginning.
     """
 
     total: int = 0
@@ -71,7 +71,7 @@ class EvaluationTally:
     threads: int = 0
 
 
-# Is given how far it is; with a cell and its row when one has ended.
+# Called with the progress; with a cell and its row when one has ended.
 Told = Callable[[EvaluationTally, Cell | None, dict[str, Any] | None], object]
 
 
@@ -79,13 +79,13 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
              told: Told = lambda _tally, _cell, _row: None,
              loading: Callable[[float], object] = lambda _: None) -> EvaluationTally:
     """
-    Compute the cells of a plan that are not finished, into tables.
+    Compute the unfinished cells of a plan, and write their rows into tables.
 
-    Whatever ends it, the same call goes on where it was.
+    After an interruption for any reason, the same call continues.
 
-    :param folder: of the evaluation; is made, or one of the same kind.
-    :param computing: where and how.
-    :param told: is given how far it is; with a cell and its row when one has ended.
+    :param folder: folder of the evaluation; it is created, or must be an evaluation's.
+    :param computing: settings of the computation.
+    :param told: called with the progress; with a cell and its row when one has ended.
     :param loading: called with the share of the plan loaded so far, 0 to 1.
     :raises InputError: if plan or folder cannot be used.
     :raises CrgameError: if the scheduler is lost; what was finished is kept.
@@ -106,7 +106,7 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
 
 
 def _sort(parts: ResultParts, grid: CellGrid, retry: bool) -> int:
-    """Put the rows of cells away that are not the plan's, or are to be computed again."""
+    """Put away the rows of cells that are not in the plan, or are to be computed again."""
     wanted = {bytes.fromhex(cell.key) for cell in grid}
     return parts.keep_wanted(lambda key, status: bytes.fromhex(key) in wanted
                              and not (retry and status != 'ok'))
@@ -134,14 +134,14 @@ def _compute(grid: CellGrid, finished: set[bytes], parts: ResultParts, store: Co
 
 
 class _Flight:
-    """Keeps so many cells out that no worker waits, and takes them in as they end."""
+    """The cells in computation: enough that no worker waits, collected as they end."""
 
     def __init__(self, client: Any, store: ContentStore, computing: Computing) -> None:
         from crgame_ros.evaluation.cell_process import Limits
         self._client, self._store = client, store
         self._limits = Limits(computing.timeout_s, computing.memory_bytes)
         self._out: dict[Any, tuple[Cell, int]] = {}
-        # Contents that cells which are out name, and how many do.
+        # Contents of the cells in computation, and the number of these cells for each.
         self._contents: dict[str, Any] = {}
         self._uses: dict[str, int] = {}
 
@@ -176,7 +176,7 @@ class _Flight:
 
     @property
     def threads(self) -> int:
-        """Count the threads that compute now."""
+        """Return the number of computing threads."""
         return sum(worker['nthreads'] for worker in
                    self._client.scheduler_info(n_workers=-1)['workers'].values())
 
@@ -210,7 +210,7 @@ class _Flight:
         """
         Return the rows of a task that has ended; None where it has to be sent again.
 
-        :raises CrgameError: if nobody can compute any.
+        :raises CrgameError: if no worker can compute cells.
         """
         from distributed.scheduler import KilledWorker
         if self._client.status != 'running':

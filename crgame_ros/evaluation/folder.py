@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What lies beside the tables of an evaluation: its plan and its files, to run any cell again."""
+"""The folder of an evaluation: its plan and files beside the tables, to repeat any cell."""
 
 import json
 from pathlib import Path
@@ -26,8 +26,8 @@ class EvaluationFolder:
     """
     An evaluation on disk.
 
-    :param path: of its folder; it is made if it is not there.
-    :raises InputError: if it cannot be written, or something else is in it.
+    :param path: path of its folder; it is created if it is missing.
+    :raises InputError: if it cannot be written, or contains other files.
     """
 
     def __init__(self, path: Path) -> None:
@@ -36,9 +36,9 @@ class EvaluationFolder:
 
     def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:
         """
-        Note what is evaluated.
+        Write the plan and the grid.
 
-        :raises InputError: if the folder cannot be written, or is somebody else's.
+        :raises InputError: if the folder cannot be written, or is in use by another process.
         """
         prepare_folder(self.path)
         if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \
@@ -57,7 +57,7 @@ class EvaluationFolder:
 
     def find(self, key: str) -> Cell:
         """
-        Find a cell by its key, or by as many of its first digits as tell it.
+        Return a cell by its key, or by enough first digits to identify it.
 
         :raises InputError: if there is none, or several.
         """
@@ -69,7 +69,7 @@ class EvaluationFolder:
 
     def grid(self) -> CellGrid:
         """
-        Read which cells there are, as they were planned.
+        Read the grid of the cells planned.
 
         :raises InputError: if the folder holds no evaluation.
         """
@@ -86,7 +86,7 @@ class EvaluationFolder:
 
     @property
     def base(self) -> Path:
-        """Name the directory against which the plan's file names are resolved."""
+        """Return the directory against which the plan's file names are resolved."""
         return Path(self._note()['base'])
 
     def _note(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What to evaluate, as a plan's file or the command line says it."""
+"""The plan of an evaluation, from its file or the command line."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class PlannerChoice:
 
     :param planner: registered name, `module:Class` or `FILE.py:Class`; `own` leaves each AV the
         planner that its game names.
-    :param label: by which tables name it; the planner's name by default.
+    :param label: name in tables; the planner's name by default.
     :param options: keyword arguments of the planner.
     """
 
@@ -39,7 +39,7 @@ class PlannerChoice:
 
     @property
     def name(self) -> str:
-        """Return the label, or what stands for it."""
+        """Return the label, or its default."""
         return self.label or self.planner.rpartition('/')[2]
 
 
@@ -79,7 +79,7 @@ class EvaluationPlan:
     base: Annotated[Path, Folder()] = Path('.')
 
     def check(self) -> None:
-        """Refuse what cannot be a plan."""
+        """Check that the plan is valid."""
         if not (self.games or self.scenarios or self.humans):
             raise InputError('names no games, scenarios or humans', '',
                              'name files or folders of one of them')
@@ -101,7 +101,7 @@ class EvaluationPlan:
                          'give seeds: 5, or seeds: [3, 7]')
 
     def perceptions(self) -> dict[str, PerceptionSpec | str | None]:
-        """Return each kind of perception by its label; OWN is the games' own, None is perfect."""
+        """Return each perception by its label; OWN is the games' own, None is perfect."""
         return _choices(self.perception, PerceptionSpec, 'perception', self.base)
 
     def traffics(self) -> dict[str, TrafficSpec | str | None]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far an evaluation is, for people: a bar on a terminal, a line now and then elsewhere."""
+"""Shows an evaluation's progress: a bar on a terminal, periodic lines elsewhere."""
 
 from collections.abc import Callable
 import sys
@@ -11,18 +11,18 @@ from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.evaluation import EvaluationTally
 
 BAR = 24
-# So often a line is written where there is no terminal, and the bar where there is one [s].
+# Period of lines without a terminal, and of the bar on a terminal [s].
 PERIOD_S, BAR_PERIOD_S = 10.0, 0.2
-# Of more failures than this only the number is told; the tables have them all.
+# Beyond this number of failures, only their count is shown; the tables have them all.
 TOLD_FAILURES = 20
 
 
 class EvaluationProgress:
     """
-    Tells of cells as they end.
+    The display of an evaluation's progress.
 
-    :param stream: where.
-    :param clock: gives the time [s].
+    :param stream: stream to write to.
+    :param clock: returns the time [s].
     """
 
     def __init__(self, stream: TextIO = sys.stderr,
@@ -35,7 +35,7 @@ class EvaluationProgress:
 
     def __call__(self, tally: EvaluationTally, cell: Cell | None,
                  row: dict[str, Any] | None) -> None:
-        """Take in how far it is; with a cell and its row when one has ended."""
+        """Update the display; a cell and its row are given when one has ended."""
         now_s = self._clock()
         if self._begin_s is None:
             self._begin_s = self._told_s = now_s

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which code a cell depends on: a change of one planner is no change of the others."""
+"""Digests of the code that a cell depends on, separate for the engine and each planner."""
 
 import ast
 from collections.abc import Iterator
@@ -13,16 +13,16 @@ import crgame_ros
 from crgame_ros import __version__
 from crgame_ros.planner.registry import BUILT_IN, EXTERNAL, planner_class
 
-# More of one planner would better be installed where the workers are [bytes].
+# A larger planner should be installed on the workers instead [bytes].
 MOST_BYTES = 512 * 1024 * 1024
 
 
 def code_neighbours(file: Path) -> list[Path]:
     """
-    Find the files in the folder of a Python file whose names stand in its source as texts.
+    Find the files in a Python file's folder whose names are string literals in its source.
 
-    `Path(__file__).with_name('weights.npz')` names one so. Python files among them are read in
-    the same way; a file that is no Python has no neighbours.
+    An example is `Path(__file__).with_name('weights.npz')`. Python files among them are searched
+    in the same way; a file that is not Python has no neighbours.
 
     :return: in alphabetical order, without the file itself.
     """
@@ -37,13 +37,13 @@ def code_neighbours(file: Path) -> list[Path]:
 
 
 def _texts(file: Path) -> Iterator[str]:
-    """Yield the texts in a Python file that can be the name of a file in the same folder."""
+    """Yield string literals of a Python file that can be names of files in the same folder."""
     if file.suffix != '.py':
         return
     try:
         tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
-        # Whoever loads it says why it cannot be used.
+        # The error is reported when the file is loaded.
         return
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) \
@@ -52,7 +52,7 @@ def _texts(file: Path) -> Iterator[str]:
             yield node.value
 
 
-# Folders and modules whose code no offline run and no measure executes.
+# Folders and modules that offline runs and measures never execute.
 WITHOUT = ('cockpit', 'nodes', 'ros', 'launcher', 'evaluation/summary', 'analysis/pictures',
            'analysis/report', 'analysis/reproduction', 'gym', 'python_interface', 'cli.py',
            'doctor.py')
@@ -60,7 +60,7 @@ WITHOUT = ('cockpit', 'nodes', 'ros', 'launcher', 'evaluation/summary', 'analysi
 
 @cache
 def engine_digest() -> str:
-    """Return the SHA-256 over the version and the code that every cell runs, without planners'."""
+    """Return the SHA-256 over the version and the code of every cell, without planners."""
     package = Path(crgame_ros.__file__).parent
     planners = {f'{target.partition(":")[0].rpartition(".")[2]}.py'
                 for target in BUILT_IN.values()}
@@ -78,7 +78,7 @@ def planner_digest(name: str) -> str:
     """
     Return the SHA-256 over the code of the module that defines a planner.
 
-    :param name: as a game names it.
+    :param name: its name in a game.
     :raises InputError: if there is no such planner.
     """
     if name == EXTERNAL:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The outlines that rays can hit: of everything that can appear, placed in the map."""
+"""The outlines of all bodies that rays can hit, placed in the map."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class Edges(NamedTuple):
     :param corners: (C, 2) corners of the bodies [m]
     :param first: (S) corner at which an edge begins
     :param second: (S) corner at which it ends
-    :param body: (S) whose edge it is
+    :param body: (S) body of each edge
     """
 
     corners: Array
@@ -36,7 +36,7 @@ class Discs(NamedTuple):
 
     :param centers: (D, 2) [m]
     :param radii: (D) [m]
-    :param body: (D) which body it is
+    :param body: (D) number of the body
     """
 
     centers: Array
@@ -48,7 +48,7 @@ class SensedBodies:
     """
     The bodies of everything that can appear: rectangles and polygons as edges, circles as discs.
 
-    :param descriptions: of all things, whose order numbers the bodies
+    :param descriptions: of all things; their order numbers the bodies
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription]) -> None:
@@ -72,7 +72,7 @@ class SensedBodies:
 
     def place(self, poses: Array) -> None:
         """
-        Put the bodies where they are.
+        Set the poses of the bodies.
 
         :param poses: (M, 3) centre x, y [m] and yaw [rad]; NaN where absent
         """
@@ -86,7 +86,7 @@ class SensedBodies:
     def near(self, x: float, y: float, reach: float) -> tuple[Edges, Discs]:
         """Return the outlines of bodies that may be within `reach` of a point [m]."""
         distance = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
-        # False where absent: a comparison with NaN.
+        # False where absent, by comparison with NaN.
         close = distance <= self.radii + reach
         discs = self._discs[close[self._discs]]
         kept = np.flatnonzero(close[self._body])

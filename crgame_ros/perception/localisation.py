@@ -7,8 +7,8 @@ The filter's states are x, y, yaw and v of the rear axle. It predicts by the kin
 
     x' = v cos(yaw),  y' = v sin(yaw),  yaw' = w,  v' = a
 
-whose inputs, the changes of heading and speed since the last step, an inertial unit measures with
-white noise, and is corrected by measurements of all four (Thrun, Burgard, Fox: Probabilistic
+An inertial unit measures its inputs, the changes of heading and speed since the last step, with
+white noise. Measurements of all four states correct it (Thrun, Burgard, Fox: Probabilistic
 Robotics, 2005, table 3.3). Its noise covariances are those of the noise that is injected.
 """
 
@@ -30,16 +30,16 @@ _HEADING, _SPEED_CHANGE, _WALK, _MEASUREMENT, _WIDTH = 0, 1, 2, 4, 8
 
 class Localisation:
     """
-    Where an AV takes itself to be, in simulation coordinates.
+    The estimated state of an AV, in simulation coordinates.
 
     It begins with the measurement of step 0. Steering angle, acceleration, yaw rate and steering
-    rate of the estimate are the true ones, as the vehicle's own sensors give them: they do not
-    depend on localisation. Steps may be left out; the inertial unit then hands over the change
-    since the last one.
+    rate of the estimate are the true ones, from the vehicle's own sensors, because they do not
+    depend on localisation. Steps may be left out; the inertial unit then measures the change since
+    the last one.
 
     :param spec: noise, bias and rates
     :param seed: of the noise
-    :param name: of the vehicle, which makes its noise its own
+    :param name: of the vehicle, so that its noise is independent
     :param initial: true state at step 0
     :param dt_s: simulation step [s]
     """
@@ -66,9 +66,9 @@ class Localisation:
     @property
     def estimate(self) -> VehicleState:
         """
-        Return the vehicle's state as the filter has it.
+        Return the vehicle's state as estimated by the filter.
 
-        Its speed never has the wrong sign: the gear is known.
+        Its speed never has the wrong sign, because the gear is known.
         """
         x, y, yaw, speed = self._state.tolist()
         truth = self._truth
@@ -77,7 +77,9 @@ class Localisation:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (4, 4) of the estimated x [m], y [m], yaw [rad] and speed [m/s]."""
+        """
+        Return the covariance (4, 4) of the estimated x [m], y [m], yaw [rad] and speed [m/s].
+        """
         return self._covariance.copy()
 
     @property
@@ -87,7 +89,7 @@ class Localisation:
 
     def step(self, n: int, truth: VehicleState) -> None:
         """
-        Take a step into account; steps up to the last one say nothing new.
+        Update the estimate with a step; ignore steps up to the last one.
 
         :param truth: the true state at n
         """
@@ -103,7 +105,9 @@ class Localisation:
             self._correct(n, truth)
 
     def _predict(self, steps: int, truth: VehicleState, rows: Array) -> None:
-        """Move the estimate on by what the inertial unit measured, with its noise summed up."""
+        """
+        Predict the estimate from the inertial unit's measurements, with their noise summed up.
+        """
         spec, before, time_s = self._spec, self._truth, steps * self._dt_s
         unit = math.sqrt(self._dt_s)
         turn = wrap_pi(truth.yaw - before.yaw) + spec.yaw_rate_noise * unit * rows[_HEADING]
@@ -125,7 +129,7 @@ class Localisation:
         self._covariance = 0.5 * (covariance + covariance.T)
 
     def _correct(self, n: int, truth: VehicleState) -> None:
-        """Use a measurement of the pose and the speed; of the speed alone in a dropout."""
+        """Correct by a measurement of pose and speed; in a dropout, of the speed alone."""
         deviations = self._deviations(truth)
         measured = slice(3, STATES) if self.lost else slice(0, STATES)
         innovation = self._measurement(n, truth, deviations) - self._state
@@ -135,7 +139,7 @@ class Localisation:
         gain = np.linalg.solve(covariance[measured, measured] + noise, covariance[measured]).T
         self._state += gain @ innovation[measured]
         self._state[2] = wrap_pi(float(self._state[2]))
-        # Joseph's form: stays positive definite whatever the rounding.
+        # Joseph's form stays positive definite in spite of rounding.
         remaining = np.eye(STATES)
         remaining[:, measured] -= gain
         covariance = remaining @ covariance @ remaining.T + gain @ noise @ gain.T
@@ -159,7 +163,7 @@ class Localisation:
         return measured
 
     def _find_dropouts(self, n: int) -> None:
-        """Let dropouts begin in the steps up to n, whether or not they were asked for."""
+        """Find the dropouts that begin in the steps up to n, including steps left out."""
         if not self._lost_probability:
             return
         for step in range(max(self._n + 1, n - self._lost_steps), n + 1):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Random numbers that belong to a step, whatever was drawn before."""
+"""Random numbers that depend on the step only, not on earlier draws."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +13,18 @@ class KeyedNoise:
     A row of random numbers for each step n, from a counter-based generator (Philox).
 
     The rows of a block of steps come from one generator, whose counter is the block's number and
-    whose key is seed and name. A row therefore depends on (seed, name, n) only: a step that
-    nobody asks for changes no other.
+    whose key is seed and name. A row therefore depends on (seed, name, n) only: a step that is
+    left out changes no other.
 
     :param seed: of the run
     :param name: of the stream; streams of different names are independent
     :param width: normal numbers in a row
-    :param block: steps generated at once; larger is cheaper where every step is asked for
+    :param block: steps generated at once; larger is cheaper where every step is used
     """
 
     def __init__(self, seed: int, name: str, width: int, block: int = 256) -> None:
         words = np.frombuffer(name.encode(), dtype=np.uint8).tolist()
-        # The length keeps streams of names that begin alike apart.
+        # The length separates streams whose names begin alike.
         self._key = np.random.SeedSequence([seed, len(words), *words]).generate_state(
             2, np.uint64)
         self._width = width

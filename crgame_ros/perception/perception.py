@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The perception of an AV: turns the engine's true request into what the AV knows (FS II-B)."""
+"""The perception of an AV: it turns the engine's true request into a perceived one (FS II-B)."""
 
 from collections.abc import Callable, Sequence
 import math
@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# What a road vehicle turns at most: the tightest curve [1/m] and the force that its tyres and
-# passengers bear [m/s^2]. Recorded headings are too rough to be trusted beyond that.
+# Limits of a road vehicle's turn: the tightest curvature [1/m] and the largest lateral
+# acceleration [m/s^2]. Beyond them, recorded headings are too rough.
 MAX_CURVATURE = 0.2
 MAX_LATERAL_ACCELERATION = 4.0
 
@@ -35,8 +35,8 @@ class Tracks:
     """
     The last seen state of each thing that can appear.
 
-    Which thing it was is known: identities are kept, no measurement is attributed to another.
-    Things move on at constant velocity, vehicles that are seen turning at constant turn rate.
+    Identities are known: no measurement is attributed to the wrong thing. Things move on at
+    constant velocity, turning vehicles at constant turn rate.
 
     :param turning: (T) whether a thing turns as vehicles do
     :param dt_s: simulation step [s]
@@ -54,7 +54,7 @@ class Tracks:
     def update(self, things: Index, n: int, until_n: int, poses: Array,
                velocities: Array) -> None:
         """
-        Take what was seen at step n; an older view does not replace a newer one.
+        Update with the things seen at step n; an older view does not replace a newer one.
 
         :param things: (D) which things
         :param until_n: the step at which they are forgotten, unless they are seen again
@@ -75,7 +75,7 @@ class Tracks:
 
     def predict(self, things: Index, n: int, times_s: Array) -> tuple[Array, Array]:
         """
-        Return where known things are at step n and go from there.
+        Return the predicted motion of known things from step n on.
 
         :param things: (D) which things
         :param times_s: (P) from n on [s]
@@ -89,7 +89,7 @@ class Tracks:
                            MAX_LATERAL_ACCELERATION / np.maximum(speed, 1e-3))
         rate = np.where(self._turning[things], np.clip(velocities[:, 2], -limit, limit), 0.0)
         turn = rate * time
-        # A chord of an arc is v t sinc(half the turn) long.
+        # The chord of an arc has the length v t sinc(half the turn).
         chord = time * np.sinc(turn / (2.0 * np.pi))
         moved = chord[..., None] * _rotated(velocities, 0.5 * turn)
         ahead = np.concatenate((poses[:, :2] + moved, (poses[:, 2] + turn)[..., None]), axis=-1)
@@ -100,7 +100,7 @@ class Tracks:
 
 
 def _rotated(velocities: Array, turn: Array) -> Array:
-    """Rotate velocities (D, 3) by angles (P, D); gives (P, D, 2)."""
+    """Rotate velocities (D, 3) by angles (P, D) to (P, D, 2)."""
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = velocities[:, 0], velocities[:, 1]
     return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
@@ -108,12 +108,12 @@ def _rotated(velocities: Array, turn: Array) -> Array:
 
 GridSource = Callable[[Array, float], OccupancyGrid | None]
 
-# Their heading says little of where they go.
+# Their heading says little about their direction of motion.
 FREE_MOVERS = ('pedestrian', 'unknown')
 
 
 class _View(NamedTuple):
-    """What one scan saw, on its way to being known at step `due_n`."""
+    """The things that one scan saw; they become known at step `due_n`."""
 
     due_n: int
     n: int
@@ -125,14 +125,14 @@ class _View(NamedTuple):
 
 class Perception:
     """
-    What one AV knows, step by step.
+    The knowledge of one AV, step by step.
 
-    The truth comes in at every simulation step, in simulation coordinates; a step that is lost
-    leaves the random numbers of all others as they are. What sensors see is placed in the map by
-    the estimated pose, so that an error of localisation shifts everything seen alike.
+    The truth comes in at every simulation step, in simulation coordinates; a lost step does not
+    change the random numbers of others. Detections are placed in the map by the estimated pose, so
+    that an error of localisation shifts all of them alike.
 
     :param av_id: av0, …
-    :param spec: what the game says
+    :param spec: from the game
     :param descriptions: driven vehicles in their order, then objects
     :param vehicle: parameters of the AV
     :param transform: from simulation to the AV's scenario coordinates (CRG 6-8)
@@ -140,7 +140,7 @@ class Perception:
     :param seed: the game's, for a specification without a seed of its own
     :param dt_s: simulation step [s]
     :param occupancy: permanent obstacles, or a function of points (N, 2) and a reach [m]
-    :raises InputError: if a sensor cannot be made.
+    :raises InputError: if a sensor cannot be created.
     """
 
     def __init__(self, av_id: str, spec: PerceptionSpec,
@@ -172,27 +172,27 @@ class Perception:
         self._n = 0
         self._truth = initial
         self._present = np.ones(len(self._ids), dtype=bool)
-        # Of the requests' names: who is meant, and their columns.
+        # From the requests' joint names: the indices of the things, and their columns.
         self._layout: tuple[tuple[str, ...], NDArray[np.intp], NDArray[np.intp]] | None = None
 
     @property
     def estimate(self) -> VehicleState:
-        """Where the AV takes itself to be, in simulation coordinates."""
+        """Return the AV's estimated state, in simulation coordinates."""
         return self._truth if self._localisation is None else self._localisation.estimate
 
     @property
     def covariance(self) -> Array:
-        """Covariance (4, 4) of the estimated x, y, yaw and speed; zero where they are known."""
+        """Return the covariance (4, 4) of the estimated x, y, yaw and speed; zero if exact."""
         return np.zeros((4, 4)) if self._localisation is None else self._localisation.covariance
 
     @property
     def scans(self) -> tuple[tuple[SensorSpec, int, Scan], ...]:
-        """Return the latest scan of each sensor and the step n that it was made at."""
+        """Return the latest scan of each sensor and its step n."""
         return tuple(self._scans.values())
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Whether each thing (V + M) is known at present: seen, remembered or the AV itself."""
+        """Return which things (V + M) are known now: seen, remembered or the AV itself."""
         known = self._tracks.known(self._n) if self._sensors else self._present.copy()
         known[self._own] = True
         return known
@@ -200,13 +200,13 @@ class Perception:
     def observe(self, n: int, vehicle_states: Array, object_poses: Array,
                 object_velocities: Array, objects_age_s: float = 0.0) -> None:
         """
-        Take the truth at simulation step n, in simulation coordinates.
+        Observe the truth at simulation step n, in simulation coordinates.
 
         :param vehicle_states: (V, 8) rear-axle states of driven vehicles
         :param object_poses: (M, 3) centre poses of objects; NaN where absent
         :param object_velocities: (M, 3)
-        :param objects_age_s: time since the objects were where they are said to be, over which
-            they have kept their velocity: they move at scenario steps only [s]
+        :param objects_age_s: age of the objects' poses, over which they have kept their velocity:
+            objects are updated at scenario steps only [s]
         """
         self._n = n
         self._truth = VehicleState(*vehicle_states[self._own].tolist())
@@ -227,10 +227,10 @@ class Perception:
         Turn a true request into the one that the planner gets.
 
         :param request: of the step last observed, in the AV's scenario coordinates
-        :return: the same times. The AV itself is where it takes itself to be; objects that are
-            neither seen nor remembered are left out, driven vehicles are NaN then; all others are
-            where they were seen, moved on. Their steering angles and accelerations are not
-            observable: NaN. So are lights of who is remembered only.
+        :return: the same times. The AV itself has its estimated state. Objects that are neither
+            seen nor remembered are left out; driven vehicles are NaN then. All others are
+            extrapolated from where they were seen. Their steering angles and accelerations are not
+            observable and NaN, as are the lights of vehicles that are only remembered.
         :raises InputError: if it names something that was not described.
         """
         if self._localisation is None and not self._sensors:
@@ -249,17 +249,17 @@ class Perception:
         return with_lights(told, self._in_view(lights)) if lights else told
 
     def _in_view(self, lights: dict[str, float]) -> dict[str, float]:
-        """Keep the lights of whom the last scans saw; of others they are NaN."""
+        """Return the lights of vehicles that the last scans saw; NaN for others."""
         if not self._sensors:
             return lights
-        # Known even if nothing were remembered.
+        # Seen now, so known even without memory.
         in_view = self._tracks.known(self._n + self._memory)
         return {name: bits if in_view[self._ids.index(name)] else math.nan
                 for name, bits in lights.items()}
 
     def _scan(self, n: int, firing: Sequence[MountedSensor], vehicle_states: Array,
               object_poses: Array, object_velocities: Array) -> None:
-        """Let sensors look at the world; what they see is known after their latency."""
+        """Scan the world with sensors; their detections become known after their latency."""
         poses = np.concatenate((vehicle_states[:, :3], object_poses))
         velocities = np.concatenate((pose_rates(vehicle_states), object_velocities))
         centers = np.concatenate((shifted(vehicle_states[:, :3], self._to_center), object_poses))
@@ -282,7 +282,7 @@ class Perception:
 
     def _placed(self, poses: Array, velocities: Array,
                 found: Detections) -> tuple[Array, Array]:
-        """Place what a sensor sees (D, 3) in the map, by the estimated pose and with noise."""
+        """Place a sensor's detections (D, 3) in the map, by the estimated pose and with noise."""
         if self._localisation is not None:
             truth, estimate = self._truth, self._localisation.estimate
             turn = estimate.yaw - truth.yaw
@@ -306,7 +306,7 @@ class Perception:
 
     def _fill(self, request: JointSeries, positions: Array, velocities: Array,
               accelerations: Array) -> None:
-        """Put what is known of others into a request, and nothing else."""
+        """Fill a request with the known data of the others, and nothing else."""
         if self._layout is None or self._layout[0] != request.names:
             found = RequestLayout.from_names(request.names, self.av_id,
                                              f'/{self.av_id}/true_request')
@@ -319,7 +319,7 @@ class Perception:
         things, columns = told[known], where[known]
         times_s = 1e-9 * request.times_ns.astype(np.float64)
         poses, rates = self._tracks.predict(things, self._n, times_s)
-        # As the engine does: everybody in the AV's scenario coordinates.
+        # As in the engine: all in the AV's scenario coordinates.
         if not self._transform.is_identity:
             poses = self._transform.to_scenario(poses)
             rates[..., :2] = self._transform.turn_to_scenario(rates[..., :2])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-# Of the spacing of rays: takes in a ray that only rounding keeps out of a sector.
+# Share of the spacing of rays: includes a ray that only rounding excludes from a sector.
 _ROUNDING = 1e-9
 
 
@@ -22,7 +22,8 @@ class RayFan:
     """
     Rays over a field of view, the first and the last on its borders.
 
-    Over a full circle the rays are spaced evenly, so that the last does not double the first.
+    Over a full circle the rays are spaced evenly, so that the last does not coincide with the
+    first.
 
     :param field_of_view: full angle [rad]
     :param rays: number of rays
@@ -46,7 +47,7 @@ class RayFan:
         :return: (Q) rays and (Q) sectors, of every pair
         """
         begin = np.mod(start - self._first, 2.0 * np.pi)
-        # A sector beyond a full turn from the first ray covers rays at the beginning again.
+        # A sector that extends a full turn beyond the first ray covers rays at the beginning too.
         begin = np.concatenate((begin, begin - 2.0 * np.pi)) / self._spacing
         end = begin + np.concatenate((width, width)) / self._spacing
         low = np.maximum(np.ceil(begin - _ROUNDING), 0.0).astype(np.intp)
@@ -60,10 +61,10 @@ class RayFan:
 
 class BorderCells:
     """
-    The occupied cells with a free side, or on the border, of the grid last asked about.
+    The occupied cells with a free side, or on the border, of the grid last used.
 
-    A ray that enters an occupied region from outside does so through one of them. They are found
-    once for each grid: maps give the same object as long as the same part of them is needed.
+    A ray enters an occupied region from outside through one of them. They are found once for each
+    grid: maps return the same object as long as the same part of them is needed.
     """
 
     def __init__(self) -> None:
@@ -72,7 +73,7 @@ class BorderCells:
 
     def near(self, grid: OccupancyGrid, x: float, y: float, reach: float) -> Array:
         """
-        List those around a point.
+        Return the cells around a point.
 
         :param x: of the point [m]
         :param y: of the point [m]
@@ -100,7 +101,7 @@ def _border(grid: OccupancyGrid) -> Array:
     return corners
 
 
-# Of pairs of a ray and something in its sector: rays, distances, bodies.
+# Pairs of a ray and something in its sector: rays, distances, bodies.
 Pairs = tuple[Index, Array, Index]
 # Sine of the angle below which a ray runs along an edge.
 _EDGE_ON = 1e-9
@@ -108,10 +109,10 @@ _EDGE_ON = 1e-9
 
 class RayCaster(Sensor):
     """
-    Trace straight rays up to the horizon; each stops at the first thing that it meets.
+    A sensor of straight rays up to the horizon; each stops at the first thing that it meets.
 
-    Only the rays in the sector that an edge, disc or cell covers, seen from the sensor, are
-    intersected with it, so that the time grows with what is seen and not with rays times things.
+    An edge, disc or cell is intersected only with the rays in the sector that it covers, seen from
+    the sensor. So the time grows with the number of hits, not with rays times things.
     """
 
     def __init__(self, spec: SensorSpec) -> None:
@@ -135,7 +136,8 @@ class RayCaster(Sensor):
         ranges = np.full(len(rays), np.inf)
         np.minimum.at(ranges, ray, distance)
         hits = np.full(len(rays), NOTHING, dtype=np.intp)
-        # Of things at the same distance the first is hit: of repeated indices the last one stays.
+        # Of things at the same distance the first is hit: of repeated indices the last one is
+        # kept.
         nearest = np.flatnonzero(distance == ranges[ray])[::-1]
         hits[ray[nearest]] = body[nearest]
         return Scan(self._fan.angles, ranges, hits, pose)
@@ -151,7 +153,7 @@ class RayCaster(Sensor):
         begin = corners[edges.first[edge]]
         along = corners[edges.second[edge]] - begin
         across = _cross(rays[ray], along)
-        # Seen from its end, an edge hides behind its neighbours; rounding would decide the rest.
+        # Seen from its end, an edge hides behind its neighbours; otherwise rounding would decide.
         met = np.flatnonzero(np.abs(across) > _EDGE_ON * np.hypot(along[:, 0], along[:, 1]))
         distance = _cross(begin[met], along[met]) / across[met]
         return ray[met], np.maximum(distance, 0.0), edges.body[edge[met]]
@@ -188,7 +190,7 @@ class RayCaster(Sensor):
         # The slabs between a square's sides (Kay, Kajiya 1986).
         with np.errstate(invalid='ignore', divide='ignore'):
             first, second = low[cell] / rays[ray], (low[cell] + edge) / rays[ray]
-        # 0 / 0: the ray runs on the line of a side, which belongs to the square.
+        # 0 / 0: the ray runs along a side, which belongs to the square.
         first[np.isnan(first)] = -np.inf
         second[np.isnan(second)] = np.inf
         enter = np.minimum(first, second).max(axis=1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of virtual sensors (FS II-B2), and those that a game may name."""
+"""The interface of virtual sensors (FS II-B2), and the sensors that a game may name."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -32,11 +32,11 @@ _PER_THING = 5
 @dataclass(frozen=True)
 class Scan:
     """
-    What the rays of a sensor met.
+    The hits of a sensor's rays.
 
     :param angles: (R) directions from the sensor's own, counter-clockwise [rad]
-    :param ranges: (R) distance to what is hit, inf where nothing is within the horizon [m]
-    :param hits: (R) index of the body that is hit, `NOTHING` (-1) or `PERMANENT` (-2)
+    :param ranges: (R) distance to the hit, inf where nothing is within the horizon [m]
+    :param hits: (R) index of the hit body, `NOTHING` (-1) or `PERMANENT` (-2)
     :param pose: x, y [m] and yaw [rad] of the sensor in simulation coordinates
     """
 
@@ -48,10 +48,10 @@ class Scan:
 
 class Sensor(ABC):
     """
-    A model of a ranger. It is exact: noise is added to what it gives.
+    A model of a ranging sensor. It is exact: noise is added to its result.
 
-    A model of a user's own takes `spec` and its options, which it annotates, as keyword arguments
-    of its constructor.
+    The constructor of a user's model takes `spec` and its options, with annotations, as keyword
+    arguments.
 
     :param spec: mounting, field of view, horizon and rays
     """
@@ -65,7 +65,7 @@ class Sensor(ABC):
         Sense the world.
 
         :param pose: x, y [m] and yaw [rad] of the sensor in the map
-        :param bodies: everything that is there but the sensor's own vehicle
+        :param bodies: all present bodies except the sensor's own vehicle
         :param grid: permanent obstacles around the sensor
         """
 
@@ -77,10 +77,10 @@ SENSORS = ModelRegistry(
 
 def create_sensor(spec: SensorSpec, where: str = '') -> Sensor:
     """
-    Make the sensor of a specification.
+    Create the sensor of a specification.
 
     :param where: the file and key that named it, for messages
-    :raises InputError: if there is none of that name, or it refuses its options.
+    :raises InputError: if there is no sensor of that name, or it refuses its options.
     """
     made: Sensor = SENSORS.create(spec.model, spec.options, where, spec=spec)
     return made
@@ -90,7 +90,7 @@ class Detections(NamedTuple):
     """
     The things that a scan reached.
 
-    :param things: (D) which
+    :param things: (D) indices of the things
     :param pose_errors: (D, 3) of x, y [m] and yaw [rad]
     :param velocity_errors: (D, 2) of the velocity's components [m/s]
     """
@@ -104,7 +104,7 @@ class MountedSensor:
     """
     One sensor of an AV.
 
-    :param spec: what it is and where it sits
+    :param spec: its kind and mounting
     :param vehicle: that carries it
     :param count: number of things that can appear
     :param seed: of its noise
@@ -120,16 +120,16 @@ class MountedSensor:
         self.mount = spec.mount(vehicle.rear_to_center, vehicle.length)
         self._count = count
         self._sensor = create_sensor(spec, f'sensor {spec.name} of {name}')
-        # Scans are rare: a block would draw rows that nobody asks for.
+        # Scans are rare: a block would draw unused rows.
         self._noise = KeyedNoise(seed, f'{name}/sensor/{spec.name}',
                                  _PER_THING * count + spec.rays, block=1)
 
     def fires(self, n: int) -> bool:
-        """Return whether it scans at step n."""
+        """Return whether the sensor scans at step n."""
         return n % self.period == 0
 
     def pose(self, carrier: VehicleState) -> Pose:
-        """Return its x, y [m] and yaw [rad] on a vehicle in some state."""
+        """Return the sensor's x, y [m] and yaw [rad] on a vehicle in a given state."""
         x, y, yaw = self.mount
         cos, sin = math.cos(carrier.yaw), math.sin(carrier.yaw)
         return (carrier.x + cos * x - sin * y, carrier.y + sin * x + cos * y,
@@ -141,7 +141,7 @@ class MountedSensor:
         Scan the world at step n.
 
         :param carrier: the true state of its vehicle
-        :raises InputError: if a model of the user's own gives no proper scan.
+        :raises InputError: if a user's model returns no valid scan.
         """
         spec = self.spec
         pose = self.pose(carrier)

@@ -22,14 +22,13 @@ Clock = Callable[[], float]
 @dataclass
 class PlannerStatistics:
     """
-    What a planner did so far.
+    Statistics of a planner's answers so far.
 
     :param plans: answers given, braking plans included.
     :param fallbacks: braking plans given.
     :param reasons: how often each reason for braking occurred, numbers replaced by `#`.
     :param durations_s: duration of each call; empty without a clock [s]
-    :param failure: where the planner's code first failed, as Python tells it; empty if it never
-        did.
+    :param failure: traceback of the first failure of the planner's code; empty without one.
     """
 
     plans: int = 0
@@ -41,12 +40,12 @@ class PlannerStatistics:
 
 class PlannerAdapter:
     """
-    Run a planner so that it always answers.
+    A wrapper around a planner that always answers.
 
-    Any exception of its `setup` or `plan`, and any plan that has the wrong stamp, numbers that
-    are not finite or another first state than the request, or that leaves the road further than
-    it starts off it, is replaced by a braking plan along the last one (`Plan.fallback` is set)
-    and counted. Exits and interrupts pass.
+    A braking plan along the last plan (`Plan.fallback` is set) is the answer if `setup` or `plan`
+    raises an exception, or if the plan has the wrong stamp, numbers that are not finite, another
+    first state than the request, or leaves the road further than its start is off it. These
+    fallbacks are counted. Exits and interrupts pass.
 
     :param planner: the planner.
     :param clock: seconds from a steady clock, to time each call; None measures nothing.
@@ -67,7 +66,8 @@ class PlannerAdapter:
         """
         Set the planner up.
 
-        :return: why it failed, or None; until the next setup it is then not asked for plans.
+        :return: the reason of a failure, or None; after a failure the planner gets no requests
+            until the next setup.
         """
         self._vehicle = context.vehicle
         self._last_plan = None
@@ -83,12 +83,12 @@ class PlannerAdapter:
 
     @property
     def setup_failure(self) -> str | None:
-        """Why the planner is not set up; None if it is."""
+        """Return the reason why the planner is not set up; None if it is."""
         return self._setup_failure
 
     def plan(self, request: PlanRequest) -> Plan:
         """
-        Answer a request: with the planner's plan or by braking.
+        Answer a request with the planner's plan or a braking plan.
 
         :raises CrgameError: if `setup` was never called.
         """
@@ -129,7 +129,7 @@ class PlannerAdapter:
 
 
 def describe(error: Exception) -> str:
-    """Put an exception into one line; unexpected ones with their type."""
+    """Return the text of an exception in one line; unexpected ones with their type."""
     text = ' '.join(str(error).split())
     if isinstance(error, PlanningError):
         return text
@@ -137,5 +137,5 @@ def describe(error: Exception) -> str:
 
 
 def reason_kind(reason: str) -> str:
-    """Return a reason for braking with `#` for its numbers, so that like ones are counted."""
+    """Return a reason with `#` for its numbers, so that similar ones are counted together."""
     return re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)

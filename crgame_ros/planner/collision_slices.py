@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Farther than this beyond what the ego can cover, an obstacle cannot matter [m].
+# Obstacles farther than this beyond the distance that the ego can cover are left out [m].
 REACH = 15.0
-# What is nearer now than its margin is enlarged less, what touches is made smaller, until the ego
-# is free: then a plan may stand or leave, and none drives on into it [m].
+# An obstacle nearer now than its margin is enlarged less, and one that touches the ego is shrunk,
+# until the ego is free: then a plan may stand or drive away, but not further into it [m].
 CORES = (0.0, -0.1, -0.2, -0.4, -0.8)
-# Of half the size of a core nothing less is left [m].
+# A shrunk obstacle with less than this half size is left out [m].
 SMALLEST = 0.02
 
 
@@ -32,7 +32,7 @@ class _Slice:
     The obstacles at one time step, and the road.
 
     :param checker: with the obstacles.
-    :param whole: asked for the road.
+    :param whole: the slices, which check the road.
     """
 
     def __init__(self, checker: pycrcc.CollisionChecker, whole: 'CollisionSlices') -> None:
@@ -40,22 +40,22 @@ class _Slice:
         self._whole = whole
 
     def collide(self, body: pycrcc.RectOBB) -> bool:
-        """Return whether the ego there touches an obstacle or is off the road."""
+        """Return whether the ego at a pose touches an obstacle or is off the road."""
         return self._checker.collide(body) or self._whole.is_off_road(body)
 
 
 class CollisionSlices:
     """
-    A stand-in for the drivability checker's `CollisionChecker`, sliced by time beforehand.
+    A replacement of the drivability checker's `CollisionChecker`, sliced by time in advance.
 
     `time_slice` of the original rebuilds the slice at each call, which costs more than the
-    check. Left out are followers in the ego's own lane, whose drivers keep the distance, and
-    what the ego is in the middle of, which no plan avoids.
+    check. Followers in the ego's own lane are left out, because their drivers keep the distance,
+    and so are obstacles that the ego is in the middle of, because no plan avoids them.
 
-    What is off the road, further than the ego is now, collides too.
+    A pose off the road, further than the ego is now, counts as a collision too.
 
     :param context: of the planner.
-    :param margin: by which obstacles are enlarged on each side [m]
+    :param margin: enlargement of obstacles on each side [m]
     """
 
     def __init__(self, context: PlannerContext, margin: float) -> None:
@@ -65,12 +65,12 @@ class CollisionSlices:
         self._limit = RoadLimit.from_context(context)
         self._slices: list[_Slice] = []
         self._k = 0
-        # By how much samples may leave the road beyond the ego's present place [m].
+        # How much further than the ego now samples may be off the road [m].
         self.road_tolerance = 0.0
 
     def update(self, request: PlanRequest, steps: int) -> None:
         """
-        Take the obstacles of a request over some steps from now.
+        Update the obstacles to those of a request, over some steps from now.
 
         :raises PlanningError: if an obstacle was never described.
         """
@@ -108,7 +108,7 @@ class CollisionSlices:
 
     def _margin_of(self, request: PlanRequest, pose: Array, column: int,
                    ego: pycrcc.RectOBB) -> float | None:
-        """Choose by how much to enlarge an obstacle; None leaves it out."""
+        """Return the enlargement of an obstacle; None leaves it out."""
         name = request.obstacle_ids[column]
         if self._follows(request.ego, pose, name):
             return None
@@ -139,7 +139,7 @@ class CollisionSlices:
 
     def _body(self, name: str, pose: Array,
               margin: float) -> pycrcc.RectOBB | pycrcc.Circle | None:
-        """Place an obstacle; polygons by the rectangle around them."""
+        """Return an obstacle as a body; a polygon as the rectangle around it."""
         x, y, yaw = pose.tolist()
         shape = self._described(name)
         if math.isnan(x):

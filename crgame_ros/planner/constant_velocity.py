@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A planner that holds its speed, whatever happens: the simplest opponent."""
+"""A planner that always holds its speed: the simplest opponent."""
 
 import math
 from typing import ClassVar, Literal
@@ -17,9 +17,9 @@ import numpy as np
 
 class ConstantVelocityPlanner(PathPlanner):
     """
-    Hold the speed of the request along the reference path; obstacles are ignored.
+    A planner that holds the speed of the request on the reference path and ignores obstacles.
 
-    :param path: `lane` follows the reference path, `straight` goes straight ahead.
+    :param path: `lane` follows the reference path, `straight` drives straight ahead.
     :param horizon: length of a plan [s]
     """
 
@@ -31,16 +31,16 @@ class ConstantVelocityPlanner(PathPlanner):
         self._horizon = horizon
 
     def setup(self, context: PlannerContext) -> None:
-        """Plan the path; going straight needs none."""
+        """Plan the path; driving straight ahead needs none."""
         self._context = context
         if not self._straight:
             super().setup(context)
 
     def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
-        """Need nothing but the path."""
+        """Do nothing: only the path is needed."""
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Hold the speed."""
+        """Plan at constant speed over the horizon."""
         steps = math.ceil(self._horizon / request.time_step_s - 1e-9)
         if self._straight:
             ego = request.ego

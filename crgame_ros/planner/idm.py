@@ -27,17 +27,17 @@ Array = NDArray[np.float64]
 LINE_GAP = 0.5
 # A standing vehicle starts when the model wants at least this share of a; it stops below it.
 START_SHARE = 0.2
-# Who may still come into the way is answered less hard than who is in the way [m/s^2], unless more
-# is needed to stop before them: by this share more, and with that much to spare [m].
+# For an obstacle that may still come into the way the ego brakes no harder than this [m/s^2],
+# unless more is needed to stop before it: by this share more, with this reserve [m].
 ANTICIPATION_LIMIT = 3.0
 NEED_SHARE = 1.15
 NEED_RESERVE = 1.0
-# Share of the desired speed with which it lets others by while it waits for a gap beside it.
+# Share of the desired speed at which the ego lets others pass while it waits for a gap beside it.
 YIELDING = 0.8
 PASSING_MARGIN_S = 0.5
 PASSING_MARGIN = 2.0
-# Who is faster and comes into the way from beside is let in so far ahead [m], where that takes no
-# more than this [m/s^2].
+# A faster vehicle that comes into the way from beside is let in with this gap [m], if no more than
+# this braking is needed [m/s^2].
 LET_IN_GAP = 1.0
 LET_IN_LIMIT = 3.0
 
@@ -50,8 +50,8 @@ class Leader(NamedTuple):
     :param center: of its centre [m]
     :param speed: along the path [m/s]
     :param blocking: whether it is in the corridor.
-    :param coming: whether it gets there later.
-    :param let_in: acceleration that lets it in ahead, infinity where that is no matter [m/s^2]
+    :param coming: whether it is there now or later.
+    :param let_in: acceleration that lets it in ahead, infinity where not needed [m/s^2]
     """
 
     rear: Sequence[float]
@@ -64,12 +64,13 @@ class Leader(NamedTuple):
 
 class IdmPlanner(PathPlanner):
     """
-    Follow the reference path with the Intelligent Driver Model (Treiber, CRG reference 10).
+    The Intelligent Driver Model on the reference path (Treiber, CRG reference 10).
 
     At each step of the horizon a = a0 (1 - (v / v0)^4 - (s* / s)^2) with the nearest obstacle
-    that the request predicts to be in the corridor then; red lights, stop signs and the end of
-    the road count as standing obstacles; curves and speed limits bound the speed. Where the route
-    changes lanes it does so into a gap, and keeps its lane, to the end if need be, without one.
+    that the request predicts to be in the corridor then. Red lights, stop signs and the end of
+    the road count as standing obstacles. Curves and speed limits bound the speed. Where the route
+    changes lanes the planner does so into a gap; without one it keeps its lane, if necessary to
+    the lane's end.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param time_headway: T [s]
@@ -117,7 +118,7 @@ class IdmPlanner(PathPlanner):
 
     def follow(self, request: PlanRequest) -> PathPosition:
         """
-        Find the ego on its path, and put the route's next lane change off until there is a gap.
+        Find the ego on its path, and postpone the route's next lane change until there is a gap.
 
         :raises PlanningError: if there is no road to follow.
         """
@@ -132,7 +133,7 @@ class IdmPlanner(PathPlanner):
         elif verdict is Verdict.DONE and not keeping and self._driving.changes < 2:
             self._change = None
         elif verdict is Verdict.DONE or (keeping and verdict is Verdict.FREE):
-            # From here on, into the gap; or on to the next change.
+            # Plan a path from here into the gap, or on to the next change.
             self._plan_path(request.ego)
         return self.locate(request)
 
@@ -157,9 +158,9 @@ class IdmPlanner(PathPlanner):
         """
         Return the model's speeds over the horizon, for planners that need a target.
 
-        :param lane: for which to ask.
-        :param there: as if the ego were in that lane already.
-        :param alone: as if there were no obstacles.
+        :param lane: lane in which the ego drives.
+        :param there: compute as if the ego were in that lane already.
+        :param alone: compute as if there were no obstacles.
         :return: (S) [m/s]
         """
         position = self.locate(request)
@@ -178,7 +179,7 @@ class IdmPlanner(PathPlanner):
         """
         Return whether the ego may change into a lane beside the path.
 
-        :param ahead_too: False to look at who is beside and behind only.
+        :param ahead_too: False to check only vehicles beside and behind.
         """
         return has_gap(self._projector, self._driving.path, request, self.locate(request).s,
                        lane.offset, self._context.vehicle, ahead_too)
@@ -203,7 +204,7 @@ class IdmPlanner(PathPlanner):
             request.k, position.s + front, max(request.ego.speed, 0.0))
         if line is not None:
             halts.append(line)
-        # A standing obstacle is halted at with the gap s0, a line with LINE_GAP.
+        # The gap at a standing obstacle is s0, at a line LINE_GAP.
         halt = min(halts) + model.s0 - LINE_GAP
         follower = [False] * len(leaders)
         desired, admissible, step = self._desired, self._admissible, self._driving.path.step
@@ -217,7 +218,7 @@ class IdmPlanner(PathPlanner):
             for number, leader in enumerate(leaders):
                 wanted = min(wanted, leader.let_in[i])
                 behind = leader.center[i] <= s + middle
-                # A prediction that drives through the ego from behind leads nobody.
+                # A vehicle predicted to drive through the ego from behind is no leader.
                 follower[number] = leader.blocking[i] and (behind or follower[number])
                 if behind or follower[number]:
                     continue
@@ -240,9 +241,9 @@ class IdmPlanner(PathPlanner):
 
 def _needed(speed: float, gap: float, other: float) -> float:
     """
-    Return the deceleration that takes the speed down to another one's within a gap [m/s^2].
+    Return the deceleration to the speed of another vehicle within a gap [m/s^2].
 
-    Towards one that comes nearer (v' < 0) it is that to a stop, v^2 / 2 a - v' v / a = s.
+    For a vehicle that comes nearer (v' < 0) it is that to a stop, v^2 / 2 a - v' v / a = s.
     """
     closing = max(speed - max(other, 0.0), 0.0)
     way = closing * (0.5 * closing + max(-other, 0.0))
@@ -282,9 +283,9 @@ def _leaders(obstacles: PathObstacles, request: PlanRequest, s: float,
 
 def _courtesy_acceleration(entry_s: float, overlap: float, speed: float) -> float:
     """
-    Return the acceleration with which somebody faster gets in ahead; infinity if none does.
+    Return the acceleration that lets a faster vehicle in ahead; infinity if it is too hard.
 
-    Whoever is beside already is not helped by hard braking: lane and speed are held then.
+    Hard braking does not help a vehicle that is beside already, so the ego holds lane and speed.
 
     :param entry_s: time until it is in the way [s]
     :param overlap: by how much its rear would then be behind the ego's front [m]

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The package commonroad-idm-planner 0.2.1 as a planner, its faults repaired where possible.
+The package commonroad-idm-planner 0.2.1 as a planner, with its faults repaired where possible.
 
-The package decides the acceleration of each step; the motion is ours. Repaired are:
+The package decides the acceleration of each step; the motion is ours. These faults are repaired:
 
-- positions are centres: the ego is handed over by its centre, the plan is of the rear axle;
+- its positions are centres: it gets the ego's centre, and the plan is of the rear axle;
 - it advances 11 Euler substeps of 10 ms for each 0.1 s and snaps to path points: its
   acceleration alone is used, positions come from the KS model along the path;
 - it returns negative speeds: the speed stops at 0, and a standing vehicle stays there;
@@ -15,12 +15,12 @@ The package decides the acceleration of each step; the motion is ours. Repaired 
   others get the prediction of the request, static ones too, which it ignores by default;
 - it crashes on an empty goal and rebuilds its velocity profile at every replan: it gets a goal
   without a position, and the speed limits and curves of the reference path as its profile;
-- it calls `logging.basicConfig`: the root logger is put back as it was.
+- it calls `logging.basicConfig`: the root logger is restored.
 
-Not repaired, because that would make it another model: the desired gap multiplies by sqrt(a b)
-where Treiber divides; the gap is from centre to centre less the leader's whole length; a leader
-is what touches the path's centre line, whatever the ego's width; one leader is chosen for the
-whole horizon; traffic lights are ignored.
+These are not repaired, because that would make it another model: the desired gap multiplies by
+sqrt(a b) where Treiber divides; the gap is from centre to centre less the leader's whole length;
+only an obstacle that touches the path's centre line is a leader, whatever the ego's width; one
+leader is chosen for the whole horizon; traffic lights are ignored.
 """
 
 import logging
@@ -72,7 +72,7 @@ LATERAL_ACCELERATION = 2.5
 
 class IdmPackagePlanner(PathPlanner):
     """
-    Let commonroad-idm-planner choose the acceleration along the reference path.
+    A planner whose acceleration along the reference path commonroad-idm-planner chooses.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param time_headway: T [s]
@@ -139,7 +139,7 @@ class IdmPackagePlanner(PathPlanner):
         state = InitialState(time_step=0, position=np.zeros(2), orientation=0.0, velocity=0.0,
                              acceleration=0.0, yaw_rate=0.0, slip_angle=0.0)
         goal = GoalRegion([CustomState(time_step=Interval(0, 1))])
-        # It searches the lanelet of each path point and fails where there is none at all.
+        # The package searches the lanelet of each path point and fails if there is none at all.
         scenario = Scenario(self._context.time_step_s)
         line = np.array([[0.0, 0.0], [1.0, 0.0]])
         scenario.add_objects(Lanelet(line + (0.0, 1.0), line, line - (0.0, 1.0), 1))
@@ -153,7 +153,7 @@ class IdmPackagePlanner(PathPlanner):
             root.setLevel(level)
 
     def _window(self, s: float) -> object:
-        """Cut the part of the path that matters; a closed loop passes a place twice."""
+        """Return the part of the path around s; a closed loop passes a place twice."""
         path = self._driving.path
         self._low = max(0, int((s - 10.0) / path.step))
         high = int((s + AHEAD) / path.step) + 2
@@ -167,14 +167,15 @@ class IdmPackagePlanner(PathPlanner):
             self._low:self._low + len(window.reference_path)]  # type: ignore[attr-defined]
 
     def _scenario(self, request: PlanRequest, position: PathPosition, steps: int) -> Scenario:
-        """Make a scenario of the obstacles near the path, each with its prediction."""
+        """Return a scenario of the obstacles near the path, each with its prediction."""
         corridor = Corridor(position.s, position.d, 10.0, AHEAD, HALF_CORRIDOR,
                             self._context.vehicle.front)
         near = self._projector.project(self._driving.path, corridor, request, steps + 1).ids
         poses, velocities = prolong(request, steps + 1)
         scenario = Scenario(request.time_step_s)
         for column, name in enumerate(request.obstacle_ids):
-            # The package needs an obstacle now and without gaps; what comes later is left out.
+            # The package needs an obstacle that is present now and without gaps; obstacles that
+            # appear later are left out.
             if name in near and np.isfinite(poses[0, column]).all():
                 scenario.add_objects(_dynamic_obstacle(
                     column + 1, self._context.objects[name].shape, request.k, poses[:, column],
@@ -195,7 +196,7 @@ class IdmPackagePlanner(PathPlanner):
 
     def _acceleration(self, k: int, s: float, speed: float, leader: int | None,
                       dt_s: float) -> float:
-        """Ask the package for the acceleration of one step."""
+        """Return the package's acceleration of one step."""
         planner = self._planner
         start = IDMState(position=self._center(s), velocity=speed, orientation=0.0,
                          acceleration=0.0, time_step=k)

@@ -17,7 +17,7 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.vehicle.parameters import VehicleParameters
 
-if TYPE_CHECKING:  # Messages are read by processes that need no scenario.
+if TYPE_CHECKING:  # Some processes that read messages need no scenario.
     from commonroad.planning.planning_problem import PlanningProblem
     from commonroad.scenario.scenario import Scenario
     from crgame_ros.roads.boundary import RoadBoundary
@@ -26,11 +26,11 @@ if TYPE_CHECKING:  # Messages are read by processes that need no scenario.
 @dataclass(frozen=True)
 class PlannerContext:
     """
-    What a planner is given once, before its first request.
+    The data that a planner gets once, before its first request.
 
     :param vehicle_id: the AV it drives (av0, …).
-    :param scenario: the CommonRoad scenario; its obstacles are for reference only: what is
-        really there comes with each request.
+    :param scenario: the CommonRoad scenario; its obstacles are for reference only: each request
+        has the actual ones.
     :param planning_problem: the AV's planning problem.
     :param vehicle: parameters of the AV.
     :param objects: description of every object that may appear in a request, by id.
@@ -52,7 +52,7 @@ class PlannerContext:
 
     @cached_property
     def road(self) -> 'RoadBoundary':
-        """Return the boundary of the scenario's road, made at first use: ask for it in `setup`."""
+        """Return the boundary of the scenario's road, built at first use: call it in `setup`."""
         from crgame_ros.roads.boundary import RoadBoundary
         return RoadBoundary(self.scenario.lanelet_network)
 
@@ -64,7 +64,7 @@ class Planner(ABC):
     Options from the game file arrive as keyword arguments of the constructor; unknown ones
     must raise `InputError`, which a signature without `**kwargs` does through the registry.
 
-    A class that sets `wants_lights` is told of others' indicators and horn (`PlanRequest.lights`).
+    A class that sets `wants_lights` gets others' indicators and horn (`PlanRequest.lights`).
     """
 
     name: ClassVar[str]

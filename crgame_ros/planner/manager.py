@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The planners of one AV in a run: the game's, and those that events bring in."""
+"""The planners of one AV in a run: the game's, and those to which events switch."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,25 +15,25 @@ from crgame_ros.roads.speed_limits import set_speed_limit, with_own_roads
 
 
 def swapped_in(vehicle_id: str, events: Sequence[EventSpec]) -> tuple[str, ...]:
-    """Return the names of the planners that events bring in for an AV."""
+    """Return the names of the planners to which events switch an AV."""
     return tuple(event.action.planner for event in events
                  if isinstance(event.action, PlannerSwap) and event.action.av == vehicle_id)
 
 
 class PlannerManager:
     """
-    Runs the planner in office, and changes it and its roads as events say.
+    The active planner of an AV; events switch it and change its roads.
 
-    Every planner is made and set up before the run, so that an event costs no time in it. After a
-    change of speed limits the planner in office is set up again at once, the others when their
-    turn comes.
+    Every planner is created and set up before the run, so that an event costs no time in the run.
+    After a change of speed limits the active planner is set up again at once, and each other one
+    when it becomes active.
 
-    :param context: what planners are given.
+    :param context: of the planners.
     :param name: of the game's planner for the AV.
     :param options: of that planner.
     :param events: all events of the game.
     :param clock: seconds from a steady clock, to time each plan; None measures nothing.
-    :raises InputError: if a planner cannot be made.
+    :raises InputError: if a planner cannot be created.
     """
 
     def __init__(self, context: PlannerContext, name: str, options: Mapping[str, Any],
@@ -66,19 +66,19 @@ class PlannerManager:
 
     @property
     def last_reason(self) -> str | None:
-        """Why the last plan was a braking plan; None if it was none."""
+        """Return the reason why the last plan was a braking plan; None if it was none."""
         return self.adapter.last_reason
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Answer a request by the planner in office."""
+        """Answer a request with the active planner."""
         return self.adapter.plan(request)
 
     def apply(self, fired: Sequence[str]) -> list[str]:
         """
-        Take over what events have done.
+        Apply the events that have fired.
 
-        :param fired: names of all events so far in their order; those known already are passed
-        :return: what was changed, for people, one line each
+        :param fired: names of all events so far in their order; those already applied are skipped
+        :return: a message about each change, one line each
         """
         said = []
         for name in fired:
@@ -100,7 +100,7 @@ class PlannerManager:
 
     def _swap(self, event: str, planner: str) -> str:
         self.adapter, self.name = self._adapters[event], planner
-        # Its setup in advance may be of the time before a change, or have failed.
+        # Its setup in advance may be older than a change of speed limits, or have failed.
         if event in self._outdated:
             self._outdated.discard(event)
             self.adapter.setup(self._context)

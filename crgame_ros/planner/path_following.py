@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Driving a kinematic single-track vehicle along a path, step by step."""
+"""Motion of a kinematic single-track vehicle along a path, step by step."""
 
 from collections.abc import Callable
 import math
@@ -40,12 +40,12 @@ class PathPosition(NamedTuple):
 
 class PathFollower:
     """
-    Steer a vehicle along a path within its steering limits.
+    A controller that steers a vehicle along a path within its steering limits.
 
     The offset follows the third derivative that a quintic d(l) to the path has at its start,
-    d''' = -60 d / L^3 - 36 d' / L^2 - 9 d'' / L, evaluated anew at each step: the feedback form
-    of replanning the quintic. Its poles (-3.6, -2.7 ± 3.1i) / L are well damped, it needs no
-    memory between ticks, and every step is a step of the KS model (CRG 2-4), so that yaw,
+    d''' = -60 d / L^3 - 36 d' / L^2 - 9 d'' / L. It is evaluated at each step, which is the
+    feedback form of replanning the quintic. The poles (-3.6, -2.7 ± 3.1i) / L are well damped, no
+    state is kept between ticks, and every step is a step of the KS model (CRG 2-4), so that yaw,
     steering angle, speed and position agree.
 
     :param path: the path of the rear axle.
@@ -57,12 +57,12 @@ class PathFollower:
         self._vehicle = vehicle
 
     def locate(self, x: float, y: float, yaw: float, guess: float) -> PathPosition:
-        """Project a pose whose arc length is known to a few metres [m]."""
+        """Return the place of a pose on the path, near a guessed arc length [m]."""
         s, d, heading = self.path.locate(x, y, guess)
         return PathPosition(s, d, wrap_pi(yaw - heading))
 
     def correction_length(self, position: PathPosition, speed: float) -> float:
-        """Choose the length L over which the offset is taken back [m]."""
+        """Return the length L over which the offset is corrected [m]."""
         d, error = abs(position.d), min(abs(position.heading_error), 1.2)
         rate = RATE_SHARE * self._vehicle.max_steering_rate
         jerk = speed * self._vehicle.wheelbase / max(rate, 1e-3)
@@ -81,7 +81,7 @@ class PathFollower:
         :param ego: state at the start, kept as row 0 in all its columns.
         :param start: where the ego is on the path.
         :param steps: number of steps of dt_s [s].
-        :param longitudinal: acceleration wanted at each step; the speed stops at 0.
+        :param longitudinal: wanted acceleration at each step; the speed stops at 0.
         :return: (steps + 1, 8) rear-axle states; yaw continues that of the ego.
         :raises PlanningError: if the ego faces away from the path.
         """

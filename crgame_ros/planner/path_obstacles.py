@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The obstacles of a request, seen along a path: which of them are in the way, and when."""
+"""The obstacles of a request along a path: which of them are in the way, and when."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,25 +19,25 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ANCHORS = 5
-# Who is farther to the side than this at every anchor does not come near between them [m].
+# An obstacle farther to the side than this at every anchor does not come near in between [m].
 ASIDE = 3.0
-# Of the polygon that stands for a circle: its corners lie on it.
+# Number of corners of the polygon that replaces a circle; they lie on it.
 CIRCLE_CORNERS = 8
 
 
 @dataclass(frozen=True)
 class Corridor:
     """
-    What the ego sweeps along its path.
+    The corridor that the ego sweeps along its path.
 
     :param s: arc length of the ego's rear axle now [m]
     :param d: its offset to the left now [m]
     :param return_length: length over which it moves to the target [m]
-    :param ahead: how far obstacles matter [m]
+    :param ahead: distance ahead within which obstacles count [m]
     :param half_width: half the ego's width and the margin [m]
     :param front: distance from the rear axle to the front bumper [m]
     :param target: offset to which it moves; 0 is the path itself [m]
-    :param behind: how far obstacles behind the ego are looked at [m]
+    :param behind: distance behind the ego within which obstacles count [m]
     """
 
     s: float
@@ -51,7 +51,7 @@ class Corridor:
 
     @property
     def aside(self) -> float:
-        """Greatest distance of the ego from the path [m]."""
+        """Return the greatest distance of the ego from the path [m]."""
         return max(abs(self.d), abs(self.target))
 
     def bounds(self, path: ReferencePath, s: Array) -> tuple[Array, Array]:
@@ -89,9 +89,9 @@ class PathObstacles:
 
 class ObstacleProjector:
     """
-    Project the predicted footprints of obstacles on a path.
+    A projector of the predicted footprints of obstacles onto a path.
 
-    :param objects: description of everything that may appear.
+    :param objects: description of all objects that may appear.
     """
 
     def __init__(self, objects: Mapping[str, ObjectDescription]) -> None:
@@ -103,7 +103,7 @@ class ObstacleProjector:
     def project(self, path: ReferencePath, corridor: Corridor, request: PlanRequest,
                 steps: int) -> PathObstacles:
         """
-        Find the obstacles that are or get in the way.
+        Find the obstacles that are in the way now or later.
 
         :param request: with poses over P points; beyond them objects keep their velocity.
         :param steps: number S of points wanted, the first being now.
@@ -134,7 +134,7 @@ class ObstacleProjector:
 
     def _tracks(self, path: ReferencePath, corridor: Corridor,
                 poses: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Choose the obstacles that may come near; their columns and centres (s, d), (S, K)."""
+        """Return columns and centres (s, d), (S, K), of the obstacles that may come near."""
         near = self._near(path, corridor, poses)
         anchors = _anchors(len(poses))
         found, aside = path.project(poses[anchors.steps[:, None], near, :2],
@@ -160,12 +160,12 @@ class ObstacleProjector:
         self._ids = ids
 
     def _near(self, path: ReferencePath, corridor: Corridor, poses: Array) -> NDArray[np.intp]:
-        """Drop the obstacles that cannot reach the corridor: absent, or too far to the side."""
+        """Return the obstacles that may reach the corridor: present, and not too far away."""
         present = np.isfinite(poses[..., 0])
         first = np.argmax(present, axis=0)
         origin = poses[first, np.arange(len(first)), :2]
         way = poses[..., :2] - origin
-        # Passes over NaN: where it is absent.
+        # fmax ignores NaN, which means absent.
         reach = np.fmax.reduce(np.hypot(way[..., 0], way[..., 1]), axis=0, initial=0.0)
         low = max(0, int((corridor.s - corridor.behind) / path.step))
         line = path.points[low:int((corridor.s + corridor.ahead) / path.step) + 2:8]
@@ -194,12 +194,12 @@ def prolong(request: PlanRequest, steps: int) -> tuple[Array, Array]:
 
 class _Anchors(NamedTuple):
     """
-    The few steps at which centres are looked for along the whole path.
+    The few steps, anchors, at which centres are searched along the whole path.
 
-    :param steps: (A) their numbers.
-    :param before: (S) for each step, the place among them of the last before it.
-    :param after: (S) and of the first behind it.
-    :param share: (S, 1) where it is between these, from 0 to 1.
+    :param steps: (A) numbers of these steps.
+    :param before: (S) for each step, index of the last anchor before it.
+    :param after: (S) and of the first anchor after it.
+    :param share: (S, 1) position of the step between these, from 0 to 1.
     """
 
     steps: NDArray[np.intp]
@@ -222,7 +222,7 @@ def _project_tracks(path: ReferencePath, poses: Array, anchors: _Anchors,
     """Project centres (S, K, 3), whose arc lengths are known at a few steps."""
     steps, count = poses.shape[:2]
     if not np.isfinite(found).all():
-        # Where an object is absent at an anchor, the neighbouring anchor serves to start from.
+        # Where an object is absent at an anchor, the neighbouring anchor gives the guess.
         found = found.copy()
         rows = range(len(anchors.steps))
         for here, there in [*pairwise(rows)] + [*pairwise(rows[::-1])]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What planners that follow a reference path have in common."""
+"""The base class of planners that follow a reference path."""
 
 from abc import abstractmethod
 import math
@@ -15,15 +15,15 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
-# Beyond this offset the vehicle is no longer where its path was planned [m].
+# Beyond this offset the vehicle has left its path [m].
 LOST = 4.0
 RETRY_DISTANCE = 20.0
-# What must lie ahead of the vehicle; a closed loop is planned anew when less is left [m].
+# Least length of path ahead of the vehicle; with less, a path that goes on is planned anew [m].
 RESERVE = 300.0
 
 
 def initial_state(context: PlannerContext) -> VehicleState:
-    """Return the rear-axle state at which a planning problem starts; it declares the centre."""
+    """Return the initial rear-axle state of a planning problem, which gives the centre."""
     start = context.planning_problem.initial_state
     (x, y), yaw = start.position[:2].tolist(), float(start.orientation)
     return VehicleState(*ahead(x, y, yaw, -context.vehicle.rear_to_center), yaw,
@@ -32,7 +32,7 @@ def initial_state(context: PlannerContext) -> VehicleState:
 
 def check_positive(planner: str, **options: float | None) -> None:
     """
-    Refuse options that are no positive finite numbers; None stands for a default.
+    Check that options are positive finite numbers; None stands for a default.
 
     :raises InputError: naming planner and option.
     """
@@ -43,7 +43,7 @@ def check_positive(planner: str, **options: float | None) -> None:
 
 
 class PathPlanner(Planner):
-    """A planner on a reference path: sets the path up and keeps track of the vehicle on it."""
+    """A planner on a reference path: it plans the path and tracks the vehicle's place on it."""
 
     follow_lane = False
 
@@ -54,7 +54,7 @@ class PathPlanner(Planner):
 
     @property
     def driving(self) -> DrivingPath:
-        """Return the path that is followed now; `locate` may replace it."""
+        """Return the present path; `locate` may replace it."""
         return self._driving
 
     @abstractmethod
@@ -82,7 +82,7 @@ class PathPlanner(Planner):
         return position
 
     def answer(self, request: PlanRequest, states: np.ndarray) -> Plan:
-        """Wrap states into the plan that answers a request."""
+        """Return states as the plan that answers a request."""
         return Plan(request.stamp_ns, states)
 
     def _plan_path(self, start: VehicleState) -> None:
@@ -92,7 +92,7 @@ class PathPlanner(Planner):
             self.follow_lane), start)
 
     def _set_path(self, driving: DrivingPath, start: VehicleState) -> None:
-        """Follow a path that was planned from where the vehicle is."""
+        """Set the path, planned from the vehicle's present state."""
         self._driving = driving
         self._planned_at = (start.x, start.y)
         self._last_s = driving.start_s

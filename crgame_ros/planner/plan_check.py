@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a plan may be followed: the engine's grounds for refusing one."""
+"""Checks of a plan: the reasons for which the engine refuses one."""
 
 from dataclasses import dataclass
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-# States of a plan; no magnitude in one is beyond this [m], [rad], [m/s], …
+# Least and greatest number of states of a plan; greatest magnitude in one [m], [rad], [m/s], …
 SHORTEST, LONGEST = 2, 3000
 LARGEST = 1e9
 
@@ -21,10 +21,11 @@ LARGEST = 1e9
 @dataclass(frozen=True)
 class PlanTolerances:
     """
-    How far a plan may be off, on top of the vehicle's limits.
+    The tolerances of a plan, on top of the vehicle's limits.
 
-    Planners discretise, and the request may be a perceived state; the defaults admit the
-    planners that ship with the package and refuse a jump of 1 m or twice the maximum speed.
+    Tolerances are needed because planners discretise and the request may be a perceived state.
+    The defaults admit the planners that ship with the package and refuse a jump of 1 m or twice
+    the maximum speed.
 
     :param start_position: distance of state 0 from the request's ego [m]
     :param start_yaw: its heading error [rad]
@@ -60,7 +61,7 @@ def check_start(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
     """
     Check that a plan answers a request: stamp, shape, finite numbers, first state.
 
-    :return: why it is refused, or None.
+    :return: the reason for a refusal, or None.
     """
     if plan.stamp_ns != request_stamp_ns:
         return (f'the stamp {plan.stamp_ns} ns is not that of the request, '
@@ -93,9 +94,9 @@ def check_plan(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
     """
     Check that a plan answers a request and that the vehicle can follow it.
 
-    :param request_ego: the ego state that the planner was sent (the perceived one).
-    :param time_step_s: Delta t_c, the distance of the plan's rows [s]
-    :return: why it is refused, naming the state and the limit, or None.
+    :param request_ego: the ego state that the planner received (the perceived one).
+    :param time_step_s: Delta t_c, the time between the plan's rows [s]
+    :return: the reason for a refusal, with the state and the limit, or None.
     """
     reason = check_start(plan, request_ego, request_stamp_ns, tolerances)
     if reason is None:
@@ -133,7 +134,7 @@ def _check_limits(states: Array, vehicle: VehicleParameters, dt_s: float,
          rate * dt_s + tolerances.steering, 'rad'))
     for what, values, limit, unit in checks:
         excess = values - limit
-        # Written so that what is no number fails.
+        # Written so that NaN fails.
         if not (excess <= 0.0).all():
             worst = int(excess.argmax())
             first = worst + (len(values) < len(states))

@@ -22,26 +22,27 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# The model's first stretch, from which the target speed is drawn [s].
+# Beginning of the model's speeds from which the target speed is extrapolated [s].
 FIRST_S = 1.0
 LEVELS = 3
-# What it must gain to leave the route's lane (the package's cost of an offset of one lane is that
-# of 2.5 m/s less than desired), to do so to the right, and to go where it is not heading [m/s].
+# Least gain of speed to leave the route's lane (the package's cost of an offset of one lane is
+# that of 2.5 m/s less than desired), additional gain to do so to the right, and to change the
+# lane that is aimed at [m/s].
 LEAVING = 2.5
 RIGHT = 0.5
 TURNING = 1.0
 # Nearer than this to a lane's centre line the ego is in that lane [m].
 INSIDE = 1.0
-# Stops are sampled that take up to so many times what the hardest would, were it at once.
+# The longest sampled stop takes this many times the time of the hardest stop.
 STOP_SHARE = 2.5
-# Lanes are looked for at least so far ahead [m].
+# Least distance ahead at which side lanes are searched [m].
 SHORTEST_LOOK = 15.0
 
 
 class _Samples:
     """The values that the package samples in one dimension, by sampling level."""
 
-    # The package reads this when it replaces the samples of its own.
+    # The package reads this when it replaces its own samples.
     _num_init_samples = 3
 
     def __init__(self, *levels: set[float]) -> None:
@@ -53,11 +54,11 @@ class _Samples:
 
 class _Aim(NamedTuple):
     """
-    A lane to drive in, and how fast.
+    A lane to drive in, and the speed there.
 
-    :param loss: speed that is lost there against a free road, with what a change costs [m/s]
+    :param loss: loss of speed there against a free road, plus the cost of a change [m/s]
     :param offset: of the lane's centre line to the left of the path [m]
-    :param speed: to aim at over the horizon [m/s]
+    :param speed: target over the horizon [m/s]
     """
 
     loss: float
@@ -67,21 +68,21 @@ class _Aim(NamedTuple):
 
 class ReactivePlanner(Planner):
     """
-    Sample trajectories in the curvilinear frame and drive the cheapest that is free.
+    A planner that samples trajectories in the curvilinear frame and drives the cheapest free one.
 
-    This is the reactive planner of CRG IV (figures 10 and 11) on the package of its authors: it
+    This is the reactive planner of CRG IV (figures 10 and 11) on the package of its authors. It
     predicts others at constant velocity and leaves its lane where another one of the same
-    direction is faster and free. For each lane the Intelligent Driver Model tells which speed it
-    allows; a lane is aimed at if it wins so much that the change pays, and if there is a gap.
-    The package then samples quartic speed profiles and quintic offsets to that lane; samples
-    that break the vehicle's limits, hit a predicted obstacle or leave the road are dropped, the
-    cheapest of the rest is the plan. If none is left the next best lane is tried, then evading
-    within the lanes of the same direction, then emergency braking and evading on the whole
-    carriageway. The number of samples bounds the time.
+    direction is faster and free. The Intelligent Driver Model gives the speed that each lane
+    allows. The planner aims at another lane if the gain of speed exceeds the cost of a change, and
+    if there is a gap. The package then samples quartic speed profiles and quintic offsets to that
+    lane. Samples that break the vehicle's limits, hit a predicted obstacle or leave the road are
+    dropped, and the cheapest of the rest is the plan. If none is left, the planner tries the next
+    best lane, then evading within the lanes of the same direction, then emergency braking and
+    evading on the whole carriageway. The number of samples bounds the time.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param horizon: length of a plan [s]
-    :param safety_margin: by which obstacles are enlarged on each side [m]
+    :param safety_margin: enlargement of obstacles on each side [m]
     """
 
     name: ClassVar[str] = 'reactive'
@@ -128,7 +129,7 @@ class ReactivePlanner(Planner):
         return Plan(request.stamp_ns, states)
 
     def _prepare(self, driving: DrivingPath) -> None:
-        """Take over a new path."""
+        """Prepare for a new path."""
         self._driving = driving
         vehicle = self._context.vehicle
         self._lane = road_bounds(driving, vehicle, 'lane')
@@ -136,29 +137,29 @@ class ReactivePlanner(Planner):
         self._carriageway = road_bounds(driving, vehicle, 'carriageway')
 
     def _aims(self, request: PlanRequest, position: PathPosition) -> Iterator[_Aim]:
-        """Go through the lanes that may be driven in, the best first."""
+        """Yield the lanes that may be driven in, the best first."""
         sides = side_lanes(self._driving, self._search_s(request, position), self._context.vehicle)
         nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
         free = float(self._idm.speeds(request, alone=True)[-1])
         own = self._aim(request, position, OWN_LANE, nearest, free)
         if own is not None and own.loss < LEAVING:
-            # No other lane can be better: they are looked at only if this one fails.
+            # No other lane can be better, so the others are judged only if this one fails.
             yield own
             own = None
         aims = [own, *(self._aim(request, position, lane, nearest, free) for lane in sides)]
         yield from sorted(aim for aim in aims if aim is not None)
 
     def _search_s(self, request: PlanRequest, position: PathPosition) -> float:
-        """Return the arc length at which lanes are looked for [m]."""
+        """Return the arc length at which side lanes are searched [m]."""
         return position.s + max(SHORTEST_LOOK, max(request.ego.speed, 0.0) * self._span_s)
 
     def _aim(self, request: PlanRequest, position: PathPosition, lane: SideLane,
              nearest: SideLane, free: float) -> _Aim | None:
-        """Judge one lane; None if there is no gap in it."""
+        """Return one lane with its loss and speed; None if there is no gap in it."""
         inside = lane is nearest or abs(lane.offset - position.d) < INSIDE
         if not inside and not self._idm.has_gap(request, lane):
             return None
-        # Whom it passes on the way over is no leader: the samples keep clear of them.
+        # Vehicles passed during the change are no leaders: the samples keep clear of them.
         speeds = self._idm.speeds(request, lane, there=not inside)
         loss = free - float(speeds[-1])
         if lane is not OWN_LANE:
@@ -169,34 +170,34 @@ class ReactivePlanner(Planner):
 
     def _target(self, request: PlanRequest, speeds: Array) -> float:
         """
-        Draw the speed to aim at from the model's speeds.
+        Return the target speed from the model's speeds.
 
         A profile that has the whole horizon to change its speed begins gently, and only its
-        beginning is driven before the next replanning: the target goes on from what the model
-        does first, so that the beginning brakes as the model does.
+        beginning is driven before the next replanning. Therefore the target extrapolates the
+        model's first stretch, so that the beginning of the profile brakes as the model does.
         """
         speed = request.ego.speed
         first = float(speeds[min(round(FIRST_S / request.time_step_s), len(speeds) - 1)])
         target = max(0.0, speed + (first - speed) * self._horizon / FIRST_S)
         if first > speed:
             target = float(speeds[-1])
-        # At rest the package keeps standing, where less than this is wanted.
+        # At rest, a lower target than this keeps the vehicle standing.
         return 0.0 if speed < REST and target < 5.0 * REST else target
 
     def _comfortable(self, aim: _Aim, position: PathPosition, speed: float) -> Array | None:
-        """Drive to the lane and its speed."""
+        """Sample trajectories to a lane and its speed."""
         middle, late = self._time(0.6), self._time(1.0)
         slower = max(aim.speed - 2.0, 0.0)
-        # Over to another lane it takes the whole horizon, for comfort.
+        # A lane change takes the whole horizon, for comfort.
         over = abs(aim.offset - position.d) > INSIDE
         return self._sample(0, aim, {late} if over else {middle, late},
                             {aim.speed, slower, 0.5 * (aim.speed + speed)}, {aim.offset})
 
     def _evading(self, request: PlanRequest, aims: list[_Aim],
                  position: PathPosition) -> Array | None:
-        """Try wider samples where nobody comes from behind, a stop, then all of the road."""
+        """Sample the free lanes of the same direction, then a stop, then the carriageway."""
         speed = request.ego.speed
-        # In the lane that the ego is in somebody may have left no speed at all.
+        # Without an aim the ego keeps its offset and stops.
         aim = aims[0] if aims else _Aim(0.0, position.d, 0.0)
         times = {self._time(0.34), self._time(0.6), self._time(1.0)}
         own = {aim.offset for aim in aims}
@@ -211,9 +212,9 @@ class ReactivePlanner(Planner):
         return self._sample(2, aim, times, {0.0, 0.5 * speed, speed}, {low, high})
 
     def _stopping(self, aim: _Aim, position: PathPosition, speed: float) -> Array | None:
-        """Stop as hard as must be, in the lane."""
-        # The package's profiles brake half as hard again in their middle as on average, less so
-        # once the brake is on. All times are tried, so that a stop that has begun goes on.
+        """Sample stops in the lane, up to the hardest."""
+        # The package's profiles brake by half harder in their middle than on average, but less so
+        # once the vehicle brakes. All times are tried, so that a stop that has begun continues.
         dt_s, brake = self._context.time_step_s, self._context.vehicle.max_acceleration
         first = max(2, math.ceil(abs(speed) / brake / dt_s))
         last = max(first, min(round(self._span_s / dt_s), round(STOP_SHARE * first)))
@@ -227,8 +228,8 @@ class ReactivePlanner(Planner):
         """
         Return the outermost offsets among the lanes of the same direction that may be used.
 
-        Those are the lane that the ego is in, and the ones where nobody is beside it and whoever
-        comes from behind has the room that a lane change leaves him.
+        These are the lane that the ego is in, and lanes without a vehicle beside the ego in which
+        the vehicle behind keeps the gap that a lane change requires.
         """
         sides = side_lanes(self._driving, self._search_s(request, position), self._context.vehicle)
         nearest = min((OWN_LANE, *sides), key=lambda lane: abs(lane.offset - position.d))
@@ -247,7 +248,7 @@ class ReactivePlanner(Planner):
     def _sample(self, level: int, aim: _Aim, times: set[float], speeds: set[float],
                 offsets: set[float]) -> Array | None:
         planner = self._core.planner
-        # Told the current speed, the package would take the goal's speed instead at 0 m/s.
+        # With the current speed given, the package would use the goal's speed instead of 0 m/s.
         planner.set_desired_velocity(aim.speed)
         planner.cost_function.desired_d = aim.offset
         space = planner.sampling_space

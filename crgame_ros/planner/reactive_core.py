@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What both planners on commonroad-reactive-planner 2025.1 need to run it on plan requests."""
+"""The common part of both planners on commonroad-reactive-planner 2025.1."""
 
 from copy import deepcopy
 import logging
@@ -31,16 +31,17 @@ from numpy.typing import NDArray  # noqa: E402
 
 Array = NDArray[np.float64]
 
-# The frame begins so far behind the vehicle, is so long, and is renewed when less lies ahead [m].
+# The frame begins this far behind the vehicle, has this length, and is renewed when less than the
+# reserve lies ahead [m].
 FRAME_BEHIND = 30.0
 FRAME_LENGTH = 500.0
 FRAME_RESERVE = 300.0
-# Its heading must stay within ±2 pi; the margin covers how the library prolongs it [rad].
+# The frame's heading must stay within ±2 pi; the margin covers the library's extension [rad].
 HEADING_LIMIT = 2.0 * np.pi - 0.2
 
 
 def frame_rows(path: ReferencePath, s: float) -> slice:
-    """Choose the points of a path around s [m] that a frame may have: loops come in pieces."""
+    """Return the points of a path around s [m] for a frame; a loop is split into pieces."""
     rows = path.rows(s - FRAME_BEHIND, s + FRAME_LENGTH, 3)
     turn = np.floor(path.heading[rows.start] / (2.0 * np.pi) + 0.5) * 2.0 * np.pi
     outside = np.flatnonzero(np.abs(path.heading[rows] - turn) > HEADING_LIMIT)
@@ -49,16 +50,16 @@ def frame_rows(path: ReferencePath, s: float) -> slice:
 
 def configuration(context: PlannerContext, steps: int) -> ReactivePlannerConfiguration:
     """
-    Make the package's default configuration, with the vehicle, the grid and the horizon set.
+    Return the package's default configuration, with the vehicle, the grid and the horizon set.
 
     :param steps: length of a plan in scenario steps.
     """
     config = ReactivePlannerConfiguration()
     config.planning.dt = context.time_step_s
     config.planning.time_steps_computation = steps
-    # It refuses to sample times below two steps.
+    # The package refuses to sample times below two steps.
     config.sampling.t_min = max(config.sampling.t_min, 2.0 * context.time_step_s)
-    # Its processes wait for ever when one of them fails.
+    # The package's processes wait for ever when one of them fails.
     config.debug.multiproc = False
     config.debug.logging_level = 'ERROR'
     _describe(config, context.vehicle)
@@ -79,13 +80,13 @@ def _describe(config: ReactivePlannerConfiguration, vehicle: VehicleParameters) 
 
 
 class _Planner(package.ReactivePlanner):
-    """The package's planner, which at rest fails over its own message if no sample is feasible."""
+    """The package's planner, repaired: at rest it fails in a message if no sample is feasible."""
 
     def _get_optimal_trajectory(self, trajectory_bundle: TrajectoryBundle,
                                 ) -> TrajectorySample | None:
         found = super()._get_optimal_trajectory(trajectory_bundle)
         if found is None and self.x_0.velocity <= REST:
-            # It goes on to stand, and wants to compare the costs with those of a sample.
+            # The package then plans a standstill, and compares its cost with those of samples.
             standing = self._compute_standstill_trajectory()
             standing.cost = self.cost_function
             trajectory_bundle.trajectories = [standing]
@@ -94,11 +95,11 @@ class _Planner(package.ReactivePlanner):
 
 class ReactiveCore:
     """
-    Runs the package's planner on a driving path, one request after the other.
+    The package's planner on a driving path, for one request after the other.
 
     :param context: of the planner.
-    :param config: what the package is to be set to.
-    :param margin: by which obstacles are enlarged on each side [m]
+    :param config: configuration of the package.
+    :param margin: enlargement of obstacles on each side [m]
     """
 
     def __init__(self, context: PlannerContext, config: ReactivePlannerConfiguration,
@@ -117,7 +118,7 @@ class ReactiveCore:
 
     def start(self, request: PlanRequest, driving: DrivingPath, position: PathPosition) -> None:
         """
-        Hand a request over to the package.
+        Set the package up for a request.
 
         :param driving: the path that its curvilinear frame follows.
         :param position: where the ego is on it.
@@ -148,34 +149,34 @@ class ReactiveCore:
         self._reset(self._low_velocity)
 
     def sample_over_time(self) -> None:
-        """Sample offsets over time again, but at low speed."""
+        """Sample offsets over time again, except at low speed."""
         self._reset(self._low_velocity)
 
     def sample_over_way(self) -> None:
         """
-        Sample offsets over the way, not over time, as it does at low speed.
+        Sample offsets over the distance, not over time, as the package does at low speed.
 
-        Stops can be sampled then at any speed: over time a vehicle would still move aside when it
-        stands, so that the package drops them all unless it keeps its offset exactly.
+        Then stops can be sampled at any speed. Over time a vehicle would still move aside while it
+        stands, so that the package drops all stops that do not keep the offset exactly.
         """
         self._reset(np.inf)
 
     def _reset(self, low_velocity: float) -> None:
         planner = self.planner
         planner.config.planning.low_vel_mode_threshold = low_velocity
-        # It needs this before `reset`, but sets it after.
+        # The package needs this before `reset`, but sets it after.
         planner._low_vel_mode = self._request.ego.speed < low_velocity
         planner.reset(initial_state_cart=self._initial, collision_checker=self.slices,
                       coordinate_system=self._system)
 
     def plan(self, level: int | None = None) -> Array | None:
         """
-        Let the package plan the request of `start`.
+        Plan the request of `start` with the package.
 
-        :param level: of sampling; None goes through all but the coarsest, as shipped
+        :param level: of sampling; None tries all but the coarsest, as shipped
         :return: (S, 8) rear-axle states, or None if no sample is feasible.
         """
-        # It divides by the spread of the costs, which may be 0, for a message that nobody reads.
+        # For a message that is not used the package divides by the spread of costs, perhaps 0.
         with np.errstate(divide='ignore', invalid='ignore'):
             found = self.planner.plan(level)
         return None if found is None else self._states(found[0].state_list)
@@ -189,7 +190,7 @@ class ReactiveCore:
                                         clcs_params=CLCSParams())
 
     def _states(self, found: list[ReactivePlannerState]) -> Array:
-        """Take over the package's states; at standstill it returns one too few."""
+        """Return the package's states as rows; at standstill it returns one too few."""
         states = np.zeros((max(len(found), self._steps + 1), STATE_WIDTH))
         for row, state in zip(states, found, strict=False):
             row[:7] = (*state.position, state.orientation - self._turn, state.velocity,

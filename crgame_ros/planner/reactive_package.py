@@ -16,14 +16,14 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 
 class ReactivePackagePlanner(PathPlanner):
     """
-    Run commonroad-reactive-planner with its own samples, cost function and desired speed.
+    The planner commonroad-reactive-planner with its own samples, costs and desired speed.
 
-    Ours is what it cannot run without: the reference path, the predicted obstacles and the road
-    as collision objects, one process instead of six that may wait for ever, states with the
-    vehicle's own limits. The rest is the package's: sampling levels 1 to 3 in turn, lateral ends
-    from -3 to 3 m, and the speed of the goal's middle or of the start, whatever signs, lights and
-    bends say. As shipped it plans 6 s and takes up to a second, in which the AV follows the last
-    plan; a shorter horizon and fewer levels make it faster.
+    This class adds what the package needs to run: the reference path, the predicted obstacles and
+    the road as collision objects, one process instead of six that may wait for ever, and states
+    with the vehicle's own limits. The rest is the package's: sampling levels 1 to 3 in turn,
+    lateral ends from -3 to 3 m, and the speed of the goal's middle or of the start, regardless of
+    signs, lights and bends. As shipped it plans 6 s and takes up to a second, in which the AV
+    follows the last plan. A shorter horizon and fewer levels make it faster.
 
     :param v0: desired speed; None takes the package's choice [m/s]
     :param horizon: length of a plan; the package's default is 60 steps of 0.1 s [s]
@@ -47,11 +47,11 @@ class ReactivePackagePlanner(PathPlanner):
         self._core = ReactiveCore(context, config, margin=0.0)
         self._desired = self._v0
         if not context.planning_problem.goal.state_list:
-            # The package asks the goal, and without a speed there the start.
+            # The package reads the speed from the goal, or from the start if the goal has none.
             self._desired = self._v0 or float(context.planning_problem.initial_state.velocity)
 
     def prepare(self, driving: DrivingPath, vehicle: VehicleParameters) -> None:
-        """Need nothing but the path."""
+        """Do nothing: only the path is needed."""
 
     def plan(self, request: PlanRequest) -> Plan:
         """

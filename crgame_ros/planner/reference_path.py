@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The drivable path of a planning problem: routed, smoothed, prolonged beyond the goal."""
+"""The drivable path of a planning problem: routed, smoothed, extended beyond the goal."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,14 +24,14 @@ BEYOND = 250.0
 LENGTH = 1500.0
 CHANGE_TIME = 4.0
 CHANGE_MIN = 25.0
-# So far from its lane's centre line a path has begun to change lanes [m].
+# At this distance from its lane's centre line a path has begun to change lanes [m].
 BEGUN = 0.2
 
 
 @dataclass(frozen=True)
 class DrivingPath:
     """
-    The path that the rear axle follows, with what the map says along it.
+    The path that the rear axle follows, with data of the map along it.
 
     :param roads: the road network that it follows.
     :param path: the smooth path; it begins some way behind the vehicle.
@@ -61,10 +61,10 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem | None, start
                       vehicle: VehicleParameters, follow_lane: bool = False,
                       keep_lane: bool = False) -> DrivingPath:
     """
-    Route a planning problem and make its path.
+    Compute the route and the path of a planning problem.
 
-    The path follows the centre lines to the goal, blends lane changes over a length that grows
-    with the speed, and goes on beyond the goal for at least 200 m: along the straightest
+    The path follows the centre lines to the goal and blends lane changes over a length that grows
+    with the speed. It goes on beyond the goal for at least 200 m, along the straightest
     successors, then straight ahead where the map ends.
 
     :param start: where the vehicle is (rear axle); it need not be on the road.
@@ -87,7 +87,7 @@ def plan_driving_path(scenario: Scenario, problem: PlanningProblem | None, start
         line = _center_line(roads, route, s, change)
         before = _before(roads, lanelet, line)
         after = line[-1] + _direction(line[-3:]) * np.array([[10.0], [0.5 * BEYOND], [BEYOND]])
-        # A vehicle turns no tighter than its largest steering angle; keep a reserve to correct.
+        # The largest steering angle bounds the curvature; a reserve is kept for corrections.
         bound = 0.8 * np.tan(vehicle.max_steering_angle) / vehicle.wheelbase
         path = ReferencePath.from_polyline(np.concatenate((before, line, after)),
                                            max_curvature=float(bound))
@@ -117,7 +117,7 @@ def _center_line(roads: RoadNetwork, route: Route, start_s: float, change: float
             s = arc_length(points)
             first = s[-1] - (lines[-1].length if len(leg) > 1 else s[-1])
             first = max(first, min(position, s[-1] - 5.0), 0.0)
-            # Several changes in a row share what is left of the lane.
+            # Several changes in a row share the rest of the lane.
             share = 1 + _changes_in_row(route, index)
             last = min(first + change, first + (s[-1] - first) / share)
             blended, entered = _blend(points, s, following, first, last)
@@ -181,7 +181,7 @@ def _spans(roads: RoadNetwork, route: Route,
         ends, _ = path.project(line.points[[0, -1]], low, high)
         spans[row] = ends
         at = max(at, float(ends[1]))
-    # Beside each other run the lanelets of a lane change: the one ends where the other begins.
+    # The lanelets of a lane change run side by side: one span ends where the other begins.
     last = -1
     for leg, following in pairwise(route.legs):
         last += len(leg)
@@ -192,7 +192,7 @@ def _spans(roads: RoadNetwork, route: Route,
 
 def _first_change(roads: RoadNetwork, route: Route, path: ReferencePath,
                   spans: Array) -> tuple[float, int | None]:
-    """Find where the path begins to leave its first lane, and for which lanelet."""
+    """Find where the path begins to leave its first lane, and the lanelet to which it changes."""
     if len(route.legs) < 2:
         return np.inf, None
     leg = route.legs[0]

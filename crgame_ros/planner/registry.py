@@ -11,7 +11,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.planner.interface import Planner
 from crgame_ros.registry import ModelRegistry, POLICY
 
-# As a planner's name: a process of the user's own answers (docs/external_planners.md).
+# This planner name means that a process of the user answers (docs/external_planners.md).
 EXTERNAL = 'external'
 BUILT_IN = {
     'idm': 'crgame_ros.planner.idm:IdmPlanner',
@@ -23,7 +23,7 @@ BUILT_IN = {
 
 
 class PlannerRegistry(ModelRegistry):
-    """The planners of the package, of entry points, and those that users write."""
+    """The planners of the package, of entry points, and of users."""
 
     def __init__(self) -> None:
         super().__init__('planners', 'planner', {
@@ -32,15 +32,15 @@ class PlannerRegistry(ModelRegistry):
         self._given: dict[str, type[Planner] | Planner] = {}
 
     def names(self) -> tuple[str, ...]:
-        """List the registered names; a policy is nothing without its file."""
+        """Return the registered names, without `policy`, which needs a file."""
         return tuple(name for name in super().names() if name != POLICY)
 
     @contextlib.contextmanager
     def giving(self, planners: Mapping[str, type[Planner] | Planner]) -> Iterator[None]:
         """
-        Know classes and objects of the caller's own, for as long as the context lasts.
+        Add the caller's own classes and objects for the duration of the context.
 
-        :param planners: by the name under which a game has them.
+        :param planners: by the name that a game uses.
         """
         earlier = self._given
         self._given = {**earlier, **planners}
@@ -50,7 +50,7 @@ class PlannerRegistry(ModelRegistry):
             self._given = earlier
 
     def resolve(self, name: str, where: str, label: str) -> Any:
-        """Find what a name stands for; of an object the caller has given, its class."""
+        """Find the class for a name; for an object that the caller has given, its class."""
         if name not in self._given:
             return super().resolve(name, where, label)
         given = self._given[name]
@@ -59,9 +59,9 @@ class PlannerRegistry(ModelRegistry):
     def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
                **given: Any) -> Any:
         """
-        Make a planner, also of `policy:FILE.py:load`; take an object that the caller has given.
+        Create a planner, also of `policy:FILE.py:load`, or return the caller's own object.
 
-        :raises InputError: as for any model; if an object, which is made, is given options.
+        :raises InputError: as for any model, and if there are options for an object.
         """
         if name.startswith(POLICY):
             options = {**(options or {}), 'policy': name.removeprefix(POLICY)}
@@ -92,13 +92,13 @@ class PlannerRegistry(ModelRegistry):
 
     def wants_lights(self, name: str) -> bool:
         """
-        Return whether a planner asks for others' lights.
+        Return whether a planner wants others' lights.
 
-        One that cannot be found asks for nothing: who is to make it says why it cannot be.
+        The answer for an unknown planner is False: its creation raises the error later.
         """
         if name not in self._given and (
                 name in BUILT_IN or name == EXTERNAL or name.startswith(POLICY)):
-            # None of ours does, and the packages behind some cost seconds to import.
+            # None of these does, and the packages of some take seconds to import.
             return False
         try:
             return self.find(name).wants_lights
@@ -110,13 +110,13 @@ PLANNERS = PlannerRegistry()
 
 
 def planner_names() -> tuple[str, ...]:
-    """List the registered names: those of the package first, then those of entry points."""
+    """Return the registered names: those of the package first, then those of entry points."""
     return PLANNERS.names()
 
 
 def create_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner:
     """
-    Make a planner.
+    Create a planner.
 
     :param name: a registered name, `module:Class` or `path/to/file.py:Class`.
     :param options: keyword arguments of its constructor.

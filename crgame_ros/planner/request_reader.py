@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading a plan request from joints, the same in process and over DDS."""
+"""The reader of plan requests from joints, the same in process and over DDS."""
 
 from collections.abc import Mapping
 
@@ -17,10 +17,10 @@ import numpy as np
 
 class RequestReader:
     """
-    Turns requests of one AV into the planner's view: centre poses, by object.
+    A reader of the requests of one AV: it gives planners the centre poses by object.
 
     :param vehicle_id: the AV.
-    :param objects: description of everything that can appear, by id.
+    :param objects: description of all objects that can appear, by id.
     :param scheduler: the run's time grids, with its clock offset.
     """
 
@@ -39,7 +39,7 @@ class RequestReader:
         """
         Read one request.
 
-        :raises InputError: if it is no tick's, or names objects that nobody described.
+        :raises InputError: if its stamp is no tick, or it names objects without a description.
         """
         if series.names != self._names:
             self._learn(series.names)
@@ -66,7 +66,7 @@ class RequestReader:
             {name: light for name, light in shown if light is not None})
 
     def _learn(self, names: tuple[str, ...]) -> None:
-        """Find out which columns hold which object; the joints stay the same over a run."""
+        """Find the columns of each object; the joints stay the same during a run."""
         layout = RequestLayout.from_names(names, self._vehicle_id)
         layout.indices({name: number for number, name in enumerate(self._objects)})
         self._ids, self._columns = layout.ids, layout.columns

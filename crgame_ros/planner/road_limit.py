@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far planned poses may leave the road: no further than the vehicle is off it already."""
+"""The limit of planned poses off the road: no further than the vehicle is off it already."""
 
 from typing import TYPE_CHECKING
 
@@ -11,23 +11,23 @@ from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # Its collision objects are loaded by those only who have a road to keep to.
+if TYPE_CHECKING:  # Its collision objects are loaded only if a planner has to keep to a road.
     from crgame_ros.roads.boundary import RoadBoundary
 
 Array = NDArray[np.float64]
 
-# A plan may reach this much further off the road than its start [m]: a rear overhang in a narrow
-# bend, or a lane that was drawn narrower than the vehicle is wide.
+# A plan may reach this much further off the road than its start, for a rear overhang in a narrow
+# bend, or a lane that was drawn narrower than the vehicle [m].
 TOLERANCE = 0.2
-# Beside every road [m].
+# At this distance a pose is off every road [m].
 FAR = 1e6
 
 
 class RoadLimit:
     """
-    Judges poses of a vehicle against the road and against where it is now.
+    A check of a vehicle's poses against the road and its present overhang.
 
-    :param road: its boundary; None if it may be left.
+    :param road: boundary of the road; None if the vehicle may leave it.
     :param vehicle: the vehicle.
     """
 
@@ -39,7 +39,7 @@ class RoadLimit:
 
     @classmethod
     def from_context(cls, context: PlannerContext) -> 'RoadLimit':
-        """Make the limit of a planner; its road boundary is made ready around the start."""
+        """Create the limit of a planner, and build the road boundary around the start."""
         # Without a lanelet there is no road that could be left.
         if not context.keep_road or not context.scenario.lanelet_network.lanelets:
             return cls(None, context.vehicle)
@@ -48,7 +48,7 @@ class RoadLimit:
         return cls(context.road, context.vehicle)
 
     def start(self, ego: VehicleState) -> None:
-        """Take the vehicle's present state, beyond which no plan may leave the road."""
+        """Set the vehicle's present state: poses may be no further off the road than it is."""
         x, y = ego.center(self._rear_to_center)
         self._now = self._overhang(x, y, ego.yaw)
 
@@ -66,7 +66,7 @@ class RoadLimit:
         return allowed == 0.0 or self._road.overhang(x, y, yaw, self._shape) > allowed
 
     def rehearse(self, ego: VehicleState) -> None:
-        """Check a plan on the road and one off it: the first of each takes milliseconds more."""
+        """Check a plan on the road and one off it: the first of each takes milliseconds longer."""
         ways = np.tile(np.array(ego), (2, 1))
         ways[1, :2] += FAR
         self.refusal(ways)
@@ -76,7 +76,7 @@ class RoadLimit:
         Check a plan, whose first state is the vehicle's, in 0.1 ms.
 
         :param states: (S, 8) finite rear-axle states
-        :return: by how much it leaves the road and where, or None.
+        :return: a message of how far it leaves the road and where, or None.
         """
         if self._road is None:
             return None

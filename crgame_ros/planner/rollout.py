@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The states of a plan as they come about, each a step of the kinematic single-track model."""
+"""The states of a plan, driven step by step with the kinematic single-track model."""
 
 import math
 
@@ -24,7 +24,7 @@ REST_STEPS = 10
 
 class Rollout:
     """
-    A plan that is driven step by step (CRG 2-4), with the derivatives that its steps had.
+    A plan that is driven step by step (CRG 2-4), with the derivatives of each step.
 
     Attributes `x`, `y` [m], `yaw` [rad], `speed` [m/s] and `steering` [rad] are those of the
     rear axle after the last step.
@@ -48,7 +48,7 @@ class Rollout:
         """
         Drive a step.
 
-        :param moving_s: part of the step until it stands [s]
+        :param moving_s: part of the step until the vehicle stands [s]
         """
         dt_s, rows, before = self._dt_s, self._rows, self.speed
         self.x, self.y, self.yaw, self.speed, self.steering = step_to_rest(
@@ -64,10 +64,10 @@ class Rollout:
 def braking_plan(request: PlanRequest, last_plan: Plan | None, vehicle: VehicleParameters,
                  deceleration: float = FIRM_BRAKING) -> Plan:
     """
-    Brake to a stop along the last plan's path, beyond its end with constant curvature.
+    Return a plan that brakes to a stop on the last plan's path, with constant curvature behind it.
 
-    The steering angle is taken from the last plan as a function of the distance covered and
-    approached within the steering rate; every step is a step of the KS model (CRG 2-4).
+    The wanted steering angle is that of the last plan as a function of the distance covered. It is
+    approached within the steering rate. Every step is a step of the KS model (CRG 2-4).
 
     :param last_plan: the plan followed so far; None keeps the steering angle.
     :param deceleration: [m/s^2]
@@ -101,7 +101,7 @@ def _steering_over_distance(request: PlanRequest, last_plan: Plan | None,
     position = min(max(elapsed, 0.0), len(states) - 1.0)
     along = arc_length(states[:, :2])
     origin = float(np.interp(position, np.arange(len(states)), along))
-    # Slower states do not say where the plan leads.
+    # States at rest do not show where the plan leads.
     ahead = along > origin + REST * request.time_step_s
     if not ahead.any():
         return here

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The first lane change of a route: begun only into a gap, and put off until there is one."""
+"""The first lane change of a route, which is postponed until there is a gap."""
 
 from dataclasses import replace
 from enum import auto, Enum
@@ -15,14 +15,14 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
-# Who comes into the lane within this time counts as well [s].
+# Vehicles that come into the lane within this time count as well [s].
 LOOK_AHEAD_S = 1.0
 BEHIND, AHEAD = 120.0, 120.0
 SIDE_MARGIN = 0.4
-# What is to be left of a gap [m], and of the time to who is behind and in front [s].
+# Least gap [m], and least headway of the follower and to the leader [s].
 SHORTEST = 2.0
 HEADWAY_BEHIND_S, HEADWAY_AHEAD_S = 0.6, 0.4
-# A faster one behind reacts after this time [s] and brakes no harder than this [m/s^2].
+# A faster follower reacts after this time [s] and brakes no harder than this [m/s^2].
 REACTION_S = 0.7
 DECELERATION = 2.5
 
@@ -32,13 +32,13 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
     """
     Return whether the ego may change into the lane beside it.
 
-    It may if nobody is beside it there, and if who is behind and who is in front are so far away
-    that the one behind, reacting late and braking moderately, keeps `SHORTEST`.
+    It may if no vehicle is beside it there, and if the gaps to follower and leader are so large
+    that the vehicle behind in each keeps `SHORTEST` with a late reaction and moderate braking.
 
     :param path: runs along the lane, at a constant distance.
     :param s: arc length of the ego's rear axle [m]
     :param offset: of the lane's centre line to the left of the path [m]
-    :param ahead_too: False where the caller itself sees to who is in front.
+    :param ahead_too: False if the caller itself checks the vehicle ahead.
     """
     speed = max(request.ego.speed, 0.0)
     rear, front = vehicle.rear, vehicle.front
@@ -64,23 +64,23 @@ def has_gap(projector: ObstacleProjector, path: ReferencePath, request: PlanRequ
 
 
 def _closing(speed: float) -> float:
-    """Return the way that it takes to react and brake a closing speed down [m]."""
+    """Return the distance lost while reacting and braking down a closing speed [m]."""
     faster = max(speed, 0.0)
     return REACTION_S * faster + faster ** 2 / (2.0 * DECELERATION)
 
 
-# Beyond this offset from its lane's centre line a change is under way, and so much nearer to the
-# other lane's it is done [m].
+# Beyond this offset from its lane's centre line a change is under way. It is done when the vehicle
+# is nearer to the other lane's centre line by this [m].
 UNDER_WAY = 0.5
 NEARER = 0.5
-# The gap is looked for from this time before the change begins [s], and at least this way [m].
+# The search for a gap begins this time before the change [s], but at least this distance [m].
 NOTICE_S, NOTICE = 1.0, 5.0
-# A lane that ends is kept up to the last place from which the change still fits in [m].
+# Reserve at the end of a lane behind the last place for the change [m].
 RESERVE = 5.0
 
 
 class Verdict(Enum):
-    """What is to become of a lane change."""
+    """The state of a lane change."""
 
     FAR = auto()
     FREE = auto()
@@ -91,7 +91,7 @@ class Verdict(Enum):
 
 class LaneChange:
     """
-    Watches over the first lane change of a path.
+    The first lane change of a path.
 
     :param context: of the planner.
     :param driving: the path with the change.
@@ -108,7 +108,7 @@ class LaneChange:
         kept = plan_driving_path(context.scenario, context.planning_problem, start,
                                  context.vehicle, keep_lane=True)
         if np.isfinite(kept.end_s):
-            # What is left of the lane must do for the change, from rest.
+            # The rest of the lane must suffice for the change, from rest.
             last = kept.end_s - CHANGE_MIN - RESERVE
             kept = replace(kept, end_s=max(last, min(kept.start_s + 2.0 * CHANGE_MIN,
                                                      kept.end_s - RESERVE)))
@@ -117,7 +117,7 @@ class LaneChange:
         self._s = kept.start_s
 
     def judge(self, request: PlanRequest) -> Verdict:
-        """Return what the change may do now."""
+        """Return the present state of the change."""
         ego = request.ego
         here = np.array([[ego.x, ego.y]])
         path = self.kept.path

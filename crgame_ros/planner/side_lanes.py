@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The lanes beside a path that a vehicle may use, and how far the carriageway reaches."""
+"""The lanes beside a path that a vehicle may use, and the width of the carriageway."""
 
 from collections.abc import Iterator
 import math
@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 Reach: TypeAlias = Literal['lane', 'lanes', 'carriageway']
 
 ROAD_MARGIN = 0.2
-# Between the samples at which widths are looked up [m].
+# Distance between the samples of widths [m].
 SPACING = 5.0
-# The centre lines of lanes that run beside each other are so far apart [m].
+# Least and greatest distance between the centre lines of lanes side by side [m].
 NEAREST, FARTHEST = 2.0, 6.0
 
 
@@ -63,7 +63,7 @@ def side_lanes(driving: DrivingPath, s: float, vehicle: VehicleParameters) -> li
 
 
 def _end(driving: DrivingPath, first: int, neighbour_of: object) -> float:
-    """Follow the path's lanelets as long as the next one has that neighbour too."""
+    """Return the arc length up to which the path's lanelets have that neighbour."""
     roads = driving.roads
     beside = neighbour_of(roads, driving.lanelets[first])  # type: ignore[operator]
     for index in range(first, len(driving.lanelets)):
@@ -79,10 +79,10 @@ def _end(driving: DrivingPath, first: int, neighbour_of: object) -> float:
 
 def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, reach: Reach) -> Array:
     """
-    Find how far the rear axle may leave the path before the vehicle leaves what it may use.
+    Return how far the rear axle may leave the path within the lanes that the vehicle may use.
 
-    :param reach: its lane alone, with the neighbours of the same direction, or with those of the
-        other direction too.
+    :param reach: its lane alone, also the neighbours of the same direction, or also those of the
+        other direction.
     :return: (N, 2) least and greatest offset at the path's samples [m]
     """
     s = driving.path.s
@@ -107,7 +107,7 @@ def road_bounds(driving: DrivingPath, vehicle: VehicleParameters, reach: Reach) 
 
 
 def _widths(roads: RoadNetwork, lanelet: int, s: float, reach: Reach) -> Iterator[float]:
-    """Yield the widths of a lanelet and of what may be used on its right and left [m]."""
+    """Yield the widths of a lanelet and of its usable neighbours on the right and left [m]."""
     own = roads.lanelet_network.find_lanelet_by_id(lanelet)
     yield roads.width_at(lanelet, s)
     for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How fast to drive along a path: desired speed, speed limits and curves."""
+"""The speed profile of a path: desired speed, speed limits and curves."""
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.planner.reference_path import DrivingPath
@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# 30 km/h: nobody wants to go slower than this on a road without signs.
+# Least desired speed on a road without signs: 30 km/h [m/s].
 SLOWEST_DESIRED = 30.0 / 3.6
 STEERING_RATE_SHARE = 0.6
 
 
 def default_speed(problem: PlanningProblem) -> float:
     """
-    Guess the desired speed where no sign tells it.
+    Return the desired speed on roads without speed limits.
 
-    The initial speed, the middle of the goal's speed interval or 30 km/h, whichever is largest:
-    a vehicle that starts from rest or in a queue wants to get going.
+    It is the initial speed, the middle of the goal's speed interval or 30 km/h, whichever is
+    largest, because a vehicle that starts from rest or in a queue has a low initial speed.
 
     :return: [m/s]
     """
@@ -61,11 +61,11 @@ def desired_speeds(driving: DrivingPath, wanted: float | None, default: float) -
 def admissible_speeds(driving: DrivingPath, desired: Array, vehicle: VehicleParameters,
                       lateral_acceleration: float, deceleration: float) -> Array:
     """
-    Lower the desired speed for curves and look ahead.
+    Return the desired speed, lowered for curves and for lower speeds ahead.
 
     :param desired: (N) [m/s]
     :param lateral_acceleration: comfortable in curves [m/s^2]
-    :param deceleration: with which a lower speed ahead is approached [m/s^2]
+    :param deceleration: towards a lower speed ahead [m/s^2]
     :return: (N) [m/s]
     """
     path = driving.path

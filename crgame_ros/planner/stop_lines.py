@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where traffic lights and stop signs along a path want a vehicle to halt."""
+"""Stop lines: where a vehicle halts for traffic lights and stop signs along a path."""
 
 from dataclasses import dataclass
 
@@ -51,10 +51,10 @@ class StopLines:
         """
         Find the nearest line to halt at.
 
-        Red and red-yellow: unless braking as hard as possible would not suffice. Yellow: if
-        comfortable braking suffices. A stop sign: until the vehicle stood there once.
+        The vehicle halts at red and red-yellow if the hardest braking suffices, at yellow if
+        comfortable braking suffices, and at a stop sign until it has stood there once.
 
-        :param k: scenario time step, whose light states count.
+        :param k: scenario time step of the light states.
         :param front: arc length of the vehicle's front [m]
         :param speed: [m/s]
         :return: arc length of the line [m], or None
@@ -97,7 +97,7 @@ def _find(scenario: Scenario, driving: DrivingPath) -> tuple[StopLine, ...]:
 
 
 def _turn(driving: DrivingPath, index: int) -> str:
-    """Return where the route turns behind the lanelet: left, right or straight."""
+    """Return the turn of the route behind a lanelet: left, right or straight."""
     if index + 1 >= len(driving.lanelets):
         return 'straight'
     start, end = driving.path.pose_at(driving.lanelet_spans[index + 1])[:, 2]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a policy's action means, the same in training, offline and live."""
+"""The meaning of a policy's actions, the same in training, offline and live."""
 
 from collections.abc import Sequence
 import math
@@ -22,23 +22,24 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ActionKind = Literal['acceleration', 'pedals', 'plan']
 ACTION_KINDS: tuple[ActionKind, ...] = ('acceleration', 'pedals', 'plan')
-# What 1 and -1 stand for: driving on and braking [m/s^2].
+# Acceleration for 1 and deceleration for -1 [m/s^2].
 DRIVING, BRAKING = 4.0, 8.0
-# The greatest curvature is that of full lock, and of so much lateral acceleration [m/s^2].
+# The greatest curvature is the lower of those of full lock and of this lateral acceleration
+# [m/s^2].
 LATERAL = 5.0
-# An action is planned on for so long, should the next one be late [s].
+# Length of the plan of an action, in case the next one is late [s].
 HELD_S = 0.5
 # Points of an action that is a plan, a scenario step apart.
 PLAN_POINTS = 10
-# Slower than this a heading that changes says nothing of the steering [m/s].
+# Below this speed the steering angle is not computed from the heading's change [m/s].
 _CREEPING = 0.5
-# Rounds in which the steering ratio, which depends on the angle sought, settles.
+# Iterations for the steering ratio, which depends on the steering-wheel angle to be found.
 _ROUNDS = 6
 
 
 class WantedMotion(NamedTuple):
     """
-    What the action `acceleration` asks for.
+    The motion that the action `acceleration` demands.
 
     :param acceleration: along the heading [m/s^2]
     :param curvature: of the rear axle's path, left positive [1/m]
@@ -64,7 +65,7 @@ def action_bounds(kind: ActionKind) -> tuple[NDArray[np.float32], NDArray[np.flo
 
 def checked_action(kind: ActionKind, action: Any) -> Array:
     """
-    Cut an action to its bounds.
+    Return an action clipped to its bounds.
 
     :raises PlanningError: if it has another shape, or a number that is not finite.
     """
@@ -79,10 +80,10 @@ def checked_action(kind: ActionKind, action: Any) -> Array:
 
 def wanted_motion(action: Array, speed: float, vehicle: VehicleParameters) -> WantedMotion:
     """
-    Return what an action `acceleration` asks for.
+    Return the motion that an action `acceleration` demands.
 
-    :param action: (2) in [-1, 1]: 1 is 4 m/s^2, -1 is braking by 8 m/s^2; then the share of the
-        curvature that the vehicle can drive at its speed, left positive
+    :param action: (2) in [-1, 1]: 1 is 4 m/s^2, -1 is braking with 8 m/s^2; then the share of the
+        greatest curvature at the vehicle's speed, left positive
     :param speed: of the vehicle [m/s]
     """
     pedal, turn = action.tolist()
@@ -104,12 +105,12 @@ def pedals(action: Array) -> DriverCommand:
 def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
                    vehicle: VehicleParameters, dt_s: float, substeps: int) -> Array:
     """
-    Plan what an action means.
+    Return the planned states of an action.
 
-    :param action: as `checked_action` gives it.
+    :param action: from `checked_action`.
     :param ego: present state, rear axle.
     :param dt_s: scenario step [s]
-    :param substeps: simulation steps in it, of which a driven vehicle's motion is made.
+    :param substeps: simulation steps in it, for the motion of a vehicle driven by pedals.
     :return: (S, 8) rear-axle states, a scenario step apart, the first the ego's
     """
     if kind == 'plan':
@@ -123,7 +124,7 @@ def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
     for _ in range(steps):
         speed, acceleration = drive.speed, wanted.acceleration
         if speed <= 0.0 and acceleration < 0.0:
-            # Brakes hold; whoever rolls backwards is stopped.
+            # Brakes hold a standing vehicle, and stop one that rolls backwards.
             acceleration = BRAKING if speed < 0.0 else 0.0
         acceleration = min(acceleration, (vehicle.max_speed - speed) / dt_s)
         moving_s = moving_time(speed, acceleration, dt_s)
@@ -135,7 +136,7 @@ def planned_states(kind: ActionKind, action: Array, ego: VehicleState,
 
 def _driven(command: DriverCommand, ego: VehicleState, vehicle: VehicleParameters, steps: int,
             dt_s: float, substeps: int) -> Array:
-    """Drive as a person would who holds a command."""
+    """Return the states of a human's vehicle under a constant command."""
     driven, states = HumanVehicle(vehicle, ego), [ego]
     for _ in range(steps):
         for _ in range(substeps):
@@ -145,7 +146,7 @@ def _driven(command: DriverCommand, ego: VehicleState, vehicle: VehicleParameter
 
 
 def _stated(points: Array, ego: VehicleState, vehicle: VehicleParameters, dt_s: float) -> Array:
-    """Complete the states of which an action says x, y, yaw and speed."""
+    """Return complete states from the x, y, yaw and speed of an action."""
     states = np.empty((len(points) + 1, STATE_WIDTH))
     states[0] = ego
     cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
@@ -163,7 +164,7 @@ def _stated(points: Array, ego: VehicleState, vehicle: VehicleParameters, dt_s: 
 
 def _steering(states: Array, turn: Array, vehicle: VehicleParameters,
               dt_s: float) -> Sequence[float]:
-    """Return the angles (S - 1) that turn the heading so, as fast as the wheels follow."""
+    """Return the steering angles (S - 1) for turns of the heading, within the steering rate."""
     angle, angles = float(states[0, StateColumn.STEERING_ANGLE]), []
     speeds = states[:, StateColumn.SPEED]
     for mean, turned in zip((0.5 * (speeds[1:] + speeds[:-1])).tolist(), turn.tolist(),
@@ -180,9 +181,9 @@ def _steering(states: Array, turn: Array, vehicle: VehicleParameters,
 
 class PedalInverse:
     """
-    Drives a human's vehicle by acceleration and curvature.
+    The inverse of a human's controls: pedals and wheel from acceleration and curvature.
 
-    What pedals cannot do is done as far as they can. The lag of the powertrain stays.
+    A motion beyond the range of the controls is approximated. The lag of the powertrain remains.
 
     :param vehicle: its parameters.
     """
@@ -196,10 +197,10 @@ class PedalInverse:
         """
         Return the command for a motion, forwards.
 
-        :param speed: present one [m/s]
+        :param speed: present speed [m/s]
         """
         vehicle = self._vehicle
-        # What drag and rolling resistance do by themselves; at rest nothing moves.
+        # Deceleration by drag and rolling resistance alone; none at rest.
         coasting = self._powertrain.command(RELEASED, speed, 1) if speed else 0.0
         force = vehicle.mass * (wanted.acceleration - coasting)
         if force >= 0.0 and not (speed == 0.0 and wanted.acceleration <= 0.0):

@@ -28,10 +28,10 @@ class DrivenSeat:
 
     :param row: of its vehicle among the driven ones.
     :param driven: (V) all driven vehicles.
-    :param others: (M) everything else that can appear.
+    :param others: (M) all other objects that can appear.
     :param scenario: the road.
     :param vehicle: its parameters.
-    :param start: where it begins, rear axle, simulation coordinates.
+    :param start: initial state, rear axle, simulation coordinates.
     :param transform: from simulation coordinates to those of the road.
     :param steps_per_tick: simulation steps in a scenario step.
     """
@@ -53,11 +53,11 @@ class DrivenSeat:
 
 class PolicyDriver(DriverSource):
     """
-    Asks a policy at scenario steps, and holds its action until the next.
+    A driver that gets actions from a policy at scenario steps and holds each until the next.
 
-    :param policy: whose action is `acceleration` or `pedals`.
-    :param seat: that it takes.
-    :raises InputError: if its action is a plan, which nobody can drive by pedals.
+    :param policy: its action is `acceleration` or `pedals`.
+    :param seat: the seat that the policy takes.
+    :raises InputError: if its action is a plan, which pedals cannot drive.
     """
 
     def __init__(self, policy: Policy, seat: DrivenSeat) -> None:
@@ -79,7 +79,7 @@ class PolicyDriver(DriverSource):
 
     def see(self, n: int, vehicle_states: NDArray[np.float64],
             objects: ObjectStates | None) -> None:
-        """Decide at a scenario step; between them only look at the own speed."""
+        """Update the action at a scenario step, and the vehicle's speed at any step."""
         state = self._view.own(vehicle_states)
         self._speed = state.speed
         if objects is None:
@@ -95,7 +95,7 @@ class PolicyDriver(DriverSource):
         self._decided_speed = state.speed
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
-        """Return the command of the action in force; released before there is one."""
+        """Return the command of the present action; released before there is one."""
         if self._action is None:
             return RELEASED
         if self._policy.action == 'pedals':

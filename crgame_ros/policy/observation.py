@@ -3,8 +3,8 @@
 """
 The observation of a policy: the same in training, offline and live.
 
-Everything is seen from the vehicle's rear axle: x ahead, y to the left. Many vehicles are observed
-at once; what one is told does not depend on the others.
+Coordinates are those of the vehicle's rear axle: x ahead, y to the left. Many vehicles are
+observed at once; the observation of one does not depend on the others.
 """
 
 from collections.abc import Sequence
@@ -33,11 +33,11 @@ Observed = dict[str, NDArray[np.float32]]
 
 class Observation:
     """
-    Makes observations of one kind of vehicle among the same things.
+    The observation of one kind of vehicle among the same objects.
 
-    :param spec: what is told.
+    :param spec: parts of the observation.
     :param vehicle: parameters of the vehicle.
-    :param things: (N) everything else that can appear; who of them is there comes with each call.
+    :param things: (N) all other objects that can appear; each call gives those that are present.
     """
 
     def __init__(self, spec: ObservationSpec, vehicle: VehicleParameters,
@@ -57,7 +57,7 @@ class Observation:
     def observe(self, states: Sequence[VehicleState], places: Sequence[RoutePlace],
                 guides: Sequence[RouteGuide], poses: Array, velocities: Array) -> Observed:
         """
-        Observe B vehicles.
+        Return the observations of B vehicles.
 
         :param states: (B) rear axle, scenario coordinates.
         :param places: (B) on their routes.
@@ -78,7 +78,7 @@ class Observation:
             else:
                 values = self._ranges(states, poses)
             low, high = self._bounds[part]
-            # Rounded last: what is cut must be a bound of the space to the last bit.
+            # Rounded before clipping: a clipped value must equal the bound to the last bit.
             made[part] = np.minimum(np.maximum(values.astype(np.float32), low), high)
         return made
 
@@ -99,7 +99,7 @@ class Observation:
             return result
         apart = poses[:, :, :2] - own[:, None, :2]
         distance = np.einsum('bni,bni->bn', apart, apart)
-        # NaN, who is absent, is farther than everybody.
+        # NaN, an absent object, counts as infinitely far.
         distance = np.where(distance <= self.spec.reach ** 2, distance, np.inf)
         nearest = np.argsort(distance, axis=1, kind='stable')[:, :wanted]
         there = np.isfinite(distance[rows, nearest])

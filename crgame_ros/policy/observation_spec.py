@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a policy is told of the world: which parts, how many numbers, in which units."""
+"""The specification of a policy's observation: its parts, their sizes and units."""
 
 from dataclasses import dataclass
 import math
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Part = Literal['state', 'route', 'objects', 'lidar']
-# No goal is farther away, and none at all is as far [m].
+# Greatest distance to a goal, and the distance without one [m].
 FAR = 1000.0
-# No driven or recorded vehicle is faster, or accelerates more.
+# Greatest speed [m/s] and acceleration [m/s^2] of driven or recorded vehicles.
 _FASTEST, _HARDEST = 200.0, 100.0
 
 
@@ -23,7 +23,7 @@ class ObservedColumn(NamedTuple):
     """
     A number of an observation.
 
-    :param low: its least value; smaller ones are cut.
+    :param low: its least value; smaller ones are clipped.
     :param high: its greatest value.
     """
 
@@ -88,7 +88,7 @@ class ObservationSpec:
     horizon: Annotated[float, Within(1.0, FAR)] = 60.0
 
     def check(self) -> None:
-        """Refuse a part that is named twice."""
+        """Raise `InputError` if a part is named twice."""
         if len(set(self.parts)) < len(self.parts):
             raise InputError('"parts" names one twice')
 

@@ -13,13 +13,13 @@ from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.policy.seat_view import RequestView
 
-# Of a person's motion by pedals, as live games have it [s].
+# Simulation step of a vehicle driven by pedals, as in live games [s].
 DRIVEN_STEP_S = 0.01
 
 
 class PolicyPlanner(Planner):
     """
-    Ask a policy for an action at each request, and plan what that means.
+    A planner that gets an action from a policy at each request and plans its motion.
 
     :param policy: `FILE.py:load`.
     """
@@ -30,7 +30,7 @@ class PolicyPlanner(Planner):
         self._policy = load_policy(policy)
 
     def setup(self, context: PlannerContext) -> None:
-        """Plan the route, and warm the policy up, which may take long at first."""
+        """Plan the route, and run the policy once, because its first call may take long."""
         self._context = context
         self._view = RequestView(context.vehicle_id, context.objects)
         self._observation = Observation(self._policy.spec, context.vehicle, self._view.things)
@@ -45,7 +45,7 @@ class PolicyPlanner(Planner):
         self._decided_k = None
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Decide, or hold on to what was decided; plan it from where the vehicle is."""
+        """Plan a new action, or the held one, from the vehicle's present state."""
         decided, place = self._decided_k, self._guide.follow(request.ego)
         if decided is None or not 0 < request.k - decided < self._policy.ticks:
             self._decided_k = request.k

@@ -21,14 +21,14 @@ _SEE = 'see docs/gym.md'
 @dataclass(frozen=True)
 class Policy:
     """
-    What `load` in a policy's file gives.
+    A policy, as `load` in its file returns it.
 
-    :param act: gives the action for an observation: arrays by part, as the environment gives
-        them. It must depend on nothing else but what it has seen since `begin`.
-    :param action: what its actions mean, as in the environment it was trained in.
-    :param observation: what it is told, as there: keys of `ObservationSpec`.
+    :param act: returns the action for an observation: arrays by part, as from the environment.
+        The action must depend only on the observations since `begin`.
+    :param action: kind of its actions, as in the environment it was trained in.
+    :param observation: parts of its observation, as there: keys of `ObservationSpec`.
     :param ticks: scenario steps for which an action holds, as there.
-    :param begin: is called before each run; for policies that remember.
+    :param begin: is called before each run, for policies with internal state.
     """
 
     act: Callable[[Mapping[str, NDArray[np.float32]]], Any]
@@ -39,9 +39,9 @@ class Policy:
 
     def check_pedals(self, seat: str) -> None:
         """
-        Refuse to drive a human's seat by plans.
+        Check that the policy can drive a human's seat: plans cannot.
 
-        :raises InputError: naming the seat.
+        :raises InputError: naming the seat, if its actions are plans.
         """
         if self.action == 'plan':
             raise InputError('its actions are plans, which no pedals can drive',
@@ -50,7 +50,7 @@ class Policy:
 
     @property
     def spec(self) -> ObservationSpec:
-        """Return what it is told."""
+        """Return the specification of its observation."""
         return read(ObservationSpec, dict(self.observation), 'observation of the policy')
 
 
@@ -58,10 +58,10 @@ def load_policy(name: str, where: str = '') -> Policy:
     """
     Load a policy.
 
-    :param name: `FILE.py:load`: a file, and a function in it that takes nothing and gives a
+    :param name: `FILE.py:load`: a file, and a function in it without arguments that returns a
         `Policy`.
     :param where: the file and key that named it, for messages.
-    :raises InputError: if there is none, it may not be run or is no policy.
+    :raises InputError: if there is no such file or function, it fails, or it returns no policy.
     """
     label = f'{where}: {POLICY}{name}' if where else f'{POLICY}{name}'
     file, _, function = name.rpartition(':')
@@ -87,7 +87,7 @@ def load_policy(name: str, where: str = '') -> Policy:
 
 
 def _called(path: Path, function: str, label: str) -> Any:
-    """Run a file as a module of its own, and give what its function gives."""
+    """Run a file as a module of its own, and return the result of its function."""
     try:
         module = module_of_file(path, f'crgame_ros_policy_{path.stem}')
         load = getattr(module, function, None)

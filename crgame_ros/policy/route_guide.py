@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The route that a seat is to follow: where it is along it, how fast it may drive, how far."""
+"""The route of a seat: the vehicle's place on it, the speed limit and the distance to the goal."""
 
 import math
 from typing import NamedTuple
@@ -19,15 +19,16 @@ from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 import shapely
 
-# A path that goes on is planned anew when so little of it is left [m].
+# A path that goes on is planned anew when less than this is left of it [m].
 RESERVE = 300.0
-# Whoever is farther beside the route, or has come farther than that at once, is sought anew [m].
+# A vehicle farther than this beside the route, or that has moved farther than this at once, is
+# searched on the whole route [m].
 LOST, JUMP = 10.0, 20.0
 
 
 class RoutePlace(NamedTuple):
     """
-    Where a vehicle is along its route.
+    The place of a vehicle on its route.
 
     :param s: arc length of the rear axle [m]
     :param d: its offset to the left [m]
@@ -35,7 +36,7 @@ class RoutePlace(NamedTuple):
     :param curvature: of the route there [1/m]
     :param speed_limit: there [m/s]
     :param goal_distance: along the route, 1000 m at most [m]
-    :param progress: come along the route since the place before [m]
+    :param progress: distance along the route since the previous place [m]
     """
 
     s: float
@@ -49,13 +50,13 @@ class RoutePlace(NamedTuple):
 
 class RouteGuide:
     """
-    Follows one vehicle along its route.
+    The route of one vehicle, on which its place is tracked.
 
     An AV's route leads to the goal of its planning problem, a human's along its lane.
 
     :param scenario: with at least one lanelet.
     :param problem: None follows the lane.
-    :param start: where the vehicle is, rear axle, scenario coordinates.
+    :param start: initial state of the vehicle, rear axle, scenario coordinates.
     :param vehicle: its parameters.
     :raises PlanningError: if there is no road to follow.
     """
@@ -67,13 +68,13 @@ class RouteGuide:
         self._plan(start)
 
     def restart(self, state: VehicleState) -> None:
-        """Begin another drive over the same route."""
+        """Start another drive on the same route."""
         if self._replanned:
             self._plan(state)
         self._s = self._search(state)
 
     def follow(self, state: VehicleState) -> RoutePlace:
-        """Return where the vehicle is now, which it was near before."""
+        """Return the vehicle's present place, searched near the previous one."""
         path, before = self.driving.path, self._s
         s, d, heading = path.locate(state.x, state.y, before)
         if not (abs(d) < LOST and abs(s - before) < JUMP):
@@ -107,7 +108,7 @@ class RouteGuide:
 
 
 def _goal(driving: DrivingPath, problem: PlanningProblem | None) -> float:
-    """Return the arc length at which the route comes to its goal; inf without one."""
+    """Return the arc length at which the route reaches its goal; inf without one."""
     if problem is None or not driving.reaches_goal:
         return math.inf
     path = driving.path

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The world around one driven vehicle, as a policy that drives it is told of it."""
+"""The world around one driven vehicle, as input of its policy's observation."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 
 class Surrounded(NamedTuple):
     """
-    A vehicle among the things around it, in scenario coordinates.
+    A vehicle and the objects around it, in scenario coordinates.
 
     :param state: of its rear axle.
-    :param poses: (N, 3) centres of all things; NaN where absent
+    :param poses: (N, 3) centres of all objects; NaN where absent
     :param velocities: (N, 3)
     """
 
@@ -32,10 +32,10 @@ class Surrounded(NamedTuple):
 
 class RequestView:
     """
-    Reads a plan request as a policy is told of it.
+    The view of a policy that plans: the present objects of a plan request.
 
-    :param vehicle_id: of the AV that asks.
-    :param objects: description of everything that may appear in a request, by id.
+    :param vehicle_id: of the AV in the request.
+    :param objects: description of every object that may appear in a request, by id.
     """
 
     def __init__(self, vehicle_id: str, objects: Mapping[str, ObjectDescription]) -> None:
@@ -44,7 +44,7 @@ class RequestView:
         self._rows = {item.id: row for row, item in enumerate(self.things)}
 
     def observe(self, request: PlanRequest) -> Surrounded:
-        """Return what is around the AV at the time of the request; the predictions stay unread."""
+        """Return the AV and the objects around it at the time of the request, no predictions."""
         poses, velocities = np.full((2, len(self.things), 3), np.nan)
         rows = [self._rows[name] for name in request.obstacle_ids]
         poses[rows], velocities[rows] = request.obstacle_poses[0], request.obstacle_velocities[0]
@@ -53,11 +53,11 @@ class RequestView:
 
 class SeatView:
     """
-    Looks at a world from one of its driven vehicles.
+    The view of the world from one of its driven vehicles.
 
     :param row: of the vehicle among the driven ones.
     :param driven: (V) all driven vehicles.
-    :param others: (M) everything else that can appear.
+    :param others: (M) all other objects that can appear.
     :param transform: from simulation to scenario coordinates, where its road is.
     """
 
@@ -79,7 +79,7 @@ class SeatView:
 
     def observe(self, states: Array, objects: ObjectStates) -> Surrounded:
         """
-        Return what is around it.
+        Return the vehicle and the objects around it.
 
         :param states: (V, 8) rear axles, simulation coordinates
         :param objects: (M) at the same time.
@@ -97,5 +97,5 @@ class SeatView:
         return Surrounded(self.own(states), poses, velocities)
 
     def in_simulation(self, poses: Array) -> Array:
-        """Return poses (..., 3) of the road's coordinates in those of the simulation."""
+        """Return poses (..., 3) in simulation coordinates from those in the road's."""
         return poses if self._transform.is_identity else self._transform.to_simulation(poses)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a vehicle has left the road (CRG III-D b)."""
+"""The road boundary: checks whether a vehicle has left the road (CRG III-D b)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# Building time grows with the number, and with the bends: 10 to 80 ms for 150 polygons.
+# Polygons of a tile. Building time grows with the number and the bends: 10 to 80 ms for 150.
 TILE_POLYGONS = 150
-# Surfaces and tiles that are kept: batches of runs build those of their roads many times.
+# Number of cached surfaces and tiles: batches of runs need those of their roads many times.
 _KEPT_SURFACES, _KEPT_TILES = 8, 32
 # How far the boundary object reaches beyond the road [m]; nothing is detected beyond.
 BOUNDARY_MARGIN = 2000.0
 # Smaller pieces make more triangles to build, larger ones more to check [m].
 PIECE_SIZE = 20.0
-# So many of them lie along a side of the map at most.
+# Greatest number of pieces along a side of the map.
 MOST_PIECES = 4000
 
 
@@ -38,7 +38,7 @@ class _Tile:
     """
     The boundary around one place, exact for every footprint inside its circle.
 
-    Bounds and boundary are relative to the centre, where the numbers are smallest.
+    Bounds and boundary are relative to the centre, for small numbers.
 
     :param x: centre, from the origin of the network [m]
     :param y: likewise [m]
@@ -62,16 +62,16 @@ class RoadBoundary:
     """
     The road boundary of a lanelet network.
 
-    Around the places named to `prepare` the boundary is triangulated and a check takes a few
-    microseconds; elsewhere the footprint must lie within the united lanelets, which gives the
-    same answer in about 20 microseconds. Nothing is ever built during a check.
+    Around the positions given to `prepare` the boundary is triangulated, and a check takes a few
+    microseconds. Elsewhere a check tests whether the footprint lies within the united lanelets,
+    which gives the same answer in about 20 microseconds. A check never builds anything.
 
     :param lanelet_network: the CommonRoad lanelet network; it is not changed.
     """
 
     def __init__(self, lanelet_network: LaneletNetwork) -> None:
-        # Everything here counts from the first lanelet: in projected coordinates of millions of
-        # metres uniting polygons leaves holes of rounding width.
+        # All coordinates are relative to the first lanelet: in projected coordinates of millions
+        # of metres the union of polygons has holes of rounding width.
         lanelets = lanelet_network.lanelets
         x, y = lanelets[0].left_vertices[0][:2].tolist() if lanelets else (0.0, 0.0)
         self._origin = (x, y)
@@ -82,7 +82,7 @@ class RoadBoundary:
 
     def prepare(self, positions: Iterable[tuple[float, float]]) -> None:
         """
-        Build the boundary around positions (x, y) [m] unless it is there; takes some 10 ms each.
+        Build the boundary around positions (x, y) [m] if it is missing, in some 10 ms each.
 
         A map of up to `TILE_POLYGONS` polygons is built as a whole at the first position.
         """
@@ -111,7 +111,7 @@ class RoadBoundary:
 
     def contains(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> bool:
         """
-        Return whether a footprint lies within the united lanelets: the second opinion.
+        Return whether a footprint lies within the united lanelets, an independent check.
 
         Parameters as in `is_off_road`.
         """
@@ -120,7 +120,7 @@ class RoadBoundary:
 
     def are_off_road(self, poses: NDArray[np.float64], shape: Shape) -> NDArray[np.bool_]:
         """
-        Tell of many footprints whether any part is off the road, 2 microseconds for each.
+        Return for many footprints whether any part is off the road, in 2 microseconds each.
 
         :param poses: (S, 3) x [m], y [m] and yaw [rad] of their centres
         :return: (S)
@@ -132,9 +132,9 @@ class RoadBoundary:
     def are_beyond(self, poses: NDArray[np.float64], shape: Shape,
                    distance: float) -> NDArray[np.bool_]:
         """
-        Tell of many footprints whether they reach further beyond the road than a distance [m].
+        Return for many footprints whether their overhang exceeds a distance [m].
 
-        Parameters otherwise as in `are_off_road`, what reaches how far as in `overhang`.
+        Other parameters are as in `are_off_road`; the overhang is that of `overhang`.
         """
         corners = self._footprint(shape).outlines(poses - (*self._origin, 0.0))
         near = shapely.dwithin(self._surface, shapely.points(corners), distance)
@@ -143,15 +143,15 @@ class RoadBoundary:
 
     def overhang(self, x_center: float, y_center: float, yaw: float, shape: Shape) -> float:
         """
-        Measure how far a footprint reaches beyond the road: 0 on it [m].
+        Return how far a footprint reaches beyond the road: 0 on it [m].
 
-        It is the distance from the road to the footprint's farthest corner, also of one that is
-        off the road as a whole; infinite where there is no road. Parameters as in `is_off_road`.
+        It is the distance from the road to the footprint's farthest corner, even if the whole
+        footprint is off the road; infinite without any road. Parameters as in `is_off_road`.
         """
         if not self._polygons:
             return math.inf
-        # Between the corners nothing is farther from the road: a gap narrower than the footprint
-        # is crossed, not left.
+        # No point between the corners counts: a vehicle crosses a gap narrower than its footprint
+        # and does not leave the road there.
         pose = np.array(((x_center - self._origin[0], y_center - self._origin[1], yaw),))
         corners = shapely.points(self._footprint(shape).outlines(pose))
         return float(shapely.distance(self._surface, corners).max())
@@ -163,10 +163,10 @@ class RoadBoundary:
         return footprint
 
 
-# Only what lanelets and place decide is shared: a check never depends on other runs.
+# The cache depends only on lanelets and place, so that a check never depends on other runs.
 @lru_cache(_KEPT_SURFACES)
 def _united(polygons: tuple[bytes, ...]) -> tuple[NDArray[np.object_], shapely.Geometry]:
-    """Return the pieces of road, polygons (WKB) and what mends their seams, and their union."""
+    """Return the pieces of road, polygons (WKB) and patches of their seams, and their union."""
     lanelets = shapely.from_wkb(polygons).tolist() if polygons else []
     patches = seam_patches(shapely.union_all(lanelets))
     return np.array([*lanelets, *patches], dtype=object), road_surface(lanelets, patches)
@@ -187,7 +187,7 @@ def _tile_at(polygons: tuple[bytes, ...], x: float, y: float) -> _Tile:
 def _is_off(tile: _Tile, footprint: Footprint, x: float, y: float, yaw: float) -> bool:
     x, y = x - tile.x, y - tile.y
     x_min, y_min, x_max, y_max = tile.bounds
-    # The centre beyond the road decides alone, so that no margin is too small.
+    # A centre beyond the road's bounds decides alone, so that no margin is too small.
     if not (x_min <= x <= x_max and y_min <= y <= y_max):
         return True
     for part in footprint.at(x, y, yaw):
@@ -211,7 +211,7 @@ def _triangulated_outside(pieces: list[shapely.Polygon]) -> pycrcc.ShapeGroup:
     # Mitred, so that the frame has straight sides and its triangles stay out of the inner box.
     frame = inner.buffer(BOUNDARY_MARGIN, join_style='mitre').difference(inner)
     strips = triangle_corners(np.array([frame, *_cut(inner.difference(surface))]))
-    # Triangles made here would belong to Python, which finds them undestroyed when it ends.
+    # Triangles created here would belong to Python, which reports them as leaks at its exit.
     return pycrcc.Util.convert_tristrips_to_triangles([strips.tolist()], surface.bounds, 0)
 
 
@@ -219,8 +219,8 @@ def _cut(area: shapely.Geometry) -> list[shapely.Polygon]:
     """
     Halve an area until its pieces are small or rectangular.
 
-    Triangles are sought by their extents: a long one across a bend would be tested in vain by
-    every check there.
+    The checker finds triangles by their extents: it would test a long one across a bend in every
+    check there.
     """
     done: list[shapely.Polygon] = []
     low_x, low_y, high_x, high_y = area.bounds if not area.is_empty else (0.0, 0.0, 0.0, 0.0)

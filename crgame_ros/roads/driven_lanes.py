@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""On which lanelets a path leads, where lanelets overlap as they do in junctions."""
+"""The lanelets that a path follows, also where lanelets overlap, as in junctions."""
 
 from collections.abc import Collection
 
@@ -9,10 +9,10 @@ from crgame_ros.roads.turns import Turns
 import numpy as np
 from numpy.typing import NDArray
 
-# How unlikely steps are, beside how badly poses agree with lanes (`RoadNetwork.candidates`):
-# to the lane beside, and to one that has nothing to do with the one before.
+# Costs of steps, added to the scores of poses on lanes (`RoadNetwork.candidates`): to the lane
+# beside, and to a lane without connection to the previous one.
 _BESIDE, _STRANGE = 1.0, 4.0
-# A lane that is not on the way to the goal is a little less likely.
+# Cost of a lane that is not on the route.
 _OFF_ROUTE = 0.05
 
 
@@ -24,8 +24,8 @@ def driven_lanes(roads: RoadNetwork, turns: Turns, poses: NDArray[np.float64],
     :param roads: the roads.
     :param turns: of these roads.
     :param poses: (N, 3) finite x [m], y [m], yaw [rad]
-    :param route: lanelets that are preferred where poses alone leave it open.
-    :return: the lanelets one after the other, each once in a row; none off the road
+    :param route: lanelets that are preferred where poses alone do not decide.
+    :return: the lanelets in order, without repetitions in a row; none off the road
     """
     rows, lanes, scores = roads.candidates(poses)
     ids = [roads.lanelet_ids[lane] for lane in lanes.tolist()]
@@ -40,7 +40,7 @@ def driven_lanes(roads: RoadNetwork, turns: Turns, poses: NDArray[np.float64],
 
 def _continued(turns: Turns, best: dict[int, tuple[float, tuple[int, ...]]], lanelet: int,
                cost: float) -> list[tuple[float, tuple[int, ...]]]:
-    """Return what it costs to have come to a lanelet, and the way to it, in each possible way."""
+    """Return cost and lanelets of each possible way to a lanelet."""
     if not best:
         return [(cost, (lanelet,))]
     return [(before + cost + _step(turns, path[-1], lanelet),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finding the lanes of many poses at once, fast enough for every tick of a running simulation."""
+"""A search for the lanes of many poses at once, fast enough for every tick of a simulation."""
 
 from collections.abc import Sequence
 import math
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 FloatArray = NDArray[np.float64]
-# Of lanes side by side, crossing and merging, so many samples hold the best one.
+# Nearest samples that are compared: among lanes side by side, crossing and merging, these contain
+# the best one.
 CANDIDATES = 16
-# Samples of the tables that are looked up: every second one.
+# Only every second sample of the tables is used.
 STRIDE = 2
-# Farther from every centre line than this, nobody is on a lane [m].
+# A pose farther than this from every centre line is on no lane [m].
 REACH = 3.0
 
 
@@ -24,9 +25,9 @@ class LaneLookup:
     """
     The lanes' centre lines as samples in one tree.
 
-    :param tables: of each lane the poses (n, 3) along its centre line, at equal distances.
+    :param tables: poses (n, 3) along the centre line of each lane, at equal distances.
     :param spacing: that distance [m]
-    :param max_angle: beyond this angle to a lane nobody drives along it [rad]
+    :param max_angle: greatest angle between a pose and a lane on which it drives [rad]
     """
 
     def __init__(self, tables: Sequence[FloatArray], spacing: float, max_angle: float) -> None:

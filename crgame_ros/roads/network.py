@@ -23,13 +23,13 @@ _NOT_FOR_CARS = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BICYCL
                  LaneletType.SHOULDER}
 _NO_ROAD = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BORDER,
             LaneletType.RESTRICTED_AREA}
-# Half the width of slits between lanelets [m], and what is no island yet [m^2].
+# Half the greatest width of slits between lanelets [m]; smaller holes are no islands [m^2].
 _SLIT, _ISLAND = 0.5, 20.0
 _SLOW_USERS = {RoadUser.PEDESTRIAN, RoadUser.BICYCLE, RoadUser.TRAIN}
-# A lane that is not for cars loses against one that is, unless it fits the heading much better.
+# A lane for cars is preferred, unless another one fits the heading much better.
 _NOT_FOR_CARS_PENALTY = 0.2
 _OFFSET_WEIGHT = 0.1
-# Published maps hold successors that begin elsewhere (metres away, even the lanelet itself).
+# Published maps have successors that begin elsewhere (metres away, even the lanelet itself).
 _MAX_GAP = 1.0
 _MAX_CHAIN = 1000
 
@@ -67,14 +67,14 @@ class RoadNetwork:
         """
         Find the lanelet that contains a point.
 
-        Of several, the one whose direction agrees best with yaw, or without yaw the one whose
-        centre line is nearest; lanes for cars before others. None off the road.
+        Of several it is the one whose direction agrees best with yaw, or without yaw the one whose
+        centre line is nearest. Lanes for cars are preferred. None off the road.
         """
         hits = self._tree.query(shapely.Point(x, y), predicate='intersects')
         return self._best(hits, x, y, yaw)
 
     def nearest_lanelet(self, x: float, y: float, yaw: float | None = None) -> int:
-        """Find the lanelet that contains a point or else is nearest to it."""
+        """Find the lanelet that contains a point, or else the nearest one."""
         found = self.lanelet_at(x, y, yaw)
         if found is None:
             found = self._best(self._tree.query_nearest(shapely.Point(x, y)), x, y, yaw)
@@ -98,11 +98,11 @@ class RoadNetwork:
     def candidates(
             self, poses: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
         """
-        Find all lanelets in which poses may be, for they overlap in junctions.
+        Find all lanelets in which poses may be, since they overlap in junctions.
 
         :param poses: (N, 3) finite x [m], y [m], yaw [rad]
-        :return: (M) places of poses, (M) positions in `lanelet_ids`, and (M) how badly the pose
-            agrees with the lane
+        :return: (M) rows of poses, (M) positions in `lanelet_ids`, and (M) scores: the lower, the
+            better the pose agrees with the lane
         """
         points = shapely.points(poses[:, :2])
         rows, lanes = self._tree.query(points, predicate='intersects')
@@ -147,19 +147,19 @@ class RoadNetwork:
         return np.concatenate(parts)
 
     def successors(self, lanelet_id: int) -> tuple[int, ...]:
-        """List where a lanelet leads, as far as the map has it."""
+        """List the successors of a lanelet that are in the map."""
         return tuple(x for x in self._lanelet(lanelet_id).successor if x in self._index)
 
     def predecessors(self, lanelet_id: int) -> tuple[int, ...]:
-        """List from where one comes to a lanelet, as far as the map has it."""
+        """List the predecessors of a lanelet that are in the map."""
         return tuple(x for x in self._lanelet(lanelet_id).predecessor if x in self._index)
 
     def straightest_successor(self, lanelet_id: int) -> int | None:
-        """Choose the successor that turns least up to its end; lanes for cars first."""
+        """Return the successor that turns least up to its end; lanes for cars first."""
         return self._straightest(lanelet_id, self._lanelet(lanelet_id).successor, -1)
 
     def straightest_predecessor(self, lanelet_id: int) -> int | None:
-        """Choose the predecessor that turns least from its start; lanes for cars first."""
+        """Return the predecessor that turns least from its start; lanes for cars first."""
         return self._straightest(lanelet_id, self._lanelet(lanelet_id).predecessor, 0)
 
     def advance(self, lanelet_id: int, s: float, distance: float) -> tuple[int, float] | None:
@@ -185,17 +185,17 @@ class RoadNetwork:
         return None
 
     def left_of(self, lanelet_id: int) -> int | None:
-        """Name the neighbour on the left that has the same direction."""
+        """Return the neighbour on the left that has the same direction, or None."""
         lanelet = self._lanelet(lanelet_id)
         return self._in_map(lanelet.adj_left) if lanelet.adj_left_same_direction else None
 
     def right_of(self, lanelet_id: int) -> int | None:
-        """Name the neighbour on the right that has the same direction."""
+        """Return the neighbour on the right that has the same direction, or None."""
         lanelet = self._lanelet(lanelet_id)
         return self._in_map(lanelet.adj_right) if lanelet.adj_right_same_direction else None
 
     def opposite_of(self, lanelet_id: int) -> int | None:
-        """Name the neighbour that has the other direction, on whichever side it is."""
+        """Return the neighbour, on either side, that has the other direction, or None."""
         lanelet = self._lanelet(lanelet_id)
         for neighbour, same in ((lanelet.adj_left, lanelet.adj_left_same_direction),
                                 (lanelet.adj_right, lanelet.adj_right_same_direction)):
@@ -240,7 +240,7 @@ class RoadNetwork:
         return bool(shapely.covers(road, footprint))
 
     def road_area(self) -> shapely.Geometry:
-        """Return what vehicles may be on as one area; slits and small islands belong to it."""
+        """Return the road for vehicles as one area, with slits and small islands filled."""
         on = [not x.lanelet_type & _NO_ROAD for x in self._lanelets]
         road = shapely.buffer(shapely.buffer(shapely.union_all(self._areas[on]), _SLIT), -_SLIT)
         return shapely.union_all([
@@ -260,7 +260,7 @@ class RoadNetwork:
         return self._lanelets[index]
 
     def _in_map(self, neighbour: int | None) -> int | None:
-        """Pass over neighbours that a map names but does not have."""
+        """Return a neighbour, or None if the map names it but does not contain it."""
         return neighbour if neighbour in self._index else None
 
     def _best(self, hits: NDArray[np.int64], x: float, y: float, yaw: float | None) -> int | None:
@@ -282,7 +282,7 @@ class RoadNetwork:
         return np.asarray(score, dtype=np.float64)
 
     def _straightest(self, lanelet_id: int, candidates: Sequence[int], end: int) -> int | None:
-        """Choose of the lanelets that touch this one at its end (-1) or its start (0)."""
+        """Return the straightest lanelet that touches this one at its end (-1) or start (0)."""
         line = self.line(lanelet_id)
         scored = []
         for candidate in candidates:

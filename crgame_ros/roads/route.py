@@ -12,7 +12,7 @@ from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 
-# A lane change costs this detour [m], more where the lane is shorter than the change wants to be.
+# A lane change costs this detour [m], and more in a lane shorter than `CHANGE_LENGTH` [m].
 CHANGE_COST = 20.0
 CHANGE_LENGTH = 40.0
 # A longer chain means a closed loop; the path is long enough by then.
@@ -24,9 +24,9 @@ class Route:
     """
     Lanelets in driving order.
 
-    :param legs: chains of successive lanelets; between two chains lies a lane change from the
-        last lanelet of the one to its neighbour, the first of the other.
-    :param goal: the goal lanelet that the route reaches; None if there is none or no way to it.
+    :param legs: chains of successive lanelets; between two chains there is a lane change from the
+        last lanelet of the first chain to its neighbour, the first lanelet of the next.
+    :param goal: the goal lanelet that the route reaches; None without one or without a way to it.
     :param road_ends: True if the last lanelet has no successor.
     """
 
@@ -60,16 +60,16 @@ def goal_lanelets(roads: RoadNetwork, problem: PlanningProblem) -> frozenset[int
 def find_route(roads: RoadNetwork, start: int, start_s: float, goals: frozenset[int],
                length: float) -> Route:
     """
-    Find the cheapest route to a goal lanelet and prolong it along the straightest successors.
+    Find the cheapest route to a goal lanelet and extend it along the straightest successors.
 
     Without a reachable goal the route follows the lane.
 
     :param start: lanelet at which the route begins.
     :param start_s: arc length on it at which the vehicle is [m]
     :param goals: lanelets of the goal, possibly none.
-    :param length: distance that the route shall go on beyond the goal [m]
+    :param length: distance by which the route goes on beyond the goal [m]
     """
-    # To look for nothing would mean to look everywhere.
+    # Without goals the search would visit the whole map.
     chain = _shortest(roads, start, start_s, goals) if goals else []
     goal = chain[-1][0] if chain else None
     chain = chain or [(start, False)]
@@ -84,9 +84,9 @@ def find_route(roads: RoadNetwork, start: int, start_s: float, goals: frozenset[
 
 def in_lane(roads: RoadNetwork, route: Route, length: float) -> Route:
     """
-    Return the route without its lane changes: the first leg, prolonged.
+    Return the route without its lane changes: the first leg, extended.
 
-    :param length: distance that the route shall go on [m]
+    :param length: distance by which the leg is extended [m]
     """
     leg = list(route.legs[0])
     ends = _prolong(roads, leg, length)
@@ -95,7 +95,7 @@ def in_lane(roads: RoadNetwork, route: Route, length: float) -> Route:
 
 def start_lanelet(roads: RoadNetwork, x: float, y: float, yaw: float) -> tuple[int, float]:
     """
-    Choose the lanelet at which a vehicle starts, by its position and heading.
+    Find the lanelet at which a vehicle starts, by its position and heading.
 
     :return: lanelet id and arc length on it [m]
     """
@@ -105,7 +105,7 @@ def start_lanelet(roads: RoadNetwork, x: float, y: float, yaw: float) -> tuple[i
 
 def _shortest(roads: RoadNetwork, start: int, start_s: float,
               goals: frozenset[int]) -> list[tuple[int, bool]]:
-    """Search by Dijkstra; (lanelet, reached by lane change) in order, or nothing."""
+    """Find the way by Dijkstra: (lanelet, reached by lane change) in order; empty without one."""
     queue: list[tuple[float, int]] = [(0.0, start)]
     cost = {start: 0.0}
     came: dict[int, tuple[int, bool]] = {}
@@ -146,7 +146,7 @@ def _unwind(lanelet: int, start: int,
 
 
 def _onward(roads: RoadNetwork, lanelet: int) -> int | None:
-    """Choose the successor that turns least; one at which the road ends only if need be."""
+    """Return the successor that turns least; one at which the road ends is avoided."""
     network = roads.lanelet_network
     scored = []
     for successor in roads.successors(lanelet):
@@ -159,7 +159,7 @@ def _onward(roads: RoadNetwork, lanelet: int) -> int | None:
 
 
 def _prolong(roads: RoadNetwork, leg: list[int], length: float) -> bool:
-    """Add the successors that turn least; tell whether the road ends."""
+    """Add the successors that turn least to a leg; return whether the road ends."""
     current: int | None = leg[-1]
     for _ in range(MAX_LANELETS):
         current = _onward(roads, leg[-1])

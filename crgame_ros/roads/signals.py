@@ -15,7 +15,7 @@ INACTIVE = 'inactive'
 
 class LightCycle:
     """
-    One light's cycle: the state that holds until each boundary, in time steps.
+    The cycle of one light: its states, and the time steps at which they end.
 
     :param light: without a cycle, or switched off, it is always inactive.
     """
@@ -37,7 +37,7 @@ class LightCycle:
         return self.states[index], self.ends[index] - phase
 
     def states_over(self) -> NDArray[np.str_]:
-        """Return the states over one period from time step 0; one where nothing ever changes."""
+        """Return the states over one period from time step 0; one state without a cycle."""
         if not self.ends:
             return np.array(self.states)
         return np.roll(np.repeat(self.states, np.diff(self.ends, prepend=0)), self.offset)
@@ -61,8 +61,8 @@ class TrafficLights:
         """
         Return each light's state in its XML spelling: red, yellow, redYellow, green, inactive.
 
-        While no light changes, the same dictionary object is returned: comparing it with `is`
-        tells cheaply whether anything may have changed since the previous call.
+        While no light changes, the same dictionary object is returned: a comparison with `is`
+        is a cheap check whether any light may have changed since the previous call.
         """
         if k not in self._valid:
             found = {light: cycle.at(k) for light, cycle in self._cycles.items()}
@@ -70,7 +70,7 @@ class TrafficLights:
             states = {light: state for light, (state, _) in found.items()}
             if states != self._states or not self._valid:
                 self._states = states
-            # Without a running cycle nothing ever changes: a span beyond every time step.
+            # Without a running cycle no light changes: the span covers every time step.
             self._valid = range(k, k + min(remaining)) if remaining else range(-2**62, 2**62)
         return self._states
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What signs and lights a lanelet has: its own, and those of its stop line."""
+"""The signs and lights of a lanelet: its own, and those of its stop line."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ STOP, MAX_SPEED = 'STOP', 'MAX_SPEED'
 def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,
                   at_line: bool = True) -> Iterator[TrafficSignElement]:
     """
-    Yield what the signs of a lanelet say, in the order of the signs' ids.
+    Yield the elements of a lanelet's signs, in the order of the signs' ids.
 
     :param at_line: whether the signs of its stop line count.
     """
@@ -30,12 +30,12 @@ def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,
 
 
 def sign_names(lanelet: Lanelet, roads: LaneletNetwork) -> set[str]:
-    """Name the kinds of signs, like `STOP` and `YIELD`, that a lanelet has."""
+    """Return the kinds of a lanelet's signs, like `STOP` and `YIELD`."""
     return {element.traffic_sign_element_id.name for element in sign_elements(lanelet, roads)}
 
 
 def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
-    """Return whether one has to halt at a lanelet's stop line because of a sign."""
+    """Return whether a sign demands a halt at a lanelet's stop line."""
     return lanelet.stop_line is not None and STOP in sign_names(lanelet, roads)
 
 
@@ -49,13 +49,13 @@ def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:
 
 
 def has_arrow(light: TrafficLight) -> bool:
-    """Return whether a light is only for who goes where it points."""
+    """Return whether a light has an arrow: it applies only to vehicles that go where it points."""
     return light.direction not in (None, TrafficLightDirection.ALL)
 
 
 def lights_for(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
     """
-    Keep the lights that are for a movement; all where none is.
+    Return the lights that apply to a movement; all lights if none does.
 
     :param arrow: straight, left or right.
     """
@@ -65,10 +65,10 @@ def lights_for(lights: list[TrafficLight], arrow: str) -> list[TrafficLight]:
 
 def stop_line_ends(lanelet: Lanelet) -> NDArray[np.float64]:
     """
-    Return the ends of a lanelet's stop line; the lane's end where the file does not say.
+    Return the ends of a lanelet's stop line; the lane's end if the file gives no position.
 
     :param lanelet: one with a stop line.
-    :return: (2, 2) left and right end as the file has them [m]
+    :return: (2, 2) left and right end, as in the file [m]
     """
     line = lanelet.stop_line
     if line.start is None or line.end is None:
@@ -77,7 +77,7 @@ def stop_line_ends(lanelet: Lanelet) -> NDArray[np.float64]:
 
 
 def stop_line_middle(lanelet: Lanelet) -> NDArray[np.float64] | None:
-    """Return the middle (2) of a lanelet's stop line [m]; None where the file does not say."""
+    """Return the middle (2) of a lanelet's stop line [m]; None if the file gives no position."""
     line = lanelet.stop_line
     if line is None or line.start is None or line.end is None:
         return None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Changing the speed limits of a parsed scenario."""
+"""Changes of the speed limits of a parsed scenario."""
 
 from collections.abc import Sequence
 import copy
@@ -28,10 +28,10 @@ def set_speed_limit(scenario: Scenario, speed: float, lanelets: Sequence[int] = 
     """
     Set the speed limit of lanelets, in place.
 
-    Their former limits no longer hold there; lanelets that shared a sign with them keep it.
+    Their former limits no longer apply; lanelets that shared a sign with them keep it.
 
     :param speed: [m/s]
-    :param lanelets: ids; all lanelets where none is named
+    :param lanelets: ids; all lanelets if none is named
     :raises InputError: if a lanelet does not exist.
     """
     network = scenario.lanelet_network
@@ -54,7 +54,7 @@ def set_speed_limit(scenario: Scenario, speed: float, lanelets: Sequence[int] = 
 
 
 def _drop_limits(network: LaneletNetwork, lanelet: Lanelet) -> None:
-    """Take the limits from a lanelet; what else its signs say stays."""
+    """Remove the speed limits from a lanelet; other elements of its signs stay."""
     for sign_id in sorted(lanelet.traffic_signs):
         sign = network.find_traffic_sign_by_id(sign_id)
         others = [] if sign is None else [

@@ -12,7 +12,7 @@ import shapely
 # Converted maps leave slits between neighbouring lanelets, a few millimetres to centimetres
 # wide; no vehicle leaves the road through one of them. Ditches and kerbs are wider.
 SEAM_WIDTH = 0.1
-# Patches reach this far into the lanelets around them, so that no slit of rounding width stays.
+# Patches reach this far into the lanelets around them, so that no slit of rounding width remains.
 PATCH_OVERLAP = 1e-3
 
 
@@ -24,10 +24,10 @@ def lanelet_ring(lanelet: Lanelet) -> NDArray[np.float64]:
 def lanelet_areas(lanelets: Iterable[Lanelet], origin: tuple[float, float] = (0.0, 0.0),
                   ) -> NDArray[np.object_]:
     """
-    Build one valid geometry of each lanelet (L); one that crosses itself is mended.
+    Build one valid geometry of each lanelet (L); one that crosses itself is repaired.
 
     :param lanelets: lanelets with at least two vertices on either side.
-    :param origin: position (x, y) from which the areas count [m]
+    :param origin: position (x, y) to which the areas are relative [m]
     """
     areas = np.array([shapely.Polygon(lanelet_ring(lanelet) - origin) for lanelet in lanelets],
                      dtype=object)
@@ -49,7 +49,7 @@ def lanelet_polygons(lanelets: Iterable[Lanelet], origin: tuple[float, float]
 def seam_patches(surface: shapely.Geometry) -> list[shapely.Polygon]:
     """Find polygons that cover every slit and hole in a surface narrower than `SEAM_WIDTH`."""
     gaps = polygons_of(_closed(surface).difference(surface))
-    # A hole of rounding width is lost in the difference, so holes are judged one by one.
+    # A hole of rounding width is lost in the difference, so holes are checked one by one.
     gaps += [hole for hole in _holes(surface) if _is_narrow(hole)]
     # The outline of a gap is widened, not the gap: a polygon of rounding width widens to nothing.
     covers = shapely.union_all([*gaps, *(gap.exterior.buffer(PATCH_OVERLAP) for gap in gaps)])
@@ -58,9 +58,9 @@ def seam_patches(surface: shapely.Geometry) -> list[shapely.Polygon]:
 
 def road_surface(polygons: Sequence[shapely.Polygon],
                  patches: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """Unite polygons and patches to one surface, prepared for tests of containment."""
+    """Return polygons and patches as one surface, prepared for tests of containment."""
     united = shapely.union_all([*polygons, *patches])
-    # Uniting leaves new holes of rounding width along the edges of the patches.
+    # The union has new holes of rounding width along the edges of the patches.
     surface = shapely.MultiPolygon([
         shapely.Polygon(part.exterior, [hole.exterior for hole in _holes(part)
                                         if not _is_narrow(hole)])
@@ -70,7 +70,7 @@ def road_surface(polygons: Sequence[shapely.Polygon],
 
 
 def polygons_of(geometry: shapely.Geometry | NDArray[np.object_]) -> list[shapely.Polygon]:
-    """Pick the polygons with an area out of a geometry, or out of an array of them."""
+    """Return the polygons with an area in a geometry, or in an array of geometries."""
     parts = shapely.get_parts(shapely.get_parts(geometry))
     is_polygon = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
     polygons: list[shapely.Polygon] = parts[is_polygon & (shapely.area(parts) > 0.0)].tolist()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where lanelets turn off, and on which side of each other they lie."""
+"""Turns of lanelets, and the side of each other on which lanelets lie, for indicators."""
 
 from collections.abc import Iterable
 import math
@@ -9,25 +9,25 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.vehicle.lights import Light
 import numpy as np
 
-# A lanelet that bends less at a fork goes straight on [rad], and so does one that bends less than
-# STRAIGHT_ON while all others bend so much more than it.
+# A lanelet that bends by less than TURN at a fork goes straight on [rad]. The same holds for one
+# that bends by less than STRAIGHT_ON if all others bend by TURN more.
 TURN, STRAIGHT_ON = math.radians(30.0), math.radians(45.0)
-# So much of a lanelet belongs to the fork at which it begins [m].
+# This length of a lanelet belongs to the fork at which it begins [m].
 OF_FORK = 50.0
-# A ring of lanelets that is no longer is a roundabout [m], if all of it bends: none of its longer
-# lanelets [m] has a larger radius [m].
+# A ring of lanelets no longer than this [m] is a roundabout if all of it bends: no lanelet longer
+# than LONGER [m] has a radius larger than LARGEST_RADIUS [m].
 LONGEST_RING = 250.0
 LONGER, LARGEST_RADIUS = 10.0, 80.0
-# Who turns less on its lanelets together has not gone all round [rad]; of fewer lanelets is a
+# Least turn of all lanelets of a roundabout [rad], and their least number; a ring of fewer is a
 # place to turn round at a dead end.
 ALL_ROUND, FEWEST = math.radians(270.0), 3
-# From one to the next place that is looked at, so many short lanelets may be passed.
+# Most lanelets from one place of a path to the next.
 _MOST_PASSED = 4
 
 
 class Turns:
     """
-    What drivers indicate on the way through a map; found once for each lanelet.
+    The turns that drivers indicate on their way through a map, found once for each lanelet.
 
     :param roads: the roads.
     """
@@ -36,8 +36,8 @@ class Turns:
         self._roads = roads
         self._turns: dict[tuple[int, int | None], Light | None] = {}
         self._rings: dict[int, float] = {}
-        # Where all others are beyond the edge of a map, or may not be driven: from which lanelets,
-        # to which; None from wherever.
+        # Turns that the map names, for forks whose other branches are beyond the map or not
+        # drivable: pairs of the lanelet before, or None for any, and the lanelet.
         self._named = frozenset(
             (before, lanelet) for intersection in roads.lanelet_network.intersections
             for incoming in intersection.incomings
@@ -48,18 +48,18 @@ class Turns:
 
     def turn_on(self, lanelet: int, before: int | None = None) -> Light | None:
         """
-        Return to which side a lanelet turns off where one could go another way.
+        Return the side to which a lanelet turns off if there is another way.
 
-        Who goes round a roundabout does not indicate, who leaves it does.
+        A driver does not indicate inside a roundabout, but does on leaving it.
 
-        :param before: from which lanelet one comes; None for any.
+        :param before: the lanelet before it on the way; None for any.
         """
         if (lanelet, before) not in self._turns:
             self._turns[lanelet, before] = self._find_turn(lanelet, before)
         return self._turns[lanelet, before]
 
     def is_only_way(self, before: int, lanelet: int) -> bool:
-        """Return whether one cannot but go from a lanelet, or from beside it, to the next one."""
+        """Return whether the only way from a lanelet, or from beside it, is to the next one."""
         return not self._others(lanelet, (before,))
 
     def turned_at(self, lanelet: int) -> tuple[float, float]:
@@ -69,7 +69,7 @@ class Turns:
         return end, float(line.heading_at(np.array(end)))
 
     def between(self, before: int, after: int) -> tuple[int, ...]:
-        """List the lanelets behind one up to another; empty if it does not lead there."""
+        """Return the lanelets behind one up to another; empty if there is no way."""
         if (before, after) not in self._ways:
             self._ways[before, after] = self._find_way(before, after)
         return self._ways[before, after]
@@ -86,10 +86,10 @@ class Turns:
 
     def side_of(self, before: int, after: int) -> Light | None:
         """
-        Return on which side of a lane another one, or what follows that, lies.
+        Return the side of a lane on which another one, or a lane that leads to it, lies.
 
-        The other one may be of the other direction; sides are those of who drives as the lane
-        leads.
+        The other one may be of the other direction. Sides are as seen in the direction of the
+        first lane.
         """
         if (before, after) not in self._sides:
             self._sides[before, after] = self._find_side(before, after)
@@ -102,7 +102,7 @@ class Turns:
                                  (Light.RIGHT, roads.right_of(base))):
                 if beside is not None and after in (beside, *roads.successors(beside)):
                     return side
-        # Who overtakes drives on it against its direction, to where it comes from.
+        # A vehicle that overtakes drives on the oncoming lane against its direction.
         for base in (before, *roads.successors(before), *roads.predecessors(before)):
             if roads.opposite_of(base) == after:
                 lanelet = roads.lanelet_network.find_lanelet_by_id(base)
@@ -125,7 +125,7 @@ class Turns:
         return Light.LEFT if bend > 0.0 else Light.RIGHT
 
     def _others(self, lanelet: int, origins: Iterable[int]) -> set[int]:
-        """List where one could go instead; lanes beside it that bend with it are the same road."""
+        """Return the alternatives to a lanelet; lanes beside it belong to the same road."""
         return {other for each in origins for lane in self._roads.abreast(each)
                 for other in self._roads.successors(lane)
                 if self._roads.is_for_cars(other)} - self._roads.abreast(lanelet)
@@ -138,22 +138,22 @@ class Turns:
         return float(heading[-1] - heading[0])
 
     def _ring(self, lanelet: int) -> float:
-        """Return how far one turns on the ring that a lanelet is of [rad]; 0 if it is of none."""
+        """Return the total turn of the ring to which a lanelet belongs [rad]; 0 without one."""
         if lanelet not in self._rings:
             self._rings[lanelet] = self._find_ring(lanelet)
         return self._rings[lanelet]
 
     def _is_round(self, lanelet: int, turned: float) -> bool:
-        """Return whether a lanelet may be a part of a roundabout, bending as those before it."""
+        """Return whether a lanelet may be part of a roundabout: it bends as those before it."""
         length, bend = self._roads.line(lanelet).length, self._bend(lanelet)
         return bend * turned >= 0.0 and (
             length <= LONGER or abs(bend) >= length / LARGEST_RADIUS)
 
     def _find_ring(self, lanelet: int) -> float:
-        """Look for a short way from a lanelet to itself that bends to one side."""
+        """Return the turn of a short way from a lanelet to itself that bends to one side, or 0."""
         if not self._is_round(lanelet, 0.0):
             return 0.0
-        # Way, turn and lanelets up to the beginning of a lanelet, by its id.
+        # Distance, turn and number of lanelets up to the beginning of a lanelet, by its id.
         reached = {lanelet: (0.0, 0.0, 0)}
         left = [lanelet]
         while left:
@@ -162,7 +162,7 @@ class Turns:
             turn = reached[here][1] + self._bend(here)
             passed = reached[here][2] + 1
             for following in self._roads.successors(here):
-                # Another way round may be one where this is none.
+                # If this way is no ring, another one may still be.
                 if following == lanelet and here != lanelet and way <= LONGEST_RING \
                         and abs(turn) > ALL_ROUND and passed >= FEWEST:
                     return turn

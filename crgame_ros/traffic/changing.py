@@ -330,7 +330,7 @@ class LaneChanges:
         return np.array(begun, dtype=np.int64)
 
     def _start(self, k: int, agents: Agents, wish: Wish, i: int) -> None:
-        """Put an agent into the lane beside it, on a polynomial to its middle (FS 4)."""
+        """Move an agent to the lane beside it, on a polynomial to its middle (FS 4)."""
         slot, beside = int(wish.slots[i]), wish.beside
         speed, shift = float(agents.speed[slot]), beside.d[i:i + 1]
         span = lane_change_length(speed, float(beside.d[i]), shortest=max(

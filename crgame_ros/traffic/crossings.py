@@ -55,7 +55,7 @@ class Crossings:
     def halts(self, k: int, agents: Agents, way: Ways, passage: Passages, arrivals: Arrivals,
               situation: Situation, elapsed_s: float) -> tuple[FloatArray, BoolArray]:
         """
-        Let agents (A) into junctions, and return where the others halt.
+        Update the grants of agents (A) at junctions, and return where the others halt.
 
         The agent for which one halts is written to `Agents.blocker`.
 
@@ -116,7 +116,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
 
 @compiled
 def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, i: int) -> None:
-    """Let an agent into its next junction, so that it no longer waits before it."""
+    """Grant an agent its next junction, so that it no longer waits before it."""
     if agents.grant[slot] < 0:
         agents.grant_hold[slot] = passage.hold[i]
     else:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Encounters of two agents: whether they touch, and how hard one has to brake."""
+"""Encounters of agents: whether two touch, and the braking that avoids it."""
 
 import math
 

@@ -53,7 +53,7 @@ _COMPILE = (sys.executable, '-m', 'crgame_ros.traffic.warm_up')
 
 
 def compile_now() -> None:
-    """Compile what is not compiled yet, in a process of its own, which prints that it does."""
+    """Compile what is not compiled yet, in a process of its own, which prints messages."""
     if not marker().exists():
         # A session of its own: Ctrl-C ends it through this process, without a traceback.
         subprocess.run(_COMPILE, check=False, start_new_session=True)

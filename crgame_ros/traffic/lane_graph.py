@@ -22,7 +22,7 @@ LEFT_HAND = frozenset("""
     NRU NZL PAK PCN PNG SGP SHN SLB SUR SWZ SYC TCA THA TKL TLS TON TTO TUV TZA UGA VCT VGB VIR WSM
     ZAF ZMB ZWE
 """.split())
-# Of these, where the law gives priority to the right all the same: Australian Road Rules 72; the
+# Those of them whose law still gives priority to the right: Australian Road Rules 72; the
 # Indian Rules of the Road Regulations 1989, 9; the Irish S.I. 182/1997, 8; New Zealand's Land
 # Transport (Road User) Rule 2004, 4.2. The Vienna Convention, 18 (4), leaves it to each of them.
 PRIORITY_TO_THE_RIGHT = frozenset({'AUS', 'IND', 'IRL', 'NZL'})
@@ -230,7 +230,7 @@ class LaneGraph:
         return slice(int(self.first[lane]), int(self.first[lane] + self.count[lane]))
 
     def nearest(self, lane: int, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Find points (N) in the coordinates of one lane, wherever on it; s, d [m]."""
+        """Return s and d [m] of points (N) in the coordinates of one lane, anywhere on it."""
         rows = self.rows_of(lane)
         away = (x[:, None] - self.x[None, rows]) ** 2 + (y[:, None] - self.y[None, rows]) ** 2
         guess = np.argmin(away, axis=1) * self.step[lane]

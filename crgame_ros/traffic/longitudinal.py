@@ -33,8 +33,8 @@ REST_SHARE = 0.2
 # Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; braking harder than
 # `EMERGENCY` sets in at once [m/s^2].
 JERK, RELEASE, EMERGENCY = 3.0, 4.0, 3.0
-# An agent above this share of the comfortable lateral acceleration approaches the comfortable speed
-# in STRAIGHTENING [s].
+# An agent above the first share of the comfortable lateral acceleration approaches the comfortable
+# speed within the second time [s].
 ALMOST, STRAIGHTENING = 0.8, 0.5
 
 

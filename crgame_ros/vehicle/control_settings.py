@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Gains and lags of `config/control.yaml`, checked; options of a game come before them."""
+"""Gains and lags of `config/control.yaml`, checked; options of a game override them."""
 
 from dataclasses import dataclass
 import functools
@@ -13,14 +13,14 @@ from crgame_ros.schema.reading import read
 from crgame_ros.yaml_text import read_yaml
 
 T = TypeVar('T')
-# A lag below this is none to a step of 10 ms, and makes the lag's equations stiff [s].
+# A shorter lag is negligible in a step of 10 ms, and makes the lag's equations stiff [s].
 SHORTEST_LAG_S = 0.001
 
 
 @dataclass(frozen=True)
 class DynamicBicycleSettings:
     """
-    What FS equation 2 leaves open.
+    The parameters that FS equation 2 leaves open.
 
     :param slip: slipping coefficient G_s in [0, 1], 1 without slip [-]
     :param steering_lag: T_delta [s]
@@ -123,10 +123,10 @@ def control_settings() -> ControlSettings:
 
 def with_options(settings: T, where: str, **options: float | bool | None) -> T:
     """
-    Put options of a game before settings.
+    Return settings with the options of a game.
 
-    :param where: what the options belong to, for messages
-    :param options: values by name; None leaves the setting
+    :param where: the owner of the options, for messages
+    :param options: values by name; None keeps the setting
     :raises InputError: if a value is out of bounds.
     """
     given = {key: value for key, value in options.items() if value is not None}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The normalised command of a driver, the same from whatever device (CRG III-C1)."""
+"""The normalised command of a driver, the same for every device (CRG III-C1)."""
 
 from struct import Struct
 from typing import NamedTuple
@@ -10,16 +10,16 @@ from crgame_ros.vehicle.lights import ALL_LIGHTS
 
 class DriverCommand(NamedTuple):
     """
-    What a seat asks of its vehicle.
+    The command of a seat to its vehicle.
 
     :param throttle: normalised throttle pedal p_th in [0, 1]
     :param brake: normalised brake pedal p_br in [0, 1]
     :param steering: normalised steering wheel s in [-1, 1], positive to the left
     :param reverse: True while the reverse gear is selected
-    :param lights: what others see and hear of it, bits of `Light`; the vehicle's motion does not
-        depend on it
-    :param put_back: True while the driver asks for the vehicle to be put back on its lane, which a
-        game with `contact: stop` does after a contact
+    :param lights: lights and horn that others see and hear, bits of `Light`; the vehicle's motion
+        does not depend on them
+    :param put_back: True while the driver requests that the vehicle be put back on its lane, which
+        a game with `contact: stop` does after a contact
     """
 
     throttle: float = 0.0
@@ -33,8 +33,8 @@ class DriverCommand(NamedTuple):
         """
         Clip to the allowed ranges and round to float32, the precision of sensor_msgs/Joy.
 
-        The engine does this to every command at its entrance, so that live, recorded and
-        replayed commands are the same bits. A value that is no number counts as released.
+        The engine does this to every incoming command, so that live, recorded and replayed
+        commands are the same bits. A value that is no number counts as released.
         """
         return DriverCommand(
             _clip_float32(self.throttle, 0.0), _clip_float32(self.brake, 0.0),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a driver sits: eyes and mirrors in a vehicle, for views out of it."""
+"""The driver's place: eyes and mirrors in a vehicle, for views from it."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ LONGEST_CAR = 6.0
 # Roof, eyes, outer mirrors and bonnet above the road [m].
 _CAR_HEIGHTS = (1.45, 1.17, 0.98, 0.95)
 _TRUCK_HEIGHTS = (3.2, 2.45, 2.2, 1.2)
-# Where people sit in a car, behind the front axle, and in a cab, behind the bumper [m].
+# Distance of the seat behind the front axle in a car, and behind the bumper in a cab [m].
 _SEAT_BEHIND_AXLE, _SEAT_BEHIND_BUMPER = 1.33, 1.4
 _MIRROR_AHEAD_OF_EYE, _MIRROR_OUTSIDE = 0.53, 0.12
 _INNER_MIRROR_AHEAD_OF_EYE, _INNER_MIRROR_BELOW_ROOF = 0.5, 0.16
@@ -25,7 +25,7 @@ class DriverPlace:
 
     :param height: of the roof [m]
     :param bonnet_height: of its highest line [m]
-    :param eye: amid the driver's eyes.
+    :param eye: the midpoint of the driver's eyes.
     :param left_mirror: its middle.
     :param right_mirror: its middle.
     :param inner_mirror: its middle.
@@ -40,7 +40,7 @@ class DriverPlace:
 
 
 def driver_place(vehicle: VehicleParameters) -> DriverPlace:
-    """Return the places that the vehicle's file names, or what is usual for its size."""
+    """Return the places from the vehicle's file, or the usual ones for its size."""
     is_car = vehicle.length <= LONGEST_CAR
     usual = _CAR_HEIGHTS if is_car else _TRUCK_HEIGHTS
     height, eye_height, mirror_height, bonnet_height = (

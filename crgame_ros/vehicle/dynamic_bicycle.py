@@ -20,10 +20,10 @@ class DynamicBicycle(VehicleModel):
     [m/s], acceleration a [m/s^2]. Inputs: commanded steering angle delta_c and acceleration a_c,
     constant over a step. Continuous dynamics: x' = v cos(theta), y' = v sin(theta),
     theta' = G_s v / L tan(delta), delta' = (delta_c - delta) / T_delta, v' = a,
-    a' = (a_c - a) / T_a. Beyond the paper: the steering rate is cut to the vehicle's limit, and
-    brakes end in a stop.
+    a' = (a_c - a) / T_a. Beyond the paper: the steering rate is limited to the vehicle's limit,
+    and braking ends in a stop.
 
-    Discretisation: delta, a and v are exact, because their equations are linear and stand alone;
+    Discretisation: delta, a and v are exact, because their equations are linear and independent;
     theta, x and y follow by Simpson's rule, which is of fourth order.
 
     Options that are None come from `config/control.yaml`.
@@ -75,7 +75,7 @@ class DynamicBicycle(VehicleModel):
                             self._turning * end_speed * tan(angle), rate)
 
     def _angle(self, start: float, target: float, time_s: float) -> float:
-        """Let the steering angle lag for a while: at the rate limit first, then exponentially."""
+        """Return the steering angle after a time: at the rate limit first, then exponentially."""
         lag, limit = self.settings.steering_lag, self.vehicle.max_steering_rate
         error = target - start
         excess = abs(error) - limit * lag
@@ -89,7 +89,7 @@ class DynamicBicycle(VehicleModel):
 
     def _speed(self, speed: float, acceleration: float, commanded: float,
                time_s: float) -> tuple[float, float]:
-        """Return speed and acceleration after a while, whatever their signs."""
+        """Return speed and acceleration after a time, for any signs."""
         lag = self.settings.acceleration_lag
         decay = exp(-time_s / lag)
         difference = acceleration - commanded
@@ -98,7 +98,7 @@ class DynamicBicycle(VehicleModel):
 
     def _moved(self, state: VehicleState, speeds: tuple[float, float, float],
                angles: tuple[float, float, float], time_s: float) -> tuple[float, float, float]:
-        """Integrate the pose over speeds and steering angles at start, middle and end."""
+        """Return the pose, integrated over speeds and steering angles at start, middle and end."""
         yaw, turning = state.yaw, self._turning
         first, middle, last = (turning * v * tan(delta)
                                for v, delta in zip(speeds, angles, strict=True))

@@ -18,9 +18,9 @@ class HumanVehicle:
     brakes stop the car within the step and hold it there.
 
     :param vehicle: parameters of the vehicle
-    :param state: where it starts, rear axle
-    :param model: what moves it; the model of the paper where None: kinematic single-track
-        (CRG 2-4) behind the powertrain's lag (CRG 25). It belongs to this vehicle alone.
+    :param state: at the start, rear axle
+    :param model: its motion model, used by this vehicle alone; that of the paper where None:
+        kinematic single-track (CRG 2-4) behind the powertrain's lag (CRG 25).
     """
 
     def __init__(self, vehicle: VehicleParameters, state: VehicleState,
@@ -34,11 +34,11 @@ class HumanVehicle:
 
     @property
     def gear(self) -> int:
-        """Engaged gear: 1 forward, -1 reverse."""
+        """Return the engaged gear: 1 forward, -1 reverse."""
         return self._model.gear
 
     def stand(self, state: VehicleState) -> None:
-        """Be stopped by something else than the brakes, in a state without speed."""
+        """Stop the vehicle by other means than the brakes, in a state without speed."""
         self.state = state
 
     def step(self, command: DriverCommand, dt_s: float) -> VehicleState:

@@ -37,7 +37,7 @@ class IdmParameters(NamedTuple):
 def free_acceleration(speed: Number, desired: Number, model: IdmParameters,
                       larger: Callable[[Any, Any], Any] = max) -> Number:
     """
-    Accelerate on a free road, a (1 - (v / v0)^4); not below -b where v exceeds v0 [m/s^2].
+    Return the free-road acceleration a (1 - (v / v0)^4); not below -b where v exceeds v0 [m/s^2].
 
     :param desired: v0, above 0 [m/s]
     :param larger: `max` for numbers, `numpy.maximum` for arrays

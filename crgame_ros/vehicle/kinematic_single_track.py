@@ -16,7 +16,7 @@ def integrate(
     angle delta [rad]. Inputs: acceleration a [m/s^2] and steering rate [rad/s], constant over the
     step. Continuous dynamics: x' = v cos(yaw), y' = v sin(yaw), yaw' = v tan(delta) / L, v' = a,
     delta' = steering rate. Speed and steering angle are linear over the step, so that two of the
-    four slopes coincide and the step below equals the textbook's with fewer evaluations.
+    four slopes coincide. The step below equals the textbook's with fewer evaluations.
 
     :param wheelbase: L [m]
     :param dt_s: length of the step [s]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a vehicle shows and sounds to others: its indicators and its horn."""
+"""The signals of a vehicle to others: its indicators and its horn."""
 
 from collections.abc import Mapping
 from enum import IntFlag
@@ -11,7 +11,7 @@ class Light(IntFlag):
     """
     A bit of `DriverCommand.lights`; both indicators together are the hazard lights.
 
-    It is what a driver has switched on: that indicators blink is for whoever draws them.
+    It is the state of the switch; the blinking of indicators is left to the viewers.
     """
 
     LEFT = 1
@@ -19,7 +19,7 @@ class Light(IntFlag):
     HORN = 4
 
 
-# ECE R13-H: below this deceleration a car must not show brake lights of its own accord [m/s^2].
+# ECE R13-H: below this deceleration a car must not show brake lights by itself [m/s^2].
 BRAKING = 0.7
 HAZARD = int(Light.LEFT | Light.RIGHT)
 ALL_LIGHTS = int(HAZARD | Light.HORN)
@@ -33,9 +33,9 @@ def lights_of(left: object, right: object, horn: object) -> int:
 
 def signals_document(n: int, lights: Mapping[str, int]) -> str:
     """
-    Write /vehicles/signals.
+    Return the text of /vehicles/signals.
 
-    :param n: the step from which on they hold.
+    :param n: the step from which the lights are on.
     :param lights: of each driven vehicle, by id.
     """
     return json.dumps({'n': n, 'vehicles': {

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a vehicle answers commands of steering angle and acceleration."""
+"""Models of a vehicle's motion under commands of steering angle and acceleration."""
 
 from abc import ABC, abstractmethod
 from math import copysign, tan
@@ -18,7 +18,7 @@ class VehicleModel(ABC):
     """
     The motion of one vehicle under commanded steering angle and acceleration.
 
-    Commands beyond the vehicle's limits are cut to them. Reverse is a gear: the speed never
+    Commands beyond the vehicle's limits are limited to them. Reverse is a gear: the speed never
     changes its sign within a step, a command against the direction of motion brakes, and at rest
     only a command in the gear's direction starts a motion.
 
@@ -27,7 +27,7 @@ class VehicleModel(ABC):
 
     def __init__(self, vehicle: VehicleParameters) -> None:
         self.vehicle = vehicle
-        # 1 forward, -1 reverse; it counts at rest only.
+        # 1 forward, -1 reverse; it matters at rest only.
         self.gear = 1
 
     @abstractmethod
@@ -56,11 +56,11 @@ class KinematicSingleTrack(VehicleModel):
     """
     The kinematic single-track model of CRG equations 2-4.
 
-    The commanded steering angle is reached at once as far as the vehicle's steering rate allows,
-    and so is the acceleration.
+    The commanded steering angle is reached as fast as the vehicle's steering rate allows. The
+    commanded acceleration is reached at once.
 
     :param vehicle: parameters of the vehicle
-    :param powertrain_lag: let the acceleration lag as in CRG 25 instead, by the vehicle's
+    :param powertrain_lag: whether the acceleration lags as in CRG 25 instead, by the vehicle's
         `longitudinal_lag`
     """
 
@@ -86,7 +86,7 @@ class KinematicSingleTrack(VehicleModel):
         x, y, yaw, new_speed, angle = integrate(
             state.x, state.y, state.yaw, speed, state.steering_angle,
             acceleration, rate, vehicle.wheelbase, driven_s)
-        # A stop at the very end of the step may leave a rounding error behind zero.
+        # A stop at the very end of the step may leave a rounding error below zero.
         if driven_s < dt_s or direction * new_speed < 0.0:
             new_speed, acceleration = 0.0, 0.0
             angle += rate * (dt_s - driven_s)
@@ -97,7 +97,7 @@ class KinematicSingleTrack(VehicleModel):
     def _within_speed_limits(
         self, speed: float, acceleration: float, direction: float, dt_s: float,
     ) -> tuple[float, float]:
-        """Return for how long the car moves within the step [s], and its acceleration."""
+        """Return how long the car accelerates within the step [s], and its acceleration."""
         along = direction * speed
         along_acceleration = direction * acceleration
         end = along + along_acceleration * dt_s
@@ -110,7 +110,7 @@ class KinematicSingleTrack(VehicleModel):
 
 
 def clipped(value: float, limit: float) -> float:
-    """Cut a value to [-limit, limit]."""
+    """Return a value limited to [-limit, limit]."""
     return min(limit, max(-limit, value))
 
 

@@ -16,17 +16,17 @@ from crgame_ros.schema.reading import read
 from crgame_ros.yaml_text import read_yaml
 
 DEFAULT_VEHICLE = 'bmw_320i'
-# No road vehicle has more; beyond, arithmetic runs out of numbers.
+# No road vehicle has larger values; beyond them arithmetic overflows.
 LARGEST, SMALLEST = 1e9, 1e-6
 Positive = Annotated[float, Within(SMALLEST, LARGEST)]
 Share = Annotated[float, Within(SMALLEST, LARGEST, or_zero=True)]
 Length = Annotated[float, Within(SMALLEST, 100.0)]
-# A place in the vehicle; 0 for what its size says.
+# A place in the vehicle; 0 for the usual one of its size.
 Place = Annotated[float, Within(SMALLEST, 100.0, or_zero=True)]
 
 
 class _Beside(Named):
-    """A file that lies beside the vehicle's, whatever it is called."""
+    """A file of any name in the folder of the vehicle's file."""
 
     def resolved(self, name: str, base: Path) -> str:
         return str(base / name)
@@ -35,7 +35,7 @@ class _Beside(Named):
 @dataclass(frozen=True)
 class VehicleParameters:
     """
-    Parameters of one vehicle type; what is switched off is 0.
+    Parameters of one vehicle type; 0 switches an effect off.
 
     :param name: of the vehicle type.
     :param length: of its rectangle [m]
@@ -63,7 +63,7 @@ class VehicleParameters:
     :param air_density: [kg/m^3]
     :param gravity: [m/s^2]
     :param longitudinal_lag: tau_long of CRG 25: drivetrain and brakes [s]
-    :param powertrain: what it sounds like in the cockpit; it drives alike.
+    :param powertrain: its sound in the cockpit; it does not affect the motion.
     :param height: of the roof; 0 for a usual one of its length [m]
     :param eye_ahead: the driver's eyes ahead of the rear axle; 0 for a usual place [m]
     :param eye_left: the driver's eyes to the left of the middle, negative to the right [m]
@@ -114,17 +114,17 @@ class VehicleParameters:
 
     @property
     def shape(self) -> Shape:
-        """Footprint of the vehicle around its centre."""
+        """Return the footprint of the vehicle around its centre."""
         return Shape.rectangle(self.length, self.width)
 
     @property
     def front(self) -> float:
-        """How far ahead of the rear axle the front bumper is [m]."""
+        """Return the distance from the rear axle forward to the front bumper [m]."""
         return self.rear_to_center + 0.5 * self.length
 
     @property
     def rear(self) -> float:
-        """How far ahead of the rear axle the rear bumper is: negative, behind it [m]."""
+        """Return the position of the rear bumper ahead of the rear axle, negative [m]."""
         return self.rear_to_center - 0.5 * self.length
 
 

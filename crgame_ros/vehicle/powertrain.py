@@ -10,7 +10,7 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 
 def pedal_response(travel: float, shape: float) -> float:
     """
-    Shape a pedal's travel p in [0, 1] to a response alpha = 1 - exp(-k p) (CRG 20).
+    Return the response alpha = 1 - exp(-k p) to a pedal's travel p in [0, 1] (CRG 20).
 
     :param shape: k > 0 [-]
     """
@@ -34,7 +34,7 @@ class Powertrain:
 
     def drive_force_limit(self, speed: float) -> float:
         """
-        Limit the tractive force by engine power and friction (CRG 21).
+        Return the largest tractive force by engine power and friction (CRG 21).
 
         :param speed: signed speed [m/s]
         :return: F_max [N]
@@ -68,7 +68,7 @@ class Powertrain:
 
     def lag(self, acceleration: float, commanded: float, dt_s: float) -> float:
         """
-        Filter the commanded acceleration by the lag of first order (CRG 25).
+        Filter the commanded acceleration by a first-order lag (CRG 25).
 
         :param acceleration: delivered acceleration a_n [m/s^2]
         :param commanded: a_cmd [m/s^2]

@@ -9,18 +9,19 @@ from crgame_ros.geometry.reference_point import ahead
 import numpy as np
 from numpy.typing import NDArray
 
-# What a wheel encoder reads as nothing: a vehicle that surely has not moved.
+# Resolution of a wheel encoder: a slower vehicle has surely not moved.
 ENCODER_REST = 0.01
-# Of a planned state: planners end a stop with a rounding error, and a tracker must not take a plan
-# that starts or ends gently for one that rests.
+# For planned states: planners end a stop with a rounding error, and a tracker must not mistake a
+# plan that starts or ends gently for one at rest.
 PLANNED_REST = 0.02
-# Of a measured, recorded or driven speed: nuPlan's bound for its kinds of contact. A slower motion
-# is noise, and its direction says nothing.
+# For measured, recorded or driven speeds: nuPlan's bound for its kinds of contact. A slower motion
+# is noise without a meaningful direction.
 REST = 0.05
-# Of who decides whether to go on: laws of car following come near 0 ever more slowly, so that who
-# is slower, and wants to go hardly at all, is held; it has halted.
+# For an agent that decides whether to go on: car-following laws approach 0 ever more slowly. So a
+# slower agent with hardly any desired acceleration is held; it has halted.
 STANDING = 0.1
-# Of others in the eyes of who waits for them or walks past: a queue that creeps on stands as well.
+# For other vehicles, as seen by an agent that waits for them or walks past: a creeping queue
+# counts as standing too.
 QUEUEING = 0.3
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Steering wheel to front wheels: CRG equations 26-27 with the ratio table R(v, theta_sw)."""
+"""Steering from wheel to front wheels: CRG equations 26-27 with the ratio table R(v, theta_sw)."""
 
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class SteeringRatioTable:
                       Called('ratio')]
 
     def ratio(self, speed: float, wheel_angle: float) -> float:
-        """Look the ratio up at a signed speed [m/s] and steering-wheel angle [rad]."""
+        """Return the ratio at a signed speed [m/s] and steering-wheel angle [rad]."""
         row, row_share = _cell(self.speeds, abs(speed))
         column, column_share = _cell(self.wheel_angles, abs(wheel_angle))
         low, high = self.ratios[row], self.ratios[row + 1]
@@ -56,7 +56,7 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
     """
     Read a ratio table.
 
-    :param path: of its file; or the table itself, as `table_text` gives it.
+    :param path: of its file; or the table itself, as text from `table_text`.
     :raises InputError: if the file is missing or is no ascending grid of positive ratios.
     """
     if path.startswith('{'):
@@ -75,7 +75,7 @@ def load_steering_ratio(path: str) -> SteeringRatioTable:
 
 
 def table_text(path: str) -> str:
-    """Return the text of a ratio table, for who has not its file."""
+    """Return the text of a ratio table, for a program without its file."""
     return json.dumps(write(load_steering_ratio(path)))
 
 
@@ -95,7 +95,7 @@ class Steering:
 
     def target_angle(self, steering: float, speed: float) -> float:
         """
-        Find the target front-wheel angle delta* (CRG 26).
+        Compute the target front-wheel angle delta* (CRG 26).
 
         :param steering: normalised steering s in [-1, 1], positive to the left
         :param speed: signed speed [m/s]
@@ -109,7 +109,7 @@ class Steering:
 
 def steering_rate(target_angle: float, angle: float, dt_s: float, limit: float) -> float:
     """
-    Find the steering rate that reaches the target within the step (CRG 27), within a limit.
+    Compute the steering rate that reaches the target within the step (CRG 27), within a limit.
 
     :param target_angle: delta* [rad]
     :param angle: delta [rad]

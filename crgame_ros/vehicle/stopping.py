@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Braking to a stop, and no farther, within a step."""
+"""Braking to a stop within a step, without reversing."""
 
 import math
 from math import copysign
@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 class SpeedEnvelope:
     """
-    The speed allowed at each arc length, so that all that comes can be slowed down for.
+    The speed allowed at each arc length, so that braking suffices for all limits ahead.
 
     v(s)^2 = min over s' >= s of V(s')^2 + 2 b (s' - s), where V is the limit at s'.
 
@@ -31,7 +31,7 @@ class SpeedEnvelope:
 
     @property
     def speeds(self) -> FloatArray:
-        """Speed allowed at each of the arc lengths, (n,) [m/s]."""
+        """Return the speed allowed at each of the arc lengths, (n,) [m/s]."""
         return np.asarray(np.sqrt(self._squares))
 
     def at(self, s: float) -> float:
@@ -39,13 +39,13 @@ class SpeedEnvelope:
         return math.sqrt(np.interp(s, self._s, self._squares))
 
 
-# Braking where there is no plan to follow [m/s^2]: firm, well within a dry road's friction.
+# Braking without a plan to follow [m/s^2]: firm, well within a dry road's friction.
 FIRM_BRAKING = 4.0
 
 
 def braking_acceleration(speed: float, deceleration: float = FIRM_BRAKING) -> float:
     """
-    Return the acceleration against a motion; none at rest.
+    Return the acceleration against a motion; 0 at rest.
 
     :param speed: signed [m/s]
     :param deceleration: above 0 [m/s^2]
@@ -58,7 +58,7 @@ def moving_time(speed: float, acceleration: float, dt_s: float) -> float:
     """
     Return the part of a step until braking has brought a vehicle to rest [s].
 
-    :return: all of the step where it does not, or where the acceleration is no braking.
+    :return: all of the step if it does not, or if the acceleration does not brake.
     """
     return min(dt_s, -speed / acceleration) if speed * acceleration < 0.0 else dt_s
 
@@ -68,7 +68,7 @@ def step_to_rest(
     acceleration: float, steering_rate: float, wheelbase: float, moving_s: float, dt_s: float,
 ) -> tuple[float, float, float, float, float]:
     """
-    Advance the KS model over the part of a step in which it moves; then it stands.
+    Advance the KS model over the part of a step in which it moves; for the rest it stands.
 
     :param moving_s: `moving_time` [s]
     :return: as `integrate`, the speed exactly 0 after a stop.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A human's vehicle that takes a recorded way, whatever its driver does."""
+"""A human's vehicle that follows a recorded path, whatever its driver does."""
 
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import VehicleState
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 class TracedVehicle:
     """
-    Stands for a `HumanVehicle` whose states are known.
+    A substitute for a `HumanVehicle`, with known states.
 
     :param states: (N, 8) rear-axle states of step 0, 1, …, columns as in `StateColumn`; after the
         last one it stays there.
@@ -22,10 +22,10 @@ class TracedVehicle:
 
     @property
     def state(self) -> VehicleState:
-        """State of the present step, rear axle."""
+        """Return the state of the present step, rear axle."""
         return self._states[self._n]
 
     def step(self, _command: DriverCommand, _dt_s: float) -> VehicleState:
-        """Go on to the next step; command and interval change nothing."""
+        """Advance to the next step; command and interval have no effect."""
         self._n = min(self._n + 1, len(self._states) - 1)
         return self.state

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The moments of a run that a paper would show: contacts, worst values, and events."""
+"""Finds the moments of a run that figures show: contacts, worst values, and events."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 import math
@@ -9,23 +9,23 @@ from typing import Any, NamedTuple, Protocol
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.recording.run_record import RunRecord
 
-# Moments so close to each other are one [s].
+# Moments this close to each other are merged [s].
 TOGETHER_S = 1.0
-# Longer times to collision are no moment [s].
+# Longer times to collision do not make a moment [s].
 NOTICED_S = 10.0
 # Groups, in the order of their ranks.
 _CONTACT, _CRITICAL, _EVENT, _NOTICED, _CLOSE = range(5)
-# Of a value that is zero, to be divided by.
+# Replaces a value of zero in a division.
 _LEAST = 1e-3
 
 
 class Moment(NamedTuple):
     """
-    A moment worth a look.
+    A moment to show.
 
     :param time_s: since the start of the run [s]
     :param why: what happens, in a few words.
-    :param vehicles: whose moment it is, who drives first.
+    :param vehicles: ids of those involved, driven vehicles first.
     """
 
     time_s: float
@@ -34,7 +34,7 @@ class Moment(NamedTuple):
 
 
 class Touching(Protocol):
-    """What of a contact is needed: of `Contact`, or of an entry in `timing.json`."""
+    """The part of a contact that is needed: a `Contact`, or an entry in `timing.json`."""
 
     @property
     def vehicle_id(self) -> str:
@@ -63,7 +63,7 @@ class Touch(NamedTuple):
 
 
 class _Ranked(NamedTuple):
-    """A moment with what it is ranked by, smaller first."""
+    """A moment with its rank, smaller first."""
 
     group: int
     rank: float
@@ -73,12 +73,11 @@ class _Ranked(NamedTuple):
 def critical_moments(record: RunRecord, criticality: Criticality,
                      contacts: Sequence[Touching] = ()) -> tuple[Moment, ...]:
     """
-    Find the moments of a run, the most critical one first.
+    Return the moments of a run, the most critical one first.
 
     Contacts come first, then values beyond their thresholds by how far they are beyond, events as
-    they fired, the smallest ttc that is not critical, and at last the smallest distance of each
-    vehicle. Moments within `TOGETHER_S` of a
-    more critical one are told as part of it, at its time.
+    they fired, the smallest ttc that is not critical, and finally the smallest distance of each
+    vehicle. A moment within `TOGETHER_S` of a more critical one becomes part of it, at its time.
 
     :param criticality: of the same run (`measure_log`).
     :param contacts: of the run.
@@ -130,10 +129,10 @@ def _close(criticality: Criticality, start_s: float) -> Iterator[_Ranked]:
     for vehicle in criticality.report():
         worst = vehicle.worst.get('min_distance')
         if worst is None or worst.time_s == start_s and worst.value > 0.0:
-            # How far apart they begin says nothing of the run.
+            # The initial distance is not a result of the run.
             continue
         both = vehicle.vehicle_id, worst.other
-        # Of two driven vehicles both say the same.
+        # Both of two driven vehicles report the same pair.
         pair = tuple(sorted(both, key=driven.index)) if worst.other in driven else both
         yield _contact(worst.time_s, pair) if worst.value == 0.0 else _Ranked(
             _CLOSE, worst.value, Moment(
@@ -145,7 +144,7 @@ def _contact(time_s: float, pair: tuple[str, ...]) -> _Ranked:
 
 
 def named(names: Collection[str]) -> str:
-    """Name vehicles in a sentence."""
+    """Return the names of vehicles as part of a sentence."""
     *others, last = names or ('nobody',)
     return f'{", ".join(others)} and {last}' if others else last
 

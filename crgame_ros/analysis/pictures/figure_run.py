@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded run as figures need it, read part by part as they ask for it."""
+"""A recorded run for figures, read part by part on demand."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -26,16 +26,16 @@ class FigureRun:
     A recording to make figures of.
 
     :param path: folder of a run, or its recording.
-    :param label: under which figures and tables name it; None for the folder's name.
+    :param label: name in figures and tables; None for the folder's name.
     :param epoch: which run, where a recording holds several; None for the last.
-    :param say: takes a line for people, on what takes long.
+    :param say: called with a line of progress, for people.
     """
 
     def __init__(self, path: Path, label: str | None, epoch: int | None,
                  say: Callable[[str], object]) -> None:
         self.path = path
         self.bag = recording_in(path)
-        # A recording lies in the folder of its run.
+        # A recording is in the folder of its run.
         self.folder = path if self.bag != path else path.parent
         resolved = path.resolve()
         self.label = label or (resolved.parent if re.fullmatch(r'bag(_part\d+)?', resolved.stem)
@@ -45,13 +45,13 @@ class FigureRun:
 
     @property
     def name(self) -> str:
-        """Name for files."""
+        """The name for files."""
         return re.sub(r'[^\w.-]+', '_', self.label).lstrip('.') or 'run'
 
     @cached_property
     def record(self) -> RunRecord:
         """
-        Read how everybody moved.
+        Read the motion of all vehicles and objects.
 
         :raises InputError: if the recording lacks it.
         """
@@ -59,7 +59,7 @@ class FigureRun:
 
     @cached_property
     def scene(self) -> FrameScene:
-        """Read what frames show."""
+        """Read the content of frames."""
         log = self.record.log
         return FrameScene(log, read_followed_plans(self.bag, log,
                                                    self._progress('reading plans of')))
@@ -69,7 +69,7 @@ class FigureRun:
         """Find the moments, the most critical one first."""
         log = self.record.log
         touches: tuple[Touch, ...] = ()
-        # Without cycles nobody says at which step; what touches at a tick is found all the same.
+        # Without cycles, the steps of contacts are unknown; contacts at a tick are found anyway.
         if log.cycles is not None:
             report = timing_report(self.bag, log=log)
             touches = tuple(map(Touch.from_entry, report['contacts'] or ()))
@@ -79,7 +79,7 @@ class FigureRun:
     @cached_property
     def timed(self) -> TimedRun:
         """
-        Read the cycles, for which nothing else need be recorded.
+        Read the cycles; they need no other recorded data.
 
         :raises InputError: if there are none.
         """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How pictures for papers look, and how they are written: the same run gives the same bytes."""
+"""The style and the files of figures for papers; the same run gives the same bytes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,12 +13,12 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-# Of IEEE's two-column pages, by the number of columns [inch].
+# Widths on IEEE's two-column pages, by number of columns [inch].
 WIDTHS = {1: 3.5, 2: 7.16}
 FORMATS = ('svg', 'pdf', 'png')
-# Of PNG, as journals ask for line art beside photographs [dots per inch].
+# Resolution of PNG, as journals require for line art with photographs [dots per inch].
 RESOLUTION = 300
-# Okabe and Ito's palette, told apart by the colour-blind: humans warm, AVs cold colours.
+# Okabe and Ito's palette, suitable for colour-blind readers: warm for humans, cold for AVs.
 HUMAN_COLOURS = ('#d55e00', '#e69f00', '#cc79a7')
 AV_COLOURS = ('#0072b2', '#56b4e9', '#009e73')
 OBJECT_COLOUR = '#8c8c8c'
@@ -27,7 +27,7 @@ PERSONS = ('pedestrian', 'bicycle', 'motorcycle')
 ROAD_COLOUR, LANE_COLOUR = '#ebebeb', '#ffffff'
 EDGE_COLOUR, DIVIDER_COLOUR = '#7f7f7f', '#9a9a9a'
 INK = '#222222'
-# The same without colours: where one drives more than there are of each, they begin anew.
+# Dashes distinguish lines without colours; with more vehicles than dashes, they repeat.
 HUMAN_DASHES = ('-', (0, (6, 1, 1, 1)), (0, (6, 1, 1, 1, 1, 1)))
 AV_DASHES = ((0, (4, 1.2)), (0, (1.2, 1.2)), (0, (4, 1.2, 1.2, 1.2)))
 HUMAN_MARKERS, AV_MARKERS = ('o', 'v', 'P'), ('s', '^', 'D')
@@ -40,9 +40,9 @@ _SETTINGS: dict[Any, Any] = {
     'xtick.major.width': 0.5, 'ytick.major.width': 0.5, 'xtick.direction': 'in',
     'ytick.direction': 'in', 'lines.linewidth': 1.1, 'lines.markersize': 3.5,
     'legend.frameon': False, 'legend.handlelength': 2.6, 'axes.axisbelow': True,
-    # Text as paths in SVG needs no font where it is read; PDF embeds TrueType, as IEEE asks.
+    # Text as paths in SVG needs no fonts for display; PDF embeds TrueType, as IEEE requires.
     'svg.fonttype': 'path', 'svg.hashsalt': 'crgame_ros', 'pdf.fonttype': 42}
-# Nothing in a file tells when it was made.
+# Files contain no date.
 _METADATA = {'svg': {'Date': None, 'Creator': 'crgame_ros'},
              'pdf': {'CreationDate': None, 'Creator': 'crgame_ros'},
              'png': {'Software': 'crgame_ros'}}
@@ -51,7 +51,7 @@ _METADATA = {'svg': {'Date': None, 'Creator': 'crgame_ros'},
 @dataclass(frozen=True)
 class VehicleStyle:
     """
-    How one driven vehicle is drawn everywhere.
+    The style of one driven vehicle in all figures.
 
     :param colour: as #rrggbb.
     :param dashes: line style of matplotlib.
@@ -65,7 +65,7 @@ class VehicleStyle:
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Draw in the style of the papers, whatever the user's own settings; they come back after."""
+    """Apply the papers' style within a context, and restore the user's settings afterwards."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
@@ -74,7 +74,7 @@ def paper_style() -> Iterator[None]:
 
 def new_figure(columns: int, height: float) -> Figure:
     """
-    Make an empty figure that no display and no other figure knows of.
+    Build an empty figure that is independent of displays and of other figures.
 
     :param columns: of the page that it takes, 1 or 2.
     :param height: [inch]
@@ -86,7 +86,7 @@ def new_figure(columns: int, height: float) -> Figure:
 
 def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION) -> bytes:
     """
-    Return a figure as a file has it, without a date: equal figures give equal bytes.
+    Return the bytes of a figure's file, without a date: equal figures give equal bytes.
 
     :param file_format: one of `FORMATS`.
     :param resolution: of PNG [dots per inch].
@@ -99,7 +99,7 @@ def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION)
 
 
 def vehicle_styles(descriptions: tuple[ObjectDescription, ...]) -> dict[str, VehicleStyle]:
-    """Return each driven vehicle its style, by id."""
+    """Return the style of each driven vehicle, by id."""
     styles = {}
     for role, colours, dashes, markers in (
             (Role.HUMAN, HUMAN_COLOURS, HUMAN_DASHES, HUMAN_MARKERS),
@@ -111,7 +111,7 @@ def vehicle_styles(descriptions: tuple[ObjectDescription, ...]) -> dict[str, Veh
 
 
 def object_colour(description: ObjectDescription) -> str:
-    """Return the colour of what nobody drives: who walks or rides is darker."""
+    """Return the colour of an object that is not driven: people on foot or bicycle are darker."""
     return PERSON_COLOUR if description.type in PERSONS else OBJECT_COLOUR
 
 

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def figures(values: argparse.Namespace) -> int:
-    """Draw what was asked for, and print the files with what they show."""
+    """Draw the requested figures, and print the files with their contents."""
     from crgame_ros.analysis.pictures.figure_run import FigureRun
     from crgame_ros.analysis.pictures.figure_style import FORMATS
     wanted = _listed('--figures', values.figures, FIGURES) if values.figures is not None \
@@ -80,7 +80,7 @@ def figures(values: argparse.Namespace) -> int:
         values.runs, values.label or [None] * len(values.runs), strict=True)]
     folder = values.out or runs[0].folder / FOLDER
     for number, run in enumerate(runs):
-        # Each run's own figures lie in a folder of its own where there are several.
+        # With several runs, each run's own figures are in a separate folder.
         own = folder / _name(number, runs) if len(runs) > 1 else folder
         if 'frames' in wanted:
             for name, figure, caption in _frames(run, values, times_s):
@@ -97,7 +97,7 @@ def figures(values: argparse.Namespace) -> int:
 
 
 def _check(values: argparse.Namespace) -> None:
-    """Refuse numbers that no figure can be made of."""
+    """Refuse values from which no figure can be drawn."""
     for name, least, most in (('moments', 1, 100), ('panels', 1, MOST_PANELS)):
         if not least <= getattr(values, name) <= most:
             raise InputError(f'is {getattr(values, name)}', f'--{name}',
@@ -138,7 +138,7 @@ def _times(text: str) -> list[float]:
 
 def _frames(run: 'FigureRun', values: argparse.Namespace, times_s: list[float] | None
             ) -> Iterator[tuple[str, 'Figure', str]]:
-    """Yield the figures of frames with their names and what they show."""
+    """Yield the figures of frames with their names and captions."""
     from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
     scene, log = run.scene, run.record.log
     scheduler = log.game.scheduler
@@ -176,7 +176,7 @@ def _timing(runs: Sequence['FigureRun'], folder: Path, wanted: Sequence[str],
     """
     Draw the timing and write the table of all runs.
 
-    :param say: takes a note where a run has no cycles; None where that is an error.
+    :param say: called with a note where a run has no cycles; None where that is an error.
     """
     from crgame_ros.analysis.pictures.timing_figure import timing_figure
     from crgame_ros.analysis.pictures.timing_table import TimingTable
@@ -223,7 +223,7 @@ def _video(run: 'FigureRun', path: Path, say: Callable[[str], object]) -> None:
 
 
 def _name(number: int, runs: Sequence['FigureRun']) -> str:
-    """Name a run's folder, apart from those of others of the same name."""
+    """Return the name of a run's folder, unique among runs of the same name."""
     name = runs[number].name
     before = sum(run.name == name for run in runs[:number])
     return f'{name}_{before + 1}' if before else name

@@ -17,8 +17,8 @@ class FollowedPlan(NamedTuple):
     """
     A plan of an AV.
 
-    :param start_s: since the start of the run, when it was there [s]
-    :param stamp_s: since the start of the run, of its first pose [s]
+    :param start_s: time since the start of the run at which it was available [s]
+    :param stamp_s: time since the start of the run of its first pose [s]
     :param poses: (S, 3) of the rear axle in frame map, scenario steps apart.
     """
 
@@ -31,11 +31,11 @@ def read_followed_plans(bag: Path, log: RunTrajectories,
                         progress: Callable[[float], object] | None = None
                         ) -> dict[str, tuple[FollowedPlan, ...]]:
     """
-    Read the plans of each AV; none where they were not recorded.
+    Read the plans of each AV; empty where they were not recorded.
 
-    Whether the engine took a plan is not recorded one by one: a refused one counts as well.
+    The recording does not show which plans the engine accepted: refused ones are included.
 
-    :param log: of the same run.
+    :param log: log of the same run.
     :param progress: called with the share of the recording read so far, 0 to 1.
     :raises InputError: as `read_plans`.
     """
@@ -46,7 +46,7 @@ def read_followed_plans(bag: Path, log: RunTrajectories,
         if recorded.plan is None or recorded.k is None or av is None:
             continue
         stamp_s = (recorded.stamp_ns - scheduler.clock_offset_ns) * 1e-9
-        # The run waits for the first answer; a further one to the same request has no latency.
+        # The run waits for the first answer; another one to the same request has no latency.
         waited_s = 0.0 if stamp_s == 0.0 or math.isnan(recorded.latency_s) \
             else recorded.latency_s * log.game.real_time_factor
         start_s = stamp_s + waited_s

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Of a character, in heights of the text.
+# Width of a character, in text heights.
 CHARACTER_WIDTH = 0.52
-# Between a name and its vehicle, and how much farther each attempt goes, in heights of the text.
+# Gap between a name and its vehicle, and the increase with each attempt, in text heights.
 _GAP, _STEP, _ATTEMPTS = 0.35, 0.6, 4
 # Above, below, behind, ahead, then across the corners.
 _DIRECTIONS = np.array(((0, 1), (0, -1), (-1, 0), (1, 0), (1, 1), (-1, 1), (-1, -1), (1, -1)))
@@ -36,7 +36,7 @@ class PlacedName(NamedTuple):
     """
     A name with its middle in the window's coordinates [m].
 
-    :param colour: of whose it is, as #rrggbb.
+    :param colour: colour of the vehicle, as #rrggbb.
     """
 
     text: str
@@ -48,16 +48,16 @@ class PlacedName(NamedTuple):
 def place_names(frame: SceneFrame, text_height: float,
                 taken: tuple[float, float] = (0.0, 0.0)) -> tuple[PlacedName, ...]:
     """
-    Find places for the names of who is labelled.
+    Find places for the names of the labelled vehicles.
 
     :param text_height: [m]
-    :param taken: length and height of what stands in the upper left corner [m]
+    :param taken: length and height of the text in the upper left corner [m]
     """
     half = 0.5 * np.array((frame.window.length, frame.window.height))
     corner = np.array((-half[0], half[1] - taken[1], -half[0] + taken[0], half[1]))
     boxes = [corner, *(np.concatenate((body.corners.min(axis=0), body.corners.max(axis=0)))
                        for body in frame.bodies)]
-    # Others' way is a smaller evil than others.
+    # It is better to cover the paths of others than their footprints.
     ways = np.concatenate([np.empty((0, 2)), *(line.points for line in
                                                (*frame.traces, *frame.plans))])
     names = []
@@ -81,7 +81,7 @@ def place_names(frame: SceneFrame, text_height: float,
 
 
 def _overlaps(tried: FloatArray, others: FloatArray) -> FloatArray:
-    """Return what each box (T, 4) has in common with all others (B, 4) [m^2]."""
+    """Return the area that each box (T, 4) shares with all others (B, 4) [m^2]."""
     sides = (np.minimum(tried[:, None, 2:], others[None, :, 2:])
              - np.maximum(tried[:, None, :2], others[None, :, :2]))
     return np.asarray(np.maximum(sides, 0.0).prod(axis=2).sum(axis=1))
@@ -93,10 +93,10 @@ def _counts(tried: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(inside.all(axis=2).sum(axis=1), dtype=np.float64)
 
 
-# Of the names of vehicles, and of the remark in the corner [pt].
+# Font sizes of vehicles' names, and of the remark in the corner [pt].
 NAME_SIZE, CORNER_SIZE = 6.5, 7.5
 DASHES = (0, (4, 4))
-# Of ways behind vehicles; AVs' lie on top, dashed, so that both are seen.
+# Style of traces behind vehicles; those of AVs are on top and dashed, so that both are visible.
 TRACE_WIDTH, TRACE_DASHES = 1.1, (0, (4, 1.5))
 PLAN_WIDTH, PLAN_DOT = 0.6, 2.4
 
@@ -105,9 +105,9 @@ def draw_frame(axes: Axes, frame: SceneFrame, metre: float, corner: str = '') ->
     """
     Draw a frame; the data coordinates are the window's own [m].
 
-    :param axes: of the window's proportions, which are then without ticks.
+    :param axes: axes with the window's proportions; their ticks are removed.
     :param metre: size of a metre in the picture [pt]
-    :param corner: what stands in the upper left corner.
+    :param corner: text in the upper left corner.
     """
     window = frame.window
     axes.set_xlim(-0.5 * window.length, 0.5 * window.length)
@@ -126,7 +126,7 @@ def draw_frame(axes: Axes, frame: SceneFrame, metre: float, corner: str = '') ->
                   markersize=PLAN_DOT, markeredgewidth=0.0, markevery=line.dots, zorder=3.5,
                   gid=f'plan {line.id}')
     for number, body in enumerate(frame.bodies):
-        # Each with its front below the next one.
+        # Each body is below the next one, including its front mark.
         zorder = 4.0 + number / len(frame.bodies)
         axes.add_patch(Polygon(
             body.corners, facecolor=body.colour, edgecolor=INK, zorder=zorder,

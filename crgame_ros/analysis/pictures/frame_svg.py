@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A frame of the scene as plain SVG, small enough to put many of them into one page."""
+"""A frame of the scene as plain SVG, small enough for many in one page."""
 
 from collections.abc import Iterable
 import math
@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Of the names of vehicles, and of the time in the corner [px].
+# Font sizes of vehicles' names, and of the time in the corner [px].
 NAME_SIZE, TIME_SIZE = 11.0, 13.0
 
 
 def frame_svg(frame: SceneFrame, width: int = 480) -> str:
     """
-    Draw a frame as an element `svg`, which needs no style sheet and no script.
+    Return a frame as an element `svg`, which needs no style sheet and no script.
 
-    :param frame: of `FrameScene.at`.
-    :param width: of the picture [px]
+    :param frame: frame from `FrameScene.at`.
+    :param width: width of the picture [px]
     :return: text without a line break; names in it are escaped.
     """
     window = frame.window
@@ -65,7 +65,7 @@ def frame_svg(frame: SceneFrame, width: int = 480) -> str:
 
 
 class _Paper:
-    """Takes shapes in metres, writes them in pixels."""
+    """A drawing in metres, written as SVG in pixels."""
 
     def __init__(self, width: float, height: float, scale: float) -> None:
         self._size = width, math.ceil(height)
@@ -73,11 +73,11 @@ class _Paper:
         self._parts: list[str] = []
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Return the pixels of a place in the window."""
+        """Return the pixel coordinates of a place in the window."""
         return (0.5 * self._size[0] + x * self._scale, 0.5 * self._size[1] - y * self._scale)
 
     def fill(self, areas: Iterable[Iterable[FloatArray]], colour: str, more: str = '') -> None:
-        """Fill areas, each of rings."""
+        """Fill areas, each given by its rings."""
         path = ''.join(f'{self._path(ring)}z' for rings in areas for ring in rings)
         if path:
             self._parts.append(f'<path d="{path}" fill="{colour}" fill-rule="evenodd"{more}/>')
@@ -95,14 +95,14 @@ class _Paper:
                            'stroke-linecap="round"/>')
 
     def write(self, text: str, x: float, y: float, size: float, colour: str, anchor: str) -> None:
-        """Write text with a white rim."""
+        """Draw text with a white outline."""
         self._parts.append(
             f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" text-anchor="{anchor}" '
             f'fill="{colour}" stroke="#fff" stroke-width="3" paint-order="stroke" '
             f'stroke-linejoin="round">{escape(text)}</text>')
 
     def text(self) -> str:
-        """Return what was drawn."""
+        """Return the SVG elements drawn."""
         width, height = self._size
         return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
                 f'width="{width}" height="{height}" font-family="sans-serif" '

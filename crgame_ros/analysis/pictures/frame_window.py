@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Rectangles of the map that frames show, chosen so that all frames of a figure have one scale."""
+"""Rectangles of the map that frames show; all frames of a figure have one scale."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,17 +17,17 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Nobody farther from the vehicle in focus has to be shown [m].
+# Vehicles farther from the one in focus need not be shown [m].
 REACH = 100.0
-# Road around the outermost footprint, ahead and behind, and beside [m].
+# Margin of road around the outermost footprints, ahead and behind, and beside [m].
 MARGIN, MARGIN_BESIDE = 7.0, 5.0
-# What stays of that beside where the road lies to the other side [m].
+# Least margin beside, where the road extends to the other side [m].
 LEAST_BESIDE = 2.5
-# No window is smaller [m].
+# Least size of a window [m].
 LEAST_LENGTH, LEAST_HEIGHT = 45.0, 15.0
-# Longer than high at least, and at most, by so much.
+# Least and greatest ratio of length to height.
 SQUAREST, LONGEST = 1.0, 9.0
-# A camera that stands shows so much at most; beyond that it goes with the vehicle in focus [m].
+# A fixed camera shows at most this length; beyond it the camera follows the vehicle in focus [m].
 MOST_STANDING = 110.0
 
 
@@ -38,8 +38,8 @@ class FrameWindow:
 
     :param x: of the centre [m]
     :param y: of the centre [m]
-    :param yaw: what points to the right in the picture [rad]
-    :param length: extent along that [m]
+    :param yaw: direction in the map that points to the right in the picture [rad]
+    :param length: extent along that direction [m]
     :param height: extent across [m]
     """
 
@@ -54,7 +54,7 @@ class FrameWindow:
         return np.asarray((points - (self.x, self.y)) @ _turn(self.yaw))
 
     def polygon(self, margin: float = 0.0) -> shapely.Polygon:
-        """Return it as a polygon of the map, wider by a margin [m] on every side."""
+        """Return the window as a polygon in the map, extended by a margin [m] on every side."""
         corners = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1))) * (
             0.5 * self.length + margin, 0.5 * self.height + margin)
         return shapely.Polygon(corners @ _turn(self.yaw).T + (self.x, self.y))
@@ -63,16 +63,17 @@ class FrameWindow:
 def footprints(descriptions: Sequence[ObjectDescription], poses: FloatArray
                ) -> list[FloatArray]:
     """
-    Place outlines in the map, each (..., C, 2) [m].
+    Return the footprints in the map, each (..., C, 2) [m].
 
-    :param poses: (..., N, 3) of the reference points: rear axles of driven vehicles, else centres.
+    :param poses: (..., N, 3) poses of reference points: rear axles of driven vehicles, else
+        centres.
     """
     return [placed(outline(item.shape), shifted(poses[..., i, :], item.rear_to_center))
             for i, item in enumerate(descriptions)]
 
 
 def all_poses(log: RunTrajectories, rows: Sequence[int]) -> FloatArray:
-    """Return the poses (R, V + M, 3) of everybody's reference points; NaN where absent."""
+    """Return the poses (R, V + M, 3) of all reference points; NaN where absent."""
     chosen = list(rows)
     return np.concatenate((log.vehicle_states[chosen, :, :3], log.object_poses[chosen]), axis=1)
 
@@ -83,19 +84,19 @@ def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence
                    road: Callable[[FrameWindow], tuple[float, float]] | None = None
                    ) -> tuple[FrameWindow, ...]:
     """
-    Choose what the frames of one figure show: the driven vehicles, and who is named.
+    Return the windows of one figure's frames, which show the driven and the named vehicles.
 
-    A camera that stands is turned as the road is for the vehicle in focus at the middle frame.
+    A fixed camera is aligned with the road at the vehicle in focus in the middle frame.
 
-    :param rows: of the log, one for each frame.
+    :param rows: rows of the log, one for each frame.
     :param vehicles: ids; the first driven one is in focus, without one the first AV or human.
-    :param standing: whether all show the same piece of road; None if that is short enough.
-    :param reach: who is farther from the vehicle in focus need not be shown [m]
-    :param least: no window is shorter [m]
-    :param road: tells from where to where road lies across a window [m]: where the window is
-        higher than need be, it shows the road's middle rather than the vehicles'.
+    :param standing: whether all show the same piece of road; None to decide by its length.
+    :param reach: vehicles farther from the one in focus need not be shown [m]
+    :param least: least length of a window [m]
+    :param road: returns the range of the road across a window [m]; if the window is higher than
+        needed, it is centred on the road rather than on the vehicles.
     :return: windows of one size.
-    :raises InputError: if nobody drives in the run.
+    :raises InputError: if the run has no driven vehicle.
     """
     focus = _focus(log, vehicles)
     poses = all_poses(log, rows)
@@ -144,6 +145,6 @@ def _size(extent: FloatArray, least: float) -> tuple[float, float]:
 
 
 def _turn(yaw: float) -> FloatArray:
-    """Return the matrix that takes coordinates along `yaw` to those of the map."""
+    """Return the matrix that rotates coordinates along `yaw` to those of the map."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     return np.array(((cos, -sin), (sin, cos)))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A figure of frames (as CRG figures 8, 10 and 12): panels around a moment, all at one scale."""
+"""Figures of frames (as CRG figures 8, 10 and 12): panels around a moment, at one scale."""
 
 from collections.abc import Sequence
 from string import ascii_lowercase
@@ -24,13 +24,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 POINTS = 72.0
-# A metre is at least so large, if a page is wide enough for it [pt].
+# Least size of a metre, if the page is wide enough [pt].
 LEAST_METRE = 2.6
-# Between panels, and below them for what colours and lines mean [pt].
+# Gap between panels, and height of a line of the legend below them [pt].
 GAP, LEGEND_LINE = 3.0, 12.0
-# Of a page [inch].
+# Height of a page [inch].
 MOST_HEIGHT = 9.0
-# Lengths of the scale bar [m]; it is as long as fits into so much [pt].
+# Possible lengths of the scale bar [m], and its greatest length [pt].
 _BARS, _BAR = (50, 20, 10, 5, 2, 1), 55.0
 
 
@@ -39,9 +39,9 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
     """
     Draw panels at scenario steps, each with its time since the start of the run.
 
-    :param vehicles: whom it is about: shown and labelled, beside the driven vehicles.
-    :param columns: of the page that it takes, 1 or 2.
-    :raises InputError: if the run does not hold a step, or nobody drives in it.
+    :param vehicles: ids of vehicles that are shown and labelled with the driven ones.
+    :param columns: number of page columns for the figure, 1 or 2.
+    :raises InputError: if the run lacks a step, or has no driven vehicle.
     """
     windows = scene.windows([scene.row(k) for k in ks], vehicles)
     labelled = {item.id for item in scene.log.vehicles} | set(vehicles)
@@ -52,7 +52,7 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
     rows = -(-len(ks) // across)
     metre = (width - (across - 1) * GAP) / across / length
     handles = _handles(scene, frames)
-    # In a narrow figure in two lines.
+    # A narrow figure has a legend of two lines.
     legend = 3.0 + LEGEND_LINE * -(-len(handles) // (4 * columns))
     total = rows * height * metre + (rows - 1) * GAP + legend
     digits = _digits(scene.log.game.scheduler.time_step_s)
@@ -75,7 +75,7 @@ def frames_figure(scene: FrameScene, ks: Sequence[int], vehicles: Sequence[str] 
 
 
 def _panels_across(count: int, width: float, length: float, height: float) -> int:
-    """Choose how many panels stand side by side: many, but large enough, and on one page."""
+    """Return the number of panels side by side: many, but large enough, and on one page."""
     best = 1
     for across in range(2, count + 1):
         metre = (width - (across - 1) * GAP) / across / length
@@ -84,12 +84,12 @@ def _panels_across(count: int, width: float, length: float, height: float) -> in
     while best < count and -(-count // best) * height * width / best / length \
             > MOST_HEIGHT * POINTS - 2.0 * LEGEND_LINE:
         best += 1
-    # No last row that is emptier than need be.
+    # Balance the rows, so that the last one is as full as possible.
     return -(-count // -(-count // best))
 
 
 def _handles(scene: FrameScene, frames: Sequence[SceneFrame]) -> list[Patch | Line2D]:
-    """Return what colours and lines mean."""
+    """Return the legend's entries for colours and lines."""
     roles = {item.role for item in scene.log.vehicles}
     shown = {body.colour for frame in frames for body in frame.bodies if not body.is_driven}
     handles: list[Patch | Line2D] = [
@@ -108,7 +108,7 @@ def _handles(scene: FrameScene, frames: Sequence[SceneFrame]) -> list[Patch | Li
 
 
 def _draw_scale(figure: Figure, metre: float, y: float) -> None:
-    """Draw how long some metres are, at a height above the lower edge [pt]."""
+    """Draw the scale bar at a height above the lower edge [pt]."""
     bar = next((each for each in _BARS if each * metre <= _BAR), _BARS[-1])
     width, height = figure.get_size_inches() * POINTS
     right = width - 2.0
@@ -126,14 +126,14 @@ def _letter(number: int) -> str:
 
 
 def _digits(step_s: float) -> int:
-    """Return how many decimals tell a scenario's steps apart."""
+    """Return the number of decimals that distinguish a scenario's steps."""
     return next((digits for digits in range(1, 4)
                  if abs(step_s * 10**digits - round(step_s * 10**digits)) < 1e-6), 3)
 
 
 def panel_steps(scene: FrameScene, time_s: float, panels: int, spacing_s: float
                 ) -> tuple[int, ...]:
-    """Return scenario steps around a time, the panel at it being in the second half."""
+    """Return scenario steps around a time, whose own panel is in the second half."""
     step_s = scene.log.game.scheduler.time_step_s
     stride = max(1, round(spacing_s / step_s))
     first, last = int(scene.log.ks[0]), int(scene.log.ks[-1])

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# What can be drawn over time, by name: column, label.
+# Profiles over time, by name: column, label.
 OVER_TIME = {
     'heading': (StateColumn.YAW, 'heading angle [rad]'),
     'velocity': (StateColumn.SPEED, 'velocity [m/s]'),
@@ -33,28 +33,27 @@ OVER_TIME = {
     'steering': (StateColumn.STEERING_ANGLE, 'steering angle [rad]'),
 }
 POSITION = 'position'
-# Those of the papers, and all.
+# The profiles of the papers, and all profiles.
 USUAL_PROFILES = ('heading', POSITION, 'velocity')
 ALL_PROFILES = (*USUAL_PROFILES, 'acceleration', 'steering')
-# Heights of a panel, beside others and above others, and of the line that names the vehicles
-# [inch].
+# Heights of a panel that is beside others, of one above others, and of the legend [inch].
 _BESIDE, _ABOVE, _NAMES = 1.7, 1.4, 0.2
-# A way that is longer than wide by more is not drawn to scale: nothing of it would be seen.
+# A path with a greater ratio of length to width is not drawn to scale: it would look like a line.
 _TO_SCALE = 3.0
 _MOMENT_LINE: dict[str, Any] = {'color': INK, 'linewidth': 0.5, 'linestyle': (0, (5, 3))}
-# Markers on a line.
+# Number of markers on a line.
 _MARKS = 8
 
 
 def profiles_figure(record: RunRecord, moments: Sequence[Moment] = (),
                     profiles: Sequence[str] = USUAL_PROFILES, columns: int = 2) -> Figure:
     """
-    Draw profiles of every driven vehicle, as they are in the log: of rear axles.
+    Draw profiles of every driven vehicle's rear axle, as in the log.
 
     Events that took effect are dotted lines with their names, moments dashed ones.
 
-    :param profiles: of `ALL_PROFILES`.
-    :param columns: of the page that it takes, 1 or 2.
+    :param profiles: names from `ALL_PROFILES`.
+    :param columns: number of page columns for the figure, 1 or 2.
     """
     log = record.log
     styles = vehicle_styles(log.vehicles)
@@ -90,7 +89,7 @@ def log_times(record: RunRecord) -> FloatArray:
 
 
 def values_of(record: RunRecord, column: StateColumn) -> FloatArray:
-    """Return what is drawn of a column of the states (K, V); a heading goes on beyond pi."""
+    """Return a column of the states (K, V) for drawing; headings are unwrapped beyond pi."""
     values = record.log.vehicle_states[:, :, column]
     return np.asarray(np.unwrap(values, axis=0) if column is StateColumn.YAW else values)
 
@@ -103,7 +102,7 @@ def draw_over_time(axes: Axes, record: RunRecord, styles: dict[str, VehicleStyle
         draw_line(axes, times_s, values[:, i], item.id, styles, i)
     axes.set_ylabel(label)
     axes.set_xlim(times_s[0], times_s[-1])
-    # Noise of rounding is no profile.
+    # The least range of the axis hides rounding noise.
     least = 0.1 if column is StateColumn.YAW else 0.02
     low, high = axes.get_ylim()
     if high - low < least:
@@ -116,7 +115,7 @@ def _draw_positions(axes: Axes, record: RunRecord, styles: dict[str, VehicleStyl
     for i, item in enumerate(record.log.vehicles):
         x, y = states[:, i, StateColumn.X], states[:, i, StateColumn.Y]
         draw_line(axes, x, y, item.id, styles, i)
-        # Where the way begins.
+        # Mark the start of the path.
         axes.plot(x[:1], y[:1], color=styles[item.id].colour, marker='o', markersize=5.0,
                   markerfacecolor='white', linestyle='none', zorder=4)
     axes.set_ylabel('y [m]')
@@ -134,7 +133,7 @@ def _draw_positions(axes: Axes, record: RunRecord, styles: dict[str, VehicleStyl
 
 def draw_line(axes: Axes, x: FloatArray, y: FloatArray, name: str,
               styles: dict[str, VehicleStyle], number: int) -> None:
-    """Draw a line of a driven vehicle in its style, its markers beside those of the others."""
+    """Draw a line of a driven vehicle in its style, with markers apart from those of others."""
     style = styles[name]
     stride = max(1, len(x) // _MARKS)
     axes.plot(x, y, color=style.colour, linestyle=style.dashes, marker=style.marker,
@@ -143,7 +142,7 @@ def draw_line(axes: Axes, x: FloatArray, y: FloatArray, name: str,
 
 
 def mark_times(axes: Axes, record: RunRecord, moments: Sequence[Moment]) -> None:
-    """Mark in a profile over time when events took effect, and moments."""
+    """Mark the times of events that took effect, and of moments, in a profile over time."""
     dt_s = record.log.game.scheduler.dt_s
     for moment in moments:
         axes.axvline(moment.time_s, zorder=1, gid='moment', **_MOMENT_LINE)

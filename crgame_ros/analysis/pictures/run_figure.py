@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run at a glance: frames at some times, velocities and distances below."""
+"""An overview figure of a run: frames at some times, with velocities and distances below."""
 
 from collections.abc import Sequence
 
@@ -19,10 +19,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
-# Of the panels below, between panels, and of the page [inch].
+# Height of the panels below, gap between panels, and margin of the page [inch].
 _BELOW, _GAP, _MARGIN = 1.7, 0.04, 0.45
 _POINTS = 72.0
-# Frames show at least so much road [m].
+# Least length of road in a frame [m].
 LEAST = 145.0
 
 

@@ -21,12 +21,12 @@ from matplotlib.figure import Figure
 import numpy as np
 from PIL import Image
 
-# Of the picture [px], and the height of what it shows in widths.
+# Width of the picture [px], and limits of its height in widths.
 WIDTHS_PX = {'.mp4': 1280, '.gif': 720}
 _FLATTEST, _HIGHEST = 0.3, 0.6
-# Nobody sees more pictures in a second.
+# Greatest frame rate; a higher one is not visible [1/s].
 MOST_RATE = 30.0
-# Around the vehicle in focus [m].
+# Distance shown around the vehicle in focus [m].
 VIDEO_REACH = 60.0
 _POINTS, _INCH_PX = 72.0, 160
 
@@ -34,12 +34,12 @@ _POINTS, _INCH_PX = 72.0, 160
 def write_video(scene: FrameScene, path: Path,
                 progress: Callable[[float], object] = lambda _: None) -> Path:
     """
-    Write a video that lasts as long as the run; the file is there whole or not at all.
+    Write a video with the run's duration; the file is written completely or not at all.
 
-    :param path: of the file, *.mp4 or *.gif.
+    :param path: path of the file, *.mp4 or *.gif.
     :param progress: called with the share drawn so far, 0 to 1.
     :return: the file, a GIF where there is no ffmpeg for MP4.
-    :raises InputError: if the name is another, or the file cannot be written.
+    :raises InputError: if the name has another suffix, or the file cannot be written.
     """
     if path.suffix not in WIDTHS_PX:
         raise InputError('is no *.mp4 or *.gif', str(path), 'name the video so')
@@ -55,7 +55,7 @@ def write_video(scene: FrameScene, path: Path,
         with paper_style(), writer.saving(figure, str(temporary), _INCH_PX):
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             for number, (row, window) in enumerate(zip(rows, windows, strict=True)):
-                # Axes are dear to make.
+                # Creating axes is slow, so they are reused.
                 for artist in (*axes.patches, *axes.lines, *axes.collections, *axes.texts):
                     artist.remove()
                 frame = scene.at(int(scene.log.ks[row]), window)
@@ -76,17 +76,17 @@ def write_video(scene: FrameScene, path: Path,
 
 
 def video_path(path: Path) -> Path:
-    """Return the file that can be written here: a GIF where there is no ffmpeg."""
+    """Return the path of a file that can be written here: a GIF without ffmpeg."""
     lacks = path.suffix == '.mp4' and not FFMpegWriter.isAvailable()
     return path.with_suffix('.gif') if lacks else path
 
 
 def _prepared(suffix: str, windows: Sequence[FrameWindow]
               ) -> tuple[Figure, list[FrameWindow]]:
-    """Make an empty picture, and the windows as high or long as to fill it."""
+    """Return an empty picture, and the windows extended to fill it."""
     length, height = windows[0].length, windows[0].height
     width = WIDTHS_PX[suffix]
-    # Video codecs want even numbers of pixels.
+    # Video codecs require even numbers of pixels.
     lines = 2 * round(0.5 * width * min(max(height / length, _FLATTEST), _HIGHEST))
     length = max(length, height * width / lines)
     figure = new_figure(1, 1.0)
@@ -98,7 +98,7 @@ def _prepared(suffix: str, windows: Sequence[FrameWindow]
 
 
 def _writer(suffix: str, rate: Any) -> AbstractMovieWriter:
-    """Make the writer of a kind of file, at so many pictures in a second, also of fractions."""
+    """Return the writer for a kind of file, at a frame rate that may be fractional."""
     if suffix == '.mp4':
         return FFMpegWriter(fps=rate, codec='libx264', metadata={'encoder': 'crgame_ros'},
                             extra_args=['-pix_fmt', 'yuv420p', '-crf', '23'])
@@ -107,10 +107,10 @@ def _writer(suffix: str, rate: Any) -> AbstractMovieWriter:
 
 class _GifWriter(PillowWriter):
     """
-    Keeps its pictures at a byte a pixel, a quarter of what they take otherwise.
+    A writer of GIF that stores one byte per pixel, a quarter of the usual memory.
 
-    A GIF counts in hundredths of a second: pictures last longer and shorter in turns, so that the
-    film as a whole keeps the time.
+    Durations in a GIF are hundredths of a second. Rounding alternates between longer and shorter
+    durations, so that the video as a whole keeps the time.
     """
 
     def __init__(self, fps: Any) -> None:
@@ -118,7 +118,7 @@ class _GifWriter(PillowWriter):
         self._taken: list[Image.Image] = []
 
     def grab_frame(self, **savefig_kwargs: Any) -> None:
-        """Take a picture."""
+        """Add the current picture."""
         canvas = self.fig.canvas
         assert isinstance(canvas, FigureCanvasAgg)
         canvas.draw()

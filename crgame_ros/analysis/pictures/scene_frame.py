@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run at one moment, seen from above: what every renderer of frames draws."""
+"""The scene of a run at one moment from above, as data for all renderers of frames."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -37,20 +37,20 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Nobody sees smaller bends [m].
+# Tolerance of simplified lines; smaller bends are not visible [m].
 SIMPLIFIED = 0.03
 _SOLID = (LineMarking.SOLID, LineMarking.BROAD_SOLID)
 
 
 class RoadInWindow(NamedTuple):
     """
-    A piece of road in a window's own coordinates [m].
+    The road in a window, in the window's own coordinates [m].
 
     :param surfaces: rings of each piece of road: the outer one (n, 2), then those of its holes.
     :param bounds: lanelets' bounds that are neither edge nor line, as on junctions.
     :param dashed: lines between lanes that may be crossed.
-    :param solid: lines between lanes that may not.
-    :param edges: of the surface.
+    :param solid: lines between lanes that must not be crossed.
+    :param edges: edges of the surface.
     """
 
     surfaces: tuple[tuple[FloatArray, ...], ...]
@@ -62,17 +62,17 @@ class RoadInWindow(NamedTuple):
 
 class PicturedRoad:
     """
-    The road around where people drove.
+    The road in the area of a run.
 
-    :param network: the scenario's.
-    :param area: smallest x, smallest y, largest x, largest y of what will be shown [m]
+    :param network: the scenario's lanelet network.
+    :param area: smallest x, smallest y, largest x, largest y of the area to show [m]
     """
 
     def __init__(self, network: LaneletNetwork, area: tuple[float, float, float, float]) -> None:
         wanted = shapely.box(*area)
         lanelets = [item for item in network.lanelets
                     if shapely.box(*_extent(item)).intersects(wanted)]
-        # In projected coordinates of millions of metres uniting would leave slits.
+        # With projected coordinates of millions of metres, the union would leave slits.
         self._origin = (area[0], area[1])
         polygons = lanelet_polygons(lanelets, self._origin)
         patches = seam_patches(shapely.union_all(polygons))
@@ -88,7 +88,7 @@ class PicturedRoad:
             shapely.prepare(geometry)
 
     def within(self, window: FrameWindow) -> RoadInWindow:
-        """Cut a window out of it."""
+        """Return the road within a window."""
         cut = shapely.transform(window.polygon(margin=1.0), lambda points: points - self._origin)
         surfaces = tuple(
             tuple(self._seen(ring, window) for ring in (piece.exterior, *piece.interiors))
@@ -99,7 +99,7 @@ class PicturedRoad:
             for kind, lines in self._lines.items()})
 
     def across(self, window: FrameWindow) -> tuple[float, float]:
-        """Return from where to where road lies in a window, across it; 0, 0 without any [m]."""
+        """Return the range of the road across a window; 0, 0 without a road [m]."""
         cut = shapely.transform(window.polygon(), lambda points: points - self._origin)
         points = shapely.get_coordinates(shapely.intersection(self._surface, cut))
         if not len(points):
@@ -117,7 +117,7 @@ def _extent(lanelet: Lanelet) -> list[float]:
 
 
 def _lines(lanelet: Lanelet, known: set[int]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield what a lanelet's bounds are; of those that two lanelets share one tells."""
+    """Yield the kinds and points of a lanelet's bounds; a shared bound comes from one lanelet."""
     for points, neighbour, same, marking in (
             (lanelet.left_vertices, lanelet.adj_left, lanelet.adj_left_same_direction,
              lanelet.line_marking_left_vertices),
@@ -129,11 +129,11 @@ def _lines(lanelet: Lanelet, known: set[int]) -> Iterator[tuple[str, FloatArray]
             yield 'solid' if marking in _SOLID else 'dashed', points[:, :2]
 
 
-# Of the way behind each driven vehicle that is drawn [s].
+# Duration of the trace behind each driven vehicle [s].
 TRACE_S = 2.0
-# Between the dots on plans [s].
+# Time between the dots on plans [s].
 DOTS_S = 0.5
-# What is shorter shows no front [m].
+# Shorter bodies have no front mark [m].
 SHOWS_FRONT = 2.5
 # Corners of the mark at the front of a vehicle, in lengths and widths.
 _FRONT = np.array(((0.12, 0.32), (0.38, 0.0), (0.12, -0.32)))
@@ -144,9 +144,9 @@ class FrameBody:
     """
     A footprint in a window's coordinates [m].
 
-    :param id: whose it is.
+    :param id: id of the vehicle or object.
     :param corners: (C, 2)
-    :param front: (3, 2) corners of the mark at its front; none of what is short.
+    :param front: (3, 2) corners of the mark at its front; empty for a short body.
     :param colour: as #rrggbb.
     :param is_driven: by a human or a planner.
     :param is_labelled: whether its id is written beside it.
@@ -163,13 +163,13 @@ class FrameBody:
 @dataclass(frozen=True)
 class FrameLine:
     """
-    A way of a driven vehicle's rear axle in a window's coordinates [m].
+    A path of a driven vehicle's rear axle in a window's coordinates [m].
 
-    :param id: whose it is.
+    :param id: id of the vehicle.
     :param points: (N, 2), a scenario step apart.
     :param colour: as #rrggbb.
     :param is_av: whether a planner drives it.
-    :param dots: at every so many points there is a dot, from the first one on.
+    :param dots: a dot is drawn at every `dots`-th point, from the first one on.
     """
 
     id: str  # noqa: A003
@@ -182,11 +182,11 @@ class FrameLine:
 @dataclass(frozen=True)
 class SceneFrame:
     """
-    Everything that a window shows at one moment.
+    The content of a window at one moment.
 
     :param time_s: since the start of the run [s]
-    :param traces: where driven vehicles have come from.
-    :param plans: what the AVs were following.
+    :param traces: recent paths of driven vehicles.
+    :param plans: plans that the AVs were following.
     """
 
     time_s: float
@@ -199,10 +199,10 @@ class SceneFrame:
 
 class FrameScene:
     """
-    A run to make frames of.
+    A run, prepared for frames.
 
-    :param log: of a recording or an offline run.
-    :param plans: that the AVs followed, by id.
+    :param log: log of a recording or an offline run.
+    :param plans: plans that the AVs followed, by id.
     :raises InputError: if the scenario in it cannot be used.
     """
 
@@ -224,10 +224,10 @@ class FrameScene:
     def at(self, k: int, window: FrameWindow, labelled: Collection[str] | None = None,
            trace_s: float = TRACE_S) -> SceneFrame:
         """
-        Look at a scenario step.
+        Return the frame of a scenario step.
 
-        :param labelled: whose ids are written; None for all driven vehicles.
-        :param trace_s: how long a way behind them is drawn [s]
+        :param labelled: ids of vehicles to label; None for all driven vehicles.
+        :param trace_s: duration of the traces behind driven vehicles [s]
         :raises InputError: if the log does not hold the step.
         """
         row = self.row(k)
@@ -250,7 +250,7 @@ class FrameScene:
     def windows(self, rows: Sequence[int], vehicles: Sequence[str] = (), *,
                 standing: bool | None = None, reach: float = REACH,
                 least: float = LEAST_LENGTH) -> tuple[FrameWindow, ...]:
-        """Choose what frames show, as `series_windows`, with as much of the road as there is."""
+        """Return windows as `series_windows` does, fitted to the available road."""
         return series_windows(self.log, rows, vehicles, standing=standing, reach=reach,
                               least=least, road=self.road.across)
 
@@ -273,7 +273,7 @@ class FrameScene:
         return int(np.clip(k, self.log.ks[0], self.log.ks[-1]))
 
     def _plan(self, av: str, time_s: float) -> FloatArray | None:
-        """Return what was left (S, 3) of the plan that an AV was following; None if nothing."""
+        """Return the remaining poses (S, 3) of the plan that an AV was following; None if none."""
         number = int(np.searchsorted(self._starts[av], time_s + 1e-9, side='right')) - 1
         if number < 0:
             return None
@@ -283,7 +283,7 @@ class FrameScene:
 
     def _bodies(self, row: int, window: FrameWindow,
                 labelled: Collection[str] | None) -> tuple[FrameBody, ...]:
-        """Return who is at least partly in the window; driven vehicles are drawn last, on top."""
+        """Return the bodies at least partly in the window; driven vehicles are last, on top."""
         poses = all_poses(self.log, [row])[0]
         bodies = []
         half = 0.5 * np.array((window.length, window.height))
@@ -291,7 +291,7 @@ class FrameScene:
         away = np.hypot(*(poses[:, :2] - (window.x, window.y)).T)
         near = away < np.hypot(*half) + self._reaches
         for i in (*range(count, len(poses)), *reversed(range(count))):
-            # Of whoever is absent the comparison with NaN is false.
+            # For absent ones, the comparison with NaN is false.
             if not near[i]:
                 continue
             item = self.log.descriptions[i]

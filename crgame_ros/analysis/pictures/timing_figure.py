@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How true runs were to the wall clock (as CRG figure 14), from their recorded cycles."""
+"""The figure of runs' timing against the wall clock (as CRG figure 14), from recorded cycles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,17 +21,17 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# More points than a page has dots would make large files: beyond, lines keep the extremes.
+# More points would enlarge files without a visible effect: longer lines keep only extremes.
 MOST_POINTS = 4000
 _HEIGHT, _NAMES = 1.55, 0.1
-# Columns of a wide figure.
+# Number of columns of a wide figure.
 PAIR = 2
 
 
 @dataclass(frozen=True)
 class TimedRun:
     """
-    The cycles of a run, under the name that figures and tables give it.
+    The cycles of a run, with its name in figures and tables.
 
     :param label: for people.
     :param cycles: as recorded.
@@ -59,20 +59,20 @@ class TimedRun:
 
     @property
     def step_errors_s(self) -> FloatArray:
-        """Step errors e_n (R - 1) [s], the sum of which is the change of the lag."""
+        """Step errors e_n (R - 1) [s], whose sum is the change of the lag."""
         return np.diff(self.lags_s)
 
 
 def timing_figure(runs: Sequence[TimedRun], columns: int = 2) -> Figure:
     """
-    Draw timelines and errors: of two runs side by side, of one or more in a row for each.
+    Draw timelines and errors: two runs side by side, or a row for each of one or more runs.
 
     :param runs: one, or several to compare.
-    :param columns: of the page that it takes, 1 or 2.
+    :param columns: number of page columns for the figure, 1 or 2.
     """
     below = len(runs) == PAIR and columns == PAIR
     places = 2 * len(runs)
-    # A pair is compared as in the paper; otherwise each run has a row, in narrow figures two.
+    # A pair is compared as in the paper; otherwise each run has one row, or two in narrow figures.
     across = PAIR if columns == PAIR else 1
     with paper_style():
         figure = new_figure(columns, places // across * _HEIGHT + _NAMES)
@@ -87,7 +87,7 @@ def timing_figure(runs: Sequence[TimedRun], columns: int = 2) -> Figure:
 
 def _title(number: int, label: str, what: str) -> str:
     letter = f'({ascii_lowercase[number]})' if number < len(ascii_lowercase) else f'({number + 1})'
-    # A dollar sign would begin a formula.
+    # An unescaped dollar sign would begin a formula.
     return f'{letter} ' + (f'{label}: {what}'.replace('$', r'\$') if label else what.capitalize())
 
 
@@ -111,7 +111,7 @@ def _draw_errors(axes: Axes, run: TimedRun, title: str) -> None:
     axes.set_ylabel('error [ms]')
     _finish(axes, steps, title)
     low, high = axes.get_ylim()
-    # Room for the legend above the lines.
+    # Space for the legend above the lines.
     axes.set_ylim(low, high + 0.3 * (high - low))
     axes.legend(loc='upper left', ncols=2, borderaxespad=0.2)
 
@@ -125,11 +125,11 @@ def _finish(axes: Axes, steps: FloatArray, title: str) -> None:
 def thinned(x: FloatArray, y: FloatArray, most: int = MOST_POINTS
             ) -> tuple[FloatArray, FloatArray]:
     """
-    Thin a line out, but for the least and the greatest value of each stretch.
+    Return a thinned line that keeps the least and the greatest value of each interval.
 
     :param x: (N) rising.
     :param y: (N)
-    :return: of at most about `most` points; shorter lines are left as they are.
+    :return: a line of at most about `most` points; shorter lines are unchanged.
     """
     if len(x) <= most:
         return x, y

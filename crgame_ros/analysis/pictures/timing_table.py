@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Table I of CRG of recorded runs, as text, CSV, Markdown or LaTeX."""
+"""Table I of CRG for recorded runs, as text, CSV, Markdown or LaTeX."""
 
 from collections.abc import Callable, Sequence
 import csv
@@ -16,11 +16,11 @@ class TimingRow(NamedTuple):
     A row of the table.
 
     :param group: heading under which it stands.
-    :param name: of the metric.
-    :param symbol: of the metric, in LaTeX.
-    :param unit: of the value; empty of none.
-    :param value: gives it.
-    :param form: how people are told it.
+    :param name: name of the metric.
+    :param symbol: symbol of the metric, in LaTeX.
+    :param unit: unit of the value; empty without one.
+    :param value: returns the value.
+    :param form: format of the value for people.
     """
 
     group: str
@@ -51,7 +51,7 @@ TIMING_ROWS = (
               lambda found: 100.0 * found.time_efficiency, '.2f'),
     TimingRow(_EFFICIENCY, 'Precision Ratio', r'P_r', '',
               lambda found: found.precision_ratio, '.2e'))
-# Of LaTeX and of Markdown, whose names come from folders.
+# Escapes for LaTeX and for Markdown: names of runs come from folders.
 _LATEX = {'\\': r'\textbackslash{}', '~': r'\textasciitilde{}', '^': r'\textasciicircum{}',
           **{each: f'\\{each}' for each in '&%$#_{}'}}
 
@@ -69,7 +69,7 @@ class TimingTable:
         self.summaries = tuple(_summary(run) for run in runs)
 
     def text(self) -> str:
-        """Return it for a terminal."""
+        """Return the table as text for a terminal."""
         rows = [('', *self.labels), *(
             (row.name, *(_format_value(row, found) for found in self.summaries))
             for row in TIMING_ROWS)]
@@ -80,7 +80,7 @@ class TimingTable:
             ).rstrip() + '\n' for row in rows)
 
     def csv(self) -> str:
-        """Return it with all digits, a row for each metric."""
+        """Return the table as CSV with all digits, a row for each metric."""
         stream = StringIO()
         writer = csv.writer(stream, lineterminator='\n')
         writer.writerow(('metric', 'unit', *self.labels))
@@ -90,7 +90,7 @@ class TimingTable:
         return stream.getvalue()
 
     def markdown(self) -> str:
-        """Return it as Markdown."""
+        """Return the table as Markdown."""
         labels = [label.replace('\\', '\\\\').replace('|', '\\|') for label in self.labels]
         lines = ['| metric | ' + ' | '.join(labels) + ' |', '|---|' + '---:|' * len(labels)]
         lines += [f'| {row.name} | ' + ' | '.join(
@@ -98,7 +98,7 @@ class TimingTable:
         return '\n'.join(lines) + '\n'
 
     def latex(self) -> str:
-        """Return it as a `tabular` that needs no package."""
+        """Return the table as a LaTeX `tabular` that needs no package."""
         lines = [rf'\begin{{tabular}}{{l{"r" * len(self.labels)}}}', r'\hline',
                  ' & '.join((r'\textbf{Metric}', *(
                      rf'\textbf{{{"".join(_LATEX.get(each, each) for each in label)}}}'

@@ -87,7 +87,7 @@ def state_rows(run: TableRun, progress: Callable[[float], object] = lambda _: No
     """
     Yield the rows of a run, in pieces: by time step, driven vehicles first.
 
-    :param progress: called with the share given so far, 0 to 1.
+    :param progress: called with the share yielded so far, 0 to 1.
     :raises InputError: if its scenario cannot be used.
     """
     log = run.record.log
@@ -169,7 +169,7 @@ class _StateRows:
         transforms = {item.id: item.transform for item in avs}
         on_road = poses.copy()
         for column, item in enumerate(self._run.record.log.descriptions):
-            # All but AVs are placed on the road by the first AV's transform, as humans are (CRG 28).
+            # All but AVs are placed on the road by the first AV's transform, like humans (CRG 28).
             transform = transforms.get(item.id, avs[0].transform if avs else None)
             if transform is not None and not transform.is_identity:
                 on_road[:, column] = transform.to_scenario(poses[:, column])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is kept of a cell: its rows in the tables, and their declarations."""
+"""The rows of a cell in the tables, and the tables' declarations."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -65,7 +65,7 @@ TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
 
 
 def outcome_of(result: OfflineResult) -> dict[str, Any]:
-    """Return the columns of the cell's row that a run fills."""
+    """Return the values of a run in the cell's row."""
     steps = len(result.vehicle_states) - 1
     return {'status': 'ok', 'simulated_s': steps * result.setup.scheduler.dt_s,
             'state_hash': result.state_hash, 'contacts': len(contacts_of(result)),
@@ -91,5 +91,5 @@ def vehicle_rows(run: TableRun, result: OfflineResult) -> list[dict[str, Any]]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON has it."""
+    """Return a value as a JSON-compatible one."""
     return value.item() if hasattr(value, 'item') else value

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of an evaluation on disk: parts that are whole, and a journal of what is newer."""
+"""The tables of an evaluation on disk: complete parts, and a journal of newer rows."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -29,20 +29,20 @@ EARLIER = 'earlier'
 
 
 def part_name(number: int) -> str:
-    """Name the file of a part."""
+    """Return the file name of a part."""
     return f'part-{number:06}.parquet'
 
 
 class ResultParts:
     """
-    Keeps the rows of finished cells; whatever ends the process, no finished cell is lost.
+    The store of finished cells' rows, which loses none however the process ends.
 
-    Rows go into a journal, a line for each cell, and with every `part_cells` of them into a part
-    of each table. The part of `cells` comes last: where it is, the part is whole.
+    Rows are appended to a journal, a line for each cell. Every `part_cells` of them are written
+    as a part of each table. The part of `cells` is written last: if it exists, all are complete.
 
-    :param folder: of the evaluation; is made.
-    :param part_cells: cells of a part.
-    :raises InputError: if it cannot be written, or somebody else writes there.
+    :param folder: folder of the evaluation; it is created.
+    :param part_cells: number of cells in a part.
+    :raises InputError: if it cannot be written, or another process writes there.
     """
 
     def __init__(self, folder: Path, part_cells: int = PART_CELLS) -> None:
@@ -71,9 +71,9 @@ class ResultParts:
 
     def add(self, rows: Mapping[str, Any]) -> None:
         """
-        Keep the rows of a cell.
+        Store the rows of a cell.
 
-        :param rows: `cell`, `vehicles`, `work`, with the columns that all have.
+        :param rows: `cell`, `vehicles`, `work`, with all columns of the tables.
         :raises InputError: if they cannot be written.
         """
         try:
@@ -96,7 +96,7 @@ class ResultParts:
         self._start_journal(self._number + 1)
 
     def close(self) -> None:
-        """Let go of the folder, as it is."""
+        """Release the folder without writing a part."""
         if self._journal is not None:
             self._journal.close()
         if not self._rows:
@@ -105,7 +105,7 @@ class ResultParts:
         self._lock.close()
 
     def keys(self) -> Iterator[str]:
-        """Yield the keys of all cells that are kept."""
+        """Yield the keys of all stored cells."""
         for path in sorted((self.folder / CELLS.name).glob('part-*.parquet')):
             yield from _column(path, 'cell')
         for rows in self._rows:
@@ -113,10 +113,10 @@ class ResultParts:
 
     def keep_wanted(self, wanted: Callable[[str, str], bool]) -> int:
         """
-        Put away the rows of cells that are not wanted, and take back those that are again.
+        Put away the rows of unwanted cells, and restore those that are wanted again.
 
-        :param wanted: tells it of a key and a status.
-        :return: how many were put away.
+        :param wanted: returns for a key and a status whether the cell is wanted.
+        :return: the number of cells put away.
         """
         self.finish_part()
         earlier, away = self.folder / EARLIER, 0
@@ -130,7 +130,7 @@ class ResultParts:
         return away
 
     def _start_journal(self, number: int) -> None:
-        """Begin the journal of a part; an empty one of another is removed."""
+        """Start the journal of a part, and remove an empty one of another part."""
         if self._journal is not None:
             self._journal.close()
             self._journal_path.unlink()
@@ -139,11 +139,11 @@ class ResultParts:
         self._journal = self._journal_path.open('a', encoding='utf-8')
 
     def _recover(self) -> int:
-        """Take up what an earlier process left; give the number of the part to come."""
+        """Recover the state that an earlier process left; return the next part's number."""
         number = _next_number(self.folder)
         for path in sorted(self.folder.glob(f'{JOURNAL}-*.jsonl')):
             if _journal_number(path) < number:
-                # It died between writing the part and this.
+                # The process died between writing the part and removing the journal.
                 path.unlink()
                 continue
             self._rows += _journal_lines(path)
@@ -172,12 +172,12 @@ def _next_number(folder: Path) -> int:
 
 def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
     """
-    Return the rows that are only in a journal yet as a part of each table, as its file would be.
+    Return the rows that are only in the journal so far, as the bytes of a part of each table.
 
-    :return: by the table's name; empty where there is no such row.
+    :return: by the table's name; empty without such rows.
     """
     journals = {path: _journal_lines(path) for path in sorted(folder.glob(f'{JOURNAL}-*.jsonl'))}
-    # Only now, because a journal is removed after its part is written.
+    # Read the number only now, because a journal is removed after its part is written.
     number = _next_number(folder)
     cells = [rows for path, found in journals.items() if _journal_number(path) >= number
              for rows in found]
@@ -195,14 +195,14 @@ def _journal_number(path: Path) -> int:
 
 
 def _journal_lines(path: Path) -> list[dict[str, Any]]:
-    """Read the rows of a journal; of one that was removed meanwhile there are none."""
+    """Read the rows of a journal; return none if it was removed in the meantime."""
     try:
         lines = path.read_text(encoding='utf-8').splitlines()
     except FileNotFoundError:
         return []
     rows = []
     for line in lines:
-        # The last may be cut off: its cell was not finished.
+        # The last line may be incomplete: its cell was not finished.
         with suppress(ValueError):
             rows.append(json.loads(line))
     return rows
@@ -210,7 +210,7 @@ def _journal_lines(path: Path) -> list[dict[str, Any]]:
 
 def _write_rows(table: TableDeclaration, cells: list[dict[str, Any]],
                 sink: Path | pa.NativeFile) -> None:
-    """Write the rows that cells have in a table."""
+    """Write the rows of cells in a table."""
     rows = [row for each in cells for row in _rows_of(table, each)]
     with TableWriter(table, sink, 'parquet') as writer:
         if rows:
@@ -234,7 +234,7 @@ def _write_part(folder: Path, number: int, cells: list[dict[str, Any]]) -> None:
 
 def _replace_part(folder: Path, name: str,
                   write: Callable[[TableDeclaration, Path], object]) -> None:
-    """Write a part of every table, whole or not at all; that of `cells` comes last."""
+    """Write a part of every table, completely or not at all; that of `cells` is last."""
     for table in reversed(TABLES_OF_CELLS):
         (folder / table.name).mkdir(parents=True, exist_ok=True)
         path = folder / table.name / name
@@ -246,7 +246,7 @@ def _replace_part(folder: Path, name: str,
 
 
 def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bool]) -> int:
-    """Move the chosen cells of a part into a part of another folder; give how many there were."""
+    """Move the chosen cells of a part into a part of another folder; return their number."""
     cells = pq.read_table(source / CELLS.name / name, columns=['cell', 'status'])
     keys = {row['cell'] for row in cells.to_pylist() if chosen(row['cell'], row['status'])}
     if keys:
@@ -258,7 +258,7 @@ def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bo
 
 def _write_filtered(source: Path, name: str, keys: set[str], inside: bool,
                     table: TableDeclaration, path: Path) -> None:
-    """Write those rows of a part whose cells are among the keys, or are not."""
+    """Write the rows of a part whose cells are among the keys, or those whose cells are not."""
     rows = pq.read_table(source / table.name / name)
     pq.write_table(rows.filter(pa.array(
         [(key in keys) is inside for key in rows['cell'].to_pylist()], pa.bool_())), path,

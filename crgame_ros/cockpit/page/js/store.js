@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Everything the page knows: the server's documents, and the samples of the running epoch. */
+/** The page's data: the server's documents, and the samples of the running epoch. */
 
 import { CriticalityLog } from './criticality.js';
 import { DisplayClock } from './display_clock.js';
@@ -21,16 +21,16 @@ import { SampleRing } from './samples.js';
 /** @import { StatusMessage, StoreMessage } from './messages.js' */
 /** @import { TasksMessage } from './tasks/task_messages.js' */
 
-// What the last 10 s can be shown from once more: at 100 Hz, and scenario steps at up to 25 Hz.
+// Samples for a replay of the last 10 s: states at 100 Hz, and scenario steps at up to 25 Hz.
 const RAW_SAMPLES = 1020;
 const RAW_STEPS = 260;
 const HISTORY_SPACING_S = 0.05;
 const HISTORY_S = 120;
-// An object whose next step is late moves on so long beyond it [s].
+// How long an object whose next step is late is extrapolated beyond it [s].
 const LATE_S = 0.1;
 
 /**
- * What is to be seen at a time: the rows of all vehicles and objects.
+ * The shown state at a time: the rows of all vehicles and objects.
  *
  * @typedef {{t: number, n: number, k: number, epoch: number, vehicles: Float64Array,
  *   objects: Float64Array}} Shown
@@ -38,7 +38,7 @@ const LATE_S = 0.1;
  */
 
 /**
- * What a listener gets, by event.
+ * The content that a listener gets, by event.
  *
  * @typedef {object} StoreEvents
  * @property {HelloMessage} hello
@@ -65,7 +65,7 @@ const LATE_S = 0.1;
 
 /** The page's data; see `on` for the events by which parts learn of changes. */
 export class Store {
-  // Documents as the server sent them last; null or empty before.
+  // Latest documents of the server; null or empty before the first.
   /** @type {Scene|null} */
   scene = null;
   /** @type {Record<string, Seat>} */
@@ -91,7 +91,7 @@ export class Store {
   /** @type {HelloMessage['mode']|null} */
   mode = null;
   version = '';
-  /** Origin of the one page that may show this one within it; empty for none. */
+  /** Origin of the one page that may frame this one; empty for none. */
   framedBy = '';
   connected = false;
   round_trip_ms = NaN;
@@ -102,9 +102,9 @@ export class Store {
   plans = new Map();
   /** @type {Map<number, PredictionFrame>} the newest predictions by index of the asking AV */
   predictions = new Map();
-  /** What AVs perceive, and the map of permanent obstacles. */
+  /** The perception of AVs, and the map of permanent obstacles. */
   perceived = new Perceived();
-  /** What is left to the vehicles; of a replay, over the whole run. */
+  /** The criticality of the vehicles; of a replay, over the whole run. */
   criticality = new CriticalityLog(HISTORY_S);
   // Received raw samples, a few seconds: states and scenario steps.
   /** @type {SampleRing<StateFrame>} */
@@ -113,9 +113,9 @@ export class Store {
   steps = new SampleRing(RAW_STEPS);
   clock = new DisplayClock();
 
-  // After each hello, until the first state: it may be another simulation, which began anew.
+  // True from each hello to the first state: it may be another simulation with new epochs.
   #fresh = true;
-  // Each set holds listeners of one event, which get what StoreEvents says.
+  // Each set holds the listeners of one event; StoreEvents describes their content.
   /** @type {Map<string, Set<(content: any) => void>>} */
   #listeners = new Map();
   /** @type {SampleRing<StateFrame>} */
@@ -135,8 +135,8 @@ export class Store {
    *
    * @template {keyof StoreEvents} Name
    * @param {Name} name of the event
-   * @param {(content: StoreEvents[Name]) => void} listener called after the store has taken the
-   *   content in
+   * @param {(content: StoreEvents[Name]) => void} listener called after the store has stored the
+   *   content
    * @returns {() => void} ends it
    */
   on(name, listener) {
@@ -146,7 +146,7 @@ export class Store {
   }
 
   /**
-   * Take in a document or an event of the server.
+   * Store a document or an event of the server.
    *
    * @param {StoreMessage} message with its `type`
    */
@@ -161,7 +161,7 @@ export class Store {
         this.#fresh = true;
         break;
       case 'scene': {
-        // A recording that is played once more begins the same epoch again.
+        // A recording that is played again begins the same epoch again.
         const again = message.time?.epoch === this.scene?.time?.epoch
           && (message.again ?? 0) !== (this.scene?.again ?? 0);
         this.scene = message;
@@ -189,7 +189,7 @@ export class Store {
   }
 
   /**
-   * Take in a binary frame; one of an epoch that is over is dropped.
+   * Store a binary frame; one of an earlier epoch is dropped.
    *
    * @param {ArrayBuffer} buffer the frame
    * @param {number} now_ms when it arrived
@@ -224,7 +224,7 @@ export class Store {
   }
 
   /**
-   * Forget all samples: a reset, or a replay that jumps.
+   * Remove all samples, for a reset or a jump of a replay.
    *
    * @param {number} epoch of the frames to come
    */
@@ -252,7 +252,7 @@ export class Store {
   }
 
   /**
-   * Show the times that a function gives instead of those of the live clock.
+   * Show the times of a function instead of those of the live clock.
    *
    * @param {((now_ms: number) => number)|null} source wall time [ms] -> simulation time [s]
    */
@@ -262,7 +262,7 @@ export class Store {
   }
 
   /**
-   * Take the past of vehicles from a function instead of the samples received.
+   * Get the past of vehicles from a function instead of the received samples.
    *
    * @param {HistorySource|null} source as `history`
    */
@@ -270,16 +270,16 @@ export class Store {
     this.#historySource = source;
   }
 
-  /** The newest state sample, undefined before the first. */
+  /** Return the newest state sample, undefined before the first. */
   get latest() {
     return this.samples.newest;
   }
 
   /**
-   * Return what is to be seen in an animation frame.
+   * Return the state to show in an animation frame.
    *
-   * Vehicles are interpolated linearly in t between the samples around t, and moved on from the
-   * newest where that is late; objects stand at pose + velocity * (t - t of their step).
+   * Vehicles are interpolated linearly in t between the samples around t, or extrapolated from the
+   * newest if it is late; objects are at pose + velocity * (t - t of their step).
    *
    * @param {number} now_ms the frame's time, as requestAnimationFrame gives it
    * @returns {Shown|null} the same object each time, refilled; null before any sample
@@ -352,7 +352,7 @@ export class Store {
   /** @param {Shown} shown */
   #fillVehicles(shown) {
     const index = Math.max(this.samples.indexAt(shown.t), 0);
-    // There is one: nothing is displayed before.
+    // There is a sample: nothing is displayed before the first.
     const before = /** @type {StateFrame} */ (this.samples.at(index));
     const after = this.samples.at(index + 1);
     if (shown.vehicles.length !== before.vehicles.length) {

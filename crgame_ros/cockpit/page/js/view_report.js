@@ -1,17 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What this page shows its person, told to the server, which records it of those who drive. */
+/** The report of this page's view to the server, which records the views of drivers. */
 
 /** @import { Connection } from './connection.js' */
 /** @import { ViewMessage } from './messages.js' */
 /** @import { Store } from './store.js' */
 
 const LOOK_EVERY_MS = 100;
-// How often pictures come is told once a second [ms].
+// The picture rate is reported once a second [ms].
 const TELL_EVERY_MS = 1000;
 const DEGREES = 180 / Math.PI;
 
-/** Looks again and again what is shown; in `window.crgame.viewReport`. */
+/** A periodic report of the view; in `window.crgame.viewReport`. */
 class ViewReport {
   #connection;
   #store;
@@ -44,7 +44,7 @@ class ViewReport {
       return;
     }
     const pictures = this.#count;
-    // Of a view that was just opened nobody knows yet how often it is drawn.
+    // The picture rate of a view that was just opened is not known yet.
     const rate_hz = text === this.#told ? 1000 * (pictures - this.#pictures) / since_ms : null;
     if (this.#connection.send({ ...this.#choice, ratio: this.#ratio, rate_hz })) {
       this.#told = text;
@@ -53,7 +53,7 @@ class ViewReport {
     }
   }
 
-  /** @returns {Omit<ViewMessage, 'ratio'|'rate_hz'>} what changes at a choice alone */
+  /** @returns {Omit<ViewMessage, 'ratio'|'rate_hz'>} the settings that only the user changes */
   get #choice() {
     const { view3d, world, stage } = window.crgame;
     const { clientWidth: width_px, clientHeight: height_px } = this.#stage;
@@ -91,7 +91,7 @@ class ViewReport {
 }
 
 /**
- * Tell the server what this page shows.
+ * Report this page's view to the server.
  *
  * @param {HTMLElement} root the stage, which holds the picture
  * @param {Store} store

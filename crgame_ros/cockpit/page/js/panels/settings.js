@@ -12,7 +12,7 @@ const THEMES = [
 ];
 
 /**
- * Make the button that goes through the themes. Whoever draws with the colours learns of a change
+ * Create the button that cycles through the themes. Parts that draw with the colours are notified
  * by `onThemeChange` of the world's palette.
  *
  * @param {HTMLElement} root of the button
@@ -49,7 +49,7 @@ export function createSettings(root) {
 }
 
 /**
- * A whole screen for the road, where the browser gives one.
+ * Add the full-screen button, if the browser supports it.
  *
  * @param {HTMLElement} root
  */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The panels at the right: their tabs, their width, and putting them away. */
+/** The panels at the right: their tabs, their width, and collapsing them. */
 
 import { element, part } from '../dom.js';
 import { icon } from './icons.js';

@@ -1,19 +1,19 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How fast an engine or a motor turns at a road speed, and which gear is in. */
+/** The speed of an engine or motor at a road speed, and the choice of the gear. */
 
 /**
- * What stands between engine and road.
+ * The drive train between engine and road.
  *
  * @typedef {object} DriveTrain
  * @property {'car'|'heavy'|'electric'} name
- * @property {number[]} ratios of the gears, the first first
+ * @property {number[]} ratios of the gears, in order
  * @property {number} reverse_ratio
  * @property {number} final_drive
  * @property {number} wheel_radius_m
  * @property {number} idle_rpm 0 for a motor that stands with its wheels
  * @property {number} limit_rpm
- * @property {number} order turns of the engine over those of its strongest tone, inverted:
+ * @property {number} order order of the strongest tone:
  *   tone = turns per second * order
  */
 
@@ -52,7 +52,7 @@ export const ELECTRIC = Object.freeze({
 // what a floored one adds. Whatever the throttle, a change up ends above where it changes down.
 const UP = { released: 0.25, floored: 0.55 };
 const DOWN = { released: 0.06, floored: 0.25 };
-// A clutch that slips holds a first gear's engine so far above idling under full throttle.
+// How far a slipping clutch holds the engine above idling in first gear at full throttle.
 const LAUNCH = 0.2;
 
 export const REVERSE = -1;
@@ -61,7 +61,7 @@ export const REVERSE = -1;
  * @param {DriveTrain} train
  * @param {number} gear index of a ratio, or REVERSE
  * @param {number} speed of the road, without a sign [m/s]
- * @returns {number} turns of the engine, were it locked to the wheels [rpm]
+ * @returns {number} engine speed if it were locked to the wheels [rpm]
  */
 export function lockedSpeed_rpm(train, gear, speed) {
   const ratio = gear === REVERSE ? train.reverse_ratio : train.ratios[gear];
@@ -73,7 +73,7 @@ export function lockedSpeed_rpm(train, gear, speed) {
  * @param {number} gear index of a ratio, or REVERSE
  * @param {number} speed without a sign [m/s]
  * @param {number} throttle 0 to 1
- * @returns {number} turns of the engine: as its wheels have it, but idling at least; in the lowest
+ * @returns {number} engine speed: locked to the wheels, but at least idling; in the lowest
  *   gears more while the clutch slips [rpm]
  */
 export function engineSpeed_rpm(train, gear, speed, throttle) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The engine of one's own vehicle: two waves, calm and harsh, mixed by the load. */
+/** The engine of the own vehicle: two waves, calm and harsh, mixed by the load. */
 
 import { tone_Hz } from './drive_train.js';
 import { engineLevel } from './levels.js';
@@ -11,11 +11,11 @@ import { engineWave, mainPartial, makeFilter, Value } from './voices.js';
 
 const CALM = 1.7;
 const HARSH = 0.7;
-// An engine's speed does not jump when a gear changes [s].
+// Time constant of the engine speed, which does not jump when a gear changes [s].
 const INERTIA_S = 0.06;
 const LOAD_S = 0.08;
 
-/** What is heard of one engine, at `output`. */
+/** The sound of one engine, at `output`. */
 export class EngineVoice {
   output;
   #context;
@@ -57,7 +57,7 @@ export class EngineVoice {
   update({ train, rpm, load }, when) {
     const frequency = tone_Hz(train, rpm) / mainPartial(train);
     if (train !== this.#train) {
-      // Whoever listens in another vehicle hears nothing for a moment: `SoundGraph.hush`.
+      // After a change of the vehicle there is a moment of silence: `SoundGraph.hush`.
       this.#train = train;
       this.#calm.setPeriodicWave(engineWave(this.#context, train, CALM));
       this.#harsh.setPeriodicWave(engineWave(this.#context, train, HARSH));

@@ -1,16 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What distance, direction and movement make of a sound on its way to an ear. */
+/** The effects of distance, direction and movement on a sound on its way to an ear. */
 
-/** Of sound in air at 20 °C [m/s]. */
+/** Speed of sound in air at 20 °C [m/s]. */
 export const SOUND_SPEED = 343;
-/** Beyond this nobody is heard [m]. */
+/** Beyond this, no other vehicle is heard [m]. */
 export const RANGE_M = 100;
-// Nearer than this nothing gets louder [m].
+// Nearer than this, sounds do not get louder [m].
 const NEAR_M = 2;
-// What comes from nearer than this is no longer wholly at one side [m].
+// A source nearer than this is no longer wholly on one side [m].
 const AROUND_M = 1.5;
-// Beyond it a wrong state, not a vehicle, would be heard [m/s].
+// A higher speed comes from a wrong state [m/s].
 const MOST_SPEED = 100;
 
 /**
@@ -20,8 +20,8 @@ const MOST_SPEED = 100;
  */
 
 /**
- * By how much a tone is higher where it is heard, in air that stands: c / (c - v) for a source
- * that comes nearer at v, (c + v) / c for an ear that does.
+ * Return the Doppler factor in still air: c / (c - v) for a source that approaches at v,
+ * (c + v) / c for an ear that does.
  *
  * @param {number} source at which the source approaches the ear [m/s]
  * @param {number} ear at which the ear approaches the source [m/s]
@@ -32,7 +32,7 @@ export function dopplerFactor(source, ear) {
 }
 
 /**
- * Pressure falls with 1 / distance, and fades to nothing at the range.
+ * Return the attenuation: pressure falls with 1 / distance, and fades to 0 at the range.
  *
  * @param {number} distance [m]
  * @returns {number} 1 near by, 0 beyond RANGE_M

@@ -1,16 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** A horn: two notes together, as cars have them; they are there only while it sounds. */
+/** A horn with the two notes of a car, whose nodes exist only while it sounds. */
 
 import { makeFilter, Value } from './voices.js';
 
-/** Of the two notes [Hz]. */
+/** Frequencies of the two notes [Hz]. */
 export const NOTES_Hz = Object.freeze([420, 500]);
 const AMPLITUDE = 0.14;
 const ATTACK_S = 0.015;
 const GONE_S = 0.2;
 
-/** One horn, heard at what it is given. */
+/** One horn, connected to a given node. */
 export class Horn {
   #context;
   #out;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Kerbs of the map, and whether the wheels of one's own vehicle have just gone over one. */
+/** Kerbs of the map, and detection of wheels of the own vehicle that cross one. */
 
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { RoadIndex } from '../view3d/road/road_index.js';
@@ -8,19 +8,19 @@ import { RoadIndex } from '../view3d/road/road_index.js';
 /** @import { Lanelet, Scene, SceneVehicle } from '../messages.js' */
 /** @import { Shown } from '../store.js' */
 
-// How hard wheels hit each, as a share of the hardest.
+// Strength of the impact on each kind of kerb, as a share of the hardest.
 /** @type {Record<string, number>} */
 const STRENGTH = { curb: 1, lowered_curb: 0.35 };
-// A tyre's middle from the side of its vehicle [m].
+// Distance of a tyre's middle from the side of its vehicle [m].
 const TYRE_M = 0.1;
-// What wheels can have gone since the last look: this, and twice their speed times the time [m].
+// Longest way of wheels since the last call: this plus twice their speed times the time [m].
 const SLACK_M = 0.5;
-// A kerb ends where another lanelet begins, by so much, as the driver's view has it [m].
+// A kerb ends this far before another lanelet, as in the driver's view [m].
 const WITHIN_M = 0.3;
 
 /** @typedef {[x: number, y: number]} Point */
 
-/** Follows one vehicle over the kerbs of a scene. */
+/** A detector of kerbs that one vehicle crosses. */
 export class Kerbs {
   /** @type {RoadIndex|null} */
   #roads = null;
@@ -34,16 +34,16 @@ export class Kerbs {
     }
   }
 
-  /** Forget where the wheels were: what comes is another vehicle, or another time. */
+  /** Clear the wheels' positions, for another vehicle or another time. */
   reset() {
     this.#last = null;
   }
 
   /**
-   * Tell what the wheels have gone over since they were asked about last.
+   * Return the strongest kerb that the wheels have crossed since the last call.
    *
    * @param {SceneVehicle} vehicle
-   * @param {Shown} shown what is to be seen now
+   * @param {Shown} shown current rows
    * @param {number} index of the vehicle
    * @returns {number} how hard it is, 0 to 1; 0 for no kerb
    */
@@ -63,7 +63,7 @@ export class Kerbs {
   /**
    * @param {Point} from
    * @param {Point} to
-   * @param {number} most farther it was put, not driven [m]
+   * @param {number} most longest way; beyond it the vehicle was moved, not driven [m]
    */
   #crossed(from, to, most) {
     const way = Math.hypot(to[0] - from[0], to[1] - from[1]);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * How loud what a driver hears is, as amplitudes before the volume: 1 is full scale.
+ * Loudness of the sounds that a driver hears, as amplitudes before the volume: 1 is full scale.
  *
  * The exponents are those of vehicle acoustics: the power of tyre noise grows with 35 dB per
  * decade of speed (30 to 40: Sandberg and Ejsmont, Tyre/Road Noise Reference Book, 2002), that of
@@ -15,13 +15,13 @@ import { speedShare } from './drive_train.js';
 const TYRES = { amplitude: 0.07, at: 30, exponent: 1.75 };
 const WIND = { amplitude: 0.06, at: 40, exponent: 3 };
 const LOUDEST_WIND = 0.2;
-// Decelerations at which brakes begin to squeal and do so at their loudest [m/s^2].
+// Decelerations at which brakes begin to squeal and are loudest [m/s^2].
 const SQUEAL_FROM = 5;
 const SQUEAL_FULL = 8;
-// Lateral accelerations at which tyres do [m/s^2].
+// Lateral accelerations at which tyres begin to squeal and are loudest [m/s^2].
 const SCREECH_FROM = 6;
 const SCREECH_FULL = 9;
-// Slower than this brakes and tyres fall silent again [m/s].
+// Slower than this, brakes and tyres are silent [m/s].
 const CREEP = 2;
 
 /**
@@ -73,7 +73,7 @@ export function cornering(lateral, speed) {
 
 /**
  * @param {number} speed without a sign [m/s]
- * @returns {number} how rough what is beside the road is to drive on, 0 to 1
+ * @returns {number} roughness of the ground beside the road, 0 to 1
  */
 export function roughness(speed) {
   return smooth(speed, 0, 15);
@@ -81,7 +81,7 @@ export function roughness(speed) {
 
 /**
  * @param {number} speed without a sign [m/s]
- * @returns {number} how hard a vehicle hits what it hits, 0 to 1
+ * @returns {number} strength of a collision, 0 to 1
  */
 export function impact(speed) {
   return 0.35 + 0.65 * smooth(speed, 0, 15);
@@ -89,7 +89,7 @@ export function impact(speed) {
 
 /**
  * @param {number} volume as people set it, 0 to 1
- * @returns {number} gain: loudness is nearer to the square root of amplitude than to it
+ * @returns {number} gain: perceived loudness is closer to the square root of amplitude
  */
 export function volumeGain(volume) {
   return volume * volume;
@@ -97,8 +97,8 @@ export function volumeGain(volume) {
 
 /**
  * @param {number} value
- * @param {number} from below which it gives 0
- * @param {number} to above which it gives 1
+ * @param {number} from below it the result is 0
+ * @param {number} to above it the result is 1
  */
 function smooth(value, from, to) {
   const share = Math.min(Math.max((value - from) / (to - from), 0), 1);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the driver of one vehicle hears: its own, and who is near. No sound is made here. */
+/** The sounds that the driver of one vehicle hears, own and near. No sound is made here. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, REVERSE } from './drive_train.js';
@@ -11,17 +11,17 @@ import { arrival, RANGE_M } from './hearing.js';
 /** @import { DriveTrain } from './drive_train.js' */
 /** @import { Arrival, Moving } from './hearing.js' */
 
-/** So many others are heard at once: the nearest. */
+/** Most others that are heard at once, the nearest. */
 export const MOST_OTHERS = 6;
 
-// A vehicle that is longer is a lorry or a bus [m].
+// A longer vehicle is a lorry or a bus [m].
 const LONG_M = 7.5;
-// Where no pedal is told the throttle is guessed: what holds a speed, less below some [m/s], and
-// what gains more [s^2/m].
+// Without a known pedal the throttle is estimated: the share that holds a speed, less below some
+// speed [m/s], and the share per acceleration [s^2/m].
 const HOLDING = 0.15;
 const HELD_FROM = 5;
 const THROTTLE_PER_ACCELERATION = 0.25;
-// Of CommonRoad's types those that are no cars; null has no engine.
+// CommonRoad's types other than cars; null has no engine.
 /** @type {Record<string, DriveTrain|null|undefined>} */
 const TYPES = {
   truck: HEAVY, bus: HEAVY, bicycle: null, pedestrian: null, parkedVehicle: null, train: null,
@@ -29,7 +29,7 @@ const TYPES = {
 };
 
 /**
- * @typedef {object} Driven one's own vehicle
+ * @typedef {object} Driven the own vehicle
  * @property {string} id
  * @property {DriveTrain} train
  * @property {number} gear index of a ratio, or REVERSE
@@ -43,27 +43,27 @@ const TYPES = {
 
 /**
  * @typedef {Arrival & {id: string, train: DriveTrain, rpm: number, speed: number,
- *   lights: number}} Other somebody near
+ *   lights: number}} Other a vehicle nearby
  * @typedef {{t: number, own: Driven, others: Other[]}} Heard
  */
 
-/** Follows one vehicle through a run; remembers which gears are in. */
+/** The listener in one vehicle, which keeps the gears of all. */
 export class Listener {
   /** @type {Map<string, number>} */
   #gears = new Map();
 
-  /** Forget the gears: another run begins. */
+  /** Clear the gears before another run. */
   reset() {
     this.#gears.clear();
   }
 
   /**
-   * Tell what is heard.
+   * Return the sounds that are heard.
    *
    * @param {Scene} scene
-   * @param {Shown} shown what is to be seen at the same time
-   * @param {string} id whose driver listens: a vehicle or an object
-   * @returns {Heard|null} null where there is no such vehicle now
+   * @param {Shown} shown rows of the same time
+   * @param {string} id of the vehicle or object whose driver listens
+   * @returns {Heard|null} null if there is no such vehicle now
    */
   hear(scene, { t, vehicles, objects }, id) {
     const index = scene.vehicles.findIndex((vehicle) => vehicle.id === id);
@@ -110,7 +110,7 @@ export class Listener {
    * @param {SceneObject} object
    * @param {Float64Array} rows
    * @param {number} column
-   * @returns {Driven|null} null for what has no driver's seat
+   * @returns {Driven|null} null for an object without a driver's seat
    */
   #passenger(object, rows, column) {
     const train = trainOfObject(object);
@@ -181,7 +181,7 @@ function trainOf(vehicle) {
 
 /**
  * @param {SceneObject} object
- * @returns {DriveTrain|null} null for what has no engine
+ * @returns {DriveTrain|null} null without an engine
  */
 function trainOfObject({ type, role, shape }) {
   const known = TYPES[type];

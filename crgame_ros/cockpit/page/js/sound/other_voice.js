@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Somebody who passes by: engine, tyres and horn, from a side, from afar, shifted in pitch. */
+/** The sound of a passing vehicle: engine, tyres and horn, with pan, distance and Doppler. */
 
 import { LIGHT } from '../lights.js';
 import { tone_Hz } from './drive_train.js';
@@ -11,21 +11,21 @@ import { engineWave, mainPartial, makeFilter, makeGain, playNoise, Value } from 
 
 /** @import { Other } from './listener.js' */
 
-// Outside, tyres are louder, and engines little, beside what each is inside.
+// Factors outside against inside: tyres are louder and engines quieter.
 const TYRES = 14;
 const ENGINE = 1.2;
 const LOAD = 0.4;
-// One hears with both ears what is at one side.
+// Largest pan: a sound from one side is heard with both ears.
 const ASIDE = 0.85;
 const BAND_Hz = 750;
-// How much of the treble a cabin lets in.
+// Cut-off of the treble that a cabin lets in.
 const CABIN_Hz = 2200;
 const FADE_S = 0.05;
 const GONE_S = 0.4;
 
-/** One of the others that are heard; lent to whoever is near. */
+/** A voice for another vehicle, assigned to one that is near. */
 export class OtherVoice {
-  /** Id of whom it is; empty while nobody is. */
+  /** Id of its vehicle; empty while it is free. */
   id = '';
   #context;
   #noise;
@@ -47,7 +47,7 @@ export class OtherVoice {
   /**
    * @param {BaseAudioContext} context
    * @param {AudioBuffer} noise
-   * @param {AudioNode} out what it is heard at, while it is somebody
+   * @param {AudioNode} out node that it is connected to while it is in use
    * @param {number} number of this voice
    */
   constructor(context, noise, out, number) {
@@ -76,7 +76,7 @@ export class OtherVoice {
 
   /**
    * @param {number} when time of the context [s]
-   * @returns {boolean} whether it can be lent
+   * @returns {boolean} whether it is free
    */
   isFree(when) {
     return this.id === '' && when >= this.#freeAt;
@@ -106,7 +106,7 @@ export class OtherVoice {
   }
 
   /**
-   * Fade out: it is nobody from now on.
+   * Fade out and free the voice.
    *
    * @param {number} when time of the context [s]
    */
@@ -117,7 +117,7 @@ export class OtherVoice {
       this.#level.to(0, when);
       this.#freeAt = when + GONE_S;
     } else if (this.#connected && when >= this.#freeAt) {
-      // What is connected to nothing costs nothing.
+      // A disconnected voice costs nothing.
       this.#panner.disconnect();
       this.#connected = false;
     }
@@ -134,7 +134,7 @@ export class OtherVoice {
       this.#panner.connect(this.#out);
       this.#connected = true;
     }
-    // Whoever comes is silent at first: nothing has to glide to where they are.
+    // A new vehicle is silent at first, so its values need not glide.
     this.#level.jump(0, when);
     this.#frequency.jump(frequency, when);
     this.#rate.jump(doppler, when);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What one's own speed sounds like: tyres, wind, brakes that squeal, ground beside the road. */
+/** The sound of the own motion: tyres, wind, squealing brakes, ground beside the road. */
 
 import { cornering, hardBraking, roughness, tyreLevel, windLevel } from './levels.js';
 import { makeFilter, makeGain, playNoise } from './voices.js';
@@ -13,7 +13,7 @@ import { makeFilter, makeGain, playNoise } from './voices.js';
  *
  * @typedef {object} Band
  * @property {[type: BiquadFilterType, frequency: number, q?: number][]} filters one after another
- * @property {number} boost what makes up for the power that the filters take away
+ * @property {number} boost gain that compensates the power that the filters remove
  * @property {(own: Road) => number} level amplitude, 0 at standstill
  *
  * @typedef {Pick<Driven, 'speed'|'deceleration'|'lateral'> & {offRoad: boolean}} Road

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a driver feels in a gamepad with motors: ground, kerbs, collisions, hard braking. */
+/** The rumble of a gamepad with motors: ground, kerbs, collisions, hard braking. */
 
 import { hardBraking, impact, roughness } from './levels.js';
 
 /** @import { Driven } from './listener.js' */
 /** @import { Trouble } from './sound_graph.js' */
 
-// An effect lasts longer than the time to the next, so that the motors turn evenly [ms].
+// An effect lasts longer than the time to the next, so that the motors run evenly [ms].
 const EVERY_MS = 80;
 const EFFECT_MS = 160;
 const KERB_MS = 150;
@@ -18,7 +18,7 @@ const COLLISION_MS = 450;
  * @typedef {{magnitude: number, until_ms: number}} Pulse
  */
 
-/** Turns what happens to one's own vehicle into magnitudes of the motors. */
+/** A converter of the own vehicle's state into magnitudes of the motors. */
 export class Feeling {
   /** @type {Trouble|null} */
   #trouble = null;
@@ -26,7 +26,7 @@ export class Feeling {
   #pulse = { magnitude: 0, until_ms: -Infinity };
   #beat = false;
 
-  /** Forget: what was is not felt later. */
+  /** Clear the past, which is not felt later. */
   reset() {
     this.#trouble = null;
     this.#pulse = { magnitude: 0, until_ms: -Infinity };
@@ -65,11 +65,11 @@ export class Rumble {
   /** @type {GamepadHapticActuator|null} */
   #running = null;
   #next_ms = -Infinity;
-  // What wheels went over between two effects.
+  // Strongest kerb between two effects.
   #kerb = 0;
 
   /**
-   * Let a gamepad feel what happens.
+   * Play the effects on a gamepad.
    *
    * @param {GamepadHapticActuator} actuator
    * @param {Pick<Driven, 'speed'|'deceleration'>} own
@@ -93,14 +93,14 @@ export class Rumble {
       return;
     }
     this.#running = actuator;
-    // A browser that cannot, or whose gamepad is gone, says so by rejecting: nothing to be done.
+    // A browser without support, or without its gamepad, rejects; this is ignored.
     actuator.playEffect('dual-rumble', {
       startDelay: 0, duration: EFFECT_MS, strongMagnitude: strength * strong,
       weakMagnitude: strength * weak,
     }).catch(() => {});
   }
 
-  /** Stand still, and forget what was. */
+  /** Stop the motors and clear the past. */
   stop() {
     this.#feeling.reset();
     this.#kerb = 0;
@@ -116,7 +116,7 @@ export class Rumble {
 
 /**
  * @param {Gamepad|undefined} pad
- * @returns {GamepadHapticActuator|null} null where the gamepad or the browser has none
+ * @returns {GamepadHapticActuator|null} null if the gamepad or the browser has none
  */
 export function actuatorOf(pad) {
   const actuator = pad?.vibrationActuator ?? null;

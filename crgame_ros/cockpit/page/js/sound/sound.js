@@ -15,26 +15,26 @@ import { Speaker } from './speaker.js';
 /** @import { Store } from '../store.js' */
 /** @import { Heard } from './listener.js' */
 
-// Ears do not need every frame of the picture [ms].
+// Interval of updates: sound does not need every frame of the picture [ms].
 const EVERY_MS = 30;
-// By then a sound has faded [ms].
+// Time after which a sound has faded [ms].
 const HUSH_MS = 60;
 const KEY = 'KeyM';
 const VOLUME = 0.7;
 const RUMBLE = 0.5;
-// A time that moves farther between two looks was jumped to [s].
+// A longer step of time between two updates is a jump [s].
 const JUMP_S = 0.5;
 
 /** @typedef {'volume'|'rumble'} Amount both from 0 to 1 */
 
 /** The page's sound; in `window.crgame.sound`. */
 export class Sound {
-  /** Whether a person wants it; a browser may still wait for a gesture. */
+  /** Whether sound is switched on; a browser may still wait for a gesture. */
   wanted = recall('sound') === 'on';
   volume = recallShare('volume', VOLUME);
   rumble = recallShare('rumble', RUMBLE);
   /**
-   * What is heard now; null in silence.
+   * The sounds heard now; null in silence.
    *
    * @type {Heard|null}
    */
@@ -52,7 +52,7 @@ export class Sound {
   #subject = '';
   #t = NaN;
   #told = '';
-  // Whether M turns it on and off.
+  // Whether the key M turns it on and off.
   #keys = true;
 
   /**
@@ -96,7 +96,7 @@ export class Sound {
     return this.#store.scene?.sound !== 'none';
   }
 
-  /** Return whether there is sound as soon as there is something to be heard. */
+  /** Return whether sound is on and can be heard. */
   get on() {
     return this.wanted && this.allowed && this.#speaker.begun;
   }
@@ -106,7 +106,7 @@ export class Sound {
     return this.#pads().some((pad) => actuatorOf(pad) !== null);
   }
 
-  /** Turn the sound on or off; on in a gesture. */
+  /** Turn the sound on or off; turning it on needs a gesture. */
   toggle() {
     this.wanted = !this.wanted;
     remember('sound', this.wanted ? 'on' : '');
@@ -117,7 +117,7 @@ export class Sound {
     this.#tell();
   }
 
-  /** Begin, where that is wanted: in a gesture, or where the browser allows it without. */
+  /** Start if it is switched on: in a gesture, or if the browser allows it without. */
   begin() {
     if (this.wanted && this.allowed && !this.#speaker.begun) {
       this.#speaker.begin();
@@ -125,9 +125,9 @@ export class Sound {
   }
 
   /**
-   * Choose for this page alone: the browser does not remember it, and M changes nothing.
+   * Choose for this page only: the browser does not remember it, and M has no effect.
    *
-   * @param {boolean} on begins with the next key, click or button of a gamepad
+   * @param {boolean} on starts with the next key, click or button of a gamepad
    */
   want(on) {
     this.wanted = on;
@@ -158,13 +158,13 @@ export class Sound {
   }
 
   /**
-   * Make heard and felt what is so now.
+   * Update sound and rumble to the current state.
    *
    * @param {number} now_ms
    */
   #look(now_ms) {
     if (!this.on && this.#pads().some(({ buttons }) => buttons.some(({ pressed }) => pressed))) {
-      // Browsers take a gamepad's button for a gesture, and tell nobody.
+      // Browsers treat a gamepad's button as a gesture, without an event.
       this.begin();
     }
     const heard = (this.on || this.#drives) && this.#runs ? this.#hear(now_ms) : null;
@@ -179,7 +179,7 @@ export class Sound {
     const kerb = this.#kerb(heard.own.id, now_ms, jumped);
     const trouble = { ...this.#verdictOn(heard.own.id), kerb };
     if (jumped) {
-      // Another ear, or another time: a moment of silence between the two.
+      // Another vehicle or a jump in time: a moment of silence in between.
       this.#next_ms = now_ms + HUSH_MS;
       this.#speaker.hush();
       this.#motors.stop();
@@ -204,7 +204,7 @@ export class Sound {
       && document.visibilityState === 'visible';
   }
 
-  /** Return whether the hands of this page are on the controls of a seat. */
+  /** Return whether this page drives a seat. */
   get #drives() {
     const { driving } = window.crgame;
     return driving !== undefined && driving.seat !== null && driving.away === null;
@@ -231,7 +231,7 @@ export class Sound {
    * @param {string} id
    * @param {number} now_ms
    * @param {boolean} jumped
-   * @returns {number} how hard a kerb was that the wheels went over since the last look, 0 to 1
+   * @returns {number} strength of the kerb crossed since the last update, 0 to 1
    */
   #kerb(id, now_ms, jumped) {
     const { scene } = this.#store;
@@ -259,7 +259,7 @@ export class Sound {
     return active === null ? pads : pads.filter((pad) => pad.index === active.index);
   }
 
-  /** Show how it is, and tell the server, which records it. */
+  /** Show the settings, and send them to the server, which records them. */
   #tell() {
     this.#control.show();
     const told = { on: Number(this.on), volume: this.volume, rumble: this.rumble };
@@ -272,7 +272,7 @@ export class Sound {
 
 /**
  * @param {Amount} amount
- * @param {number} usual where none was kept
+ * @param {number} usual value if none was saved
  */
 function recallShare(amount, usual) {
   const kept = Number.parseFloat(recall(amount));
@@ -280,7 +280,7 @@ function recallShare(amount, usual) {
 }
 
 /**
- * Put the sound's control into the header, and make heard what is to be heard.
+ * Put the sound's control into the header, and start the sound.
  *
  * @param {HTMLElement} root of the control
  * @param {Store} store

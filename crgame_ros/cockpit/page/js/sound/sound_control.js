@@ -12,7 +12,7 @@ import { icon } from '../panels/icons.js';
  *
  * @param {HTMLElement} root of the button
  * @param {Sound} sound
- * @returns {{show: () => void}} show: writes how it is now
+ * @returns {{show: () => void}} show: updates the control
  */
 export function createSoundControl(root, sound) {
   const button = element('button', {
@@ -72,7 +72,7 @@ function stateOf({ allowed, wanted, on }) {
 /**
  * @param {Sound} sound
  * @param {Amount} amount
- * @param {string} name for people
+ * @param {string} name readable name
  */
 function slider(sound, amount, name) {
   const text = element('span');
@@ -86,7 +86,7 @@ function slider(sound, amount, name) {
     sound.set(amount, Number(input.value) / 100);
     show();
   });
-  // A slider that keeps the focus would take the driving keys.
+  // A focused slider would take the driving keys.
   input.addEventListener('pointerup', () => input.blur());
   return { node: element('label', { class: 'sound-slider' }, text, input), show };
 }

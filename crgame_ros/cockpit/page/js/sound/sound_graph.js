@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * Everything that is heard, as one graph of audio nodes, for speakers or for an offline context.
+ * All sounds as one graph of audio nodes, for speakers or for an offline context.
  *
  * voices -> mix -> compressor -> clipper -> gate (volume, silence) -> out. The clipper's curve
  * ends below 1, and the gate gives at most 1: no sample is ever beyond full scale.
@@ -21,14 +21,14 @@ import { makeNoise } from './voices.js';
 
 const THRESHOLD_dB = -8;
 const RATIO = 12;
-// Input and output of the clipper: straight up to the knee, then ever flatter.
+// Input and output of the clipper: linear up to the knee, then increasingly flat.
 const CLIP_RANGE = 4;
 const KNEE = 0.8;
 const CEILING = 0.98;
 const FADE_S = 0.04;
 
 /**
- * Of one's own vehicle; kerb: how hard its wheels have just gone over one, 0 to 1.
+ * State of the own vehicle; kerb: strength of a kerb just crossed, 0 to 1.
  *
  * @typedef {{collision: boolean, offRoad: boolean, kerb: number}} Trouble
  */
@@ -52,7 +52,7 @@ export class SoundGraph {
   constructor(context) {
     this.#context = context;
     const noise = makeNoise(context);
-    // Always of two channels: who passes by must not change what flows.
+    // Always two channels, so that a passing vehicle does not change the channel count.
     this.#mix = new GainNode(context, { channelCount: 2, channelCountMode: 'explicit' });
     this.#gate = context.createGain();
     this.#gate.gain.value = 0;
@@ -68,7 +68,7 @@ export class SoundGraph {
   }
 
   /**
-   * Let it be heard.
+   * Fade in.
    *
    * @param {number} gain 0 to 1
    * @param {number} when time of the context [s]
@@ -81,18 +81,18 @@ export class SoundGraph {
    * Fade to silence, which is exact after a moment.
    *
    * @param {number} when time of the context [s]
-   * @returns {number} from when on nothing is heard [s]
+   * @returns {number} time from which it is silent [s]
    */
   hush(when) {
     this.#fade(0, when);
-    // What happens meanwhile is not made up for.
+    // Events during the silence are dropped.
     this.#trouble = null;
     this.#horn.update(false, 1, when);
     return when + FADE_S;
   }
 
   /**
-   * Take what is to be heard from a time on.
+   * Set the sounds from a time on.
    *
    * @param {Heard} heard
    * @param {Trouble} trouble
@@ -169,14 +169,14 @@ export class SoundGraph {
     param.linearRampToValueAtTime(gain, when + FADE_S);
   }
 
-  /** @returns {AudioNode} what makes the mix safe for ears and speakers */
+  /** @returns {AudioNode} nodes that limit the mix to a safe level */
   #limit() {
     const context = this.#context;
     const compressor = new DynamicsCompressorNode(context, {
       threshold: THRESHOLD_dB, knee: 0, ratio: RATIO, attack: 0.002, release: 0.2,
     });
-    // A compressor makes up for what it takes from full scale (Web Audio API 1.1, 1.19.5): that
-    // is taken back, so that what is below the threshold stays as it is.
+    // A compressor applies make-up gain (Web Audio API 1.1, 1.19.5). This is undone, so that
+    // sounds below the threshold stay unchanged.
     const undo = context.createGain();
     undo.gain.value = 10 ** (0.6 * THRESHOLD_dB * (1 - 1 / RATIO) / 20) / CLIP_RANGE;
     const clipper = context.createWaveShaper();

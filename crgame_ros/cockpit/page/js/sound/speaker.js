@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The browser's loudspeaker: begun by a gesture, open while something is to be heard. */
+/** The browser's audio output: started by a gesture, open while there is sound. */
 
 import { volumeGain } from './levels.js';
 import { SoundGraph } from './sound_graph.js';
@@ -8,10 +8,10 @@ import { SoundGraph } from './sound_graph.js';
 /** @import { Heard } from './listener.js' */
 /** @import { Trouble } from './sound_graph.js' */
 
-// After so long a silence the audio device is let go [ms].
+// Length of silence after which the audio device is released [ms].
 const IDLE_MS = 1000;
 
-/** Plays what is heard. */
+/** The player of the sounds. */
 export class Speaker {
   /** @type {AudioContext|null} */
   #context = null;
@@ -19,22 +19,22 @@ export class Speaker {
   #graph = null;
   #gain = NaN;
   #quiet = true;
-  // Whether the context was suspended here, and not by the browser.
+  // Whether this class, not the browser, has suspended the context.
   #idle = false;
   #idleTimer = 0;
   #changed;
 
-  /** @param {() => void} changed called when the browser lets it play, or stops it */
+  /** @param {() => void} changed called when the browser allows or stops playing */
   constructor(changed) {
     this.#changed = changed;
   }
 
-  /** Return whether the browser has let it begin. */
+  /** Return whether the browser has allowed it to start. */
   get begun() {
     return this.#context !== null && (this.#context.state === 'running' || this.#idle);
   }
 
-  /** Begin; browsers allow it in a click or a key alone. */
+  /** Start; browsers allow this only in a click or a key press. */
   begin() {
     if (this.#context === null) {
       this.#context = new AudioContext({ latencyHint: 'interactive' });
@@ -68,7 +68,7 @@ export class Speaker {
     }
   }
 
-  /** Be silent: nothing is heard 40 ms later. */
+  /** Fade to silence within 40 ms. */
   hush() {
     if (!this.#quiet) {
       this.#quiet = true;

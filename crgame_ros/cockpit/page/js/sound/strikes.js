@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What sounds once and is over: a relay that clicks, a kerb, a collision. */
+/** Short sounds: the click of a relay, a kerb, a collision. */
 
 import { makeFilter } from './voices.js';
 
-// Nothing begins with a jump [s].
+// Rise time, so that no sound begins with a step [s].
 const ATTACK_S = 0.002;
-// By then an exponential has fallen to a thousandth.
+// Time constants until an exponential has fallen to a thousandth.
 const TIME_CONSTANTS = 7;
 
-/** Strikes, heard at what it is given. */
+/** Short sounds, connected to a given node. */
 export class Strikes {
   #context;
   #noise;
@@ -27,9 +27,9 @@ export class Strikes {
   }
 
   /**
-   * The relay of an indicator.
+   * Play the relay of an indicator.
    *
-   * @param {boolean} lit whether its lamps go on: higher than when they go off
+   * @param {boolean} lit whether its lamps go on, which sounds higher
    * @param {number} when time of the context [s]
    */
   click(lit, when) {
@@ -37,7 +37,7 @@ export class Strikes {
   }
 
   /**
-   * Wheels that go over an edge.
+   * Play wheels that cross a kerb.
    *
    * @param {number} strength 0 to 1
    * @param {number} when time of the context [s]
@@ -48,7 +48,7 @@ export class Strikes {
   }
 
   /**
-   * Something hits something.
+   * Play a collision.
    *
    * @param {number} strength 0 to 1
    * @param {number} when time of the context [s]
@@ -89,7 +89,7 @@ export class Strikes {
   }
 
   /**
-   * @param {AudioScheduledSourceNode} source ended with it
+   * @param {AudioScheduledSourceNode} source stopped at its end
    * @param {number} when [s]
    * @param {number} amplitude
    * @param {number} decay_s

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What every voice is made of: values that move without a click, noise, waves. */
+/** Building blocks of voices: smooth values, noise, waves. */
 
 /** @import { DriveTrain } from './drive_train.js' */
 
-// A voice's values go to new ones with this time constant: no click, and no lag to be heard [s].
+// Time constant of a voice's values: it avoids clicks and audible lag [s].
 const SETTLE_S = 0.025;
 const NOISE_S = 3;
-// Less than this cannot be heard: no event for it.
+// A smaller change is inaudible and causes no event.
 const SAME = 2e-4;
 const PARTIALS = 128;
 
@@ -43,7 +43,7 @@ export class Value {
   }
 
   /**
-   * Jump to a value, for what nobody hears just then.
+   * Jump to a value, for a voice that is silent.
    *
    * @param {number} value
    * @param {number} when time of the context [s]
@@ -101,11 +101,11 @@ export function makeNoise(context) {
 }
 
 /**
- * Play noise for ever.
+ * Play noise without end.
  *
  * @param {BaseAudioContext} context
  * @param {AudioBuffer} noise
- * @param {number} [offset_s] where it begins: two players of one noise must not be alike
+ * @param {number} [offset_s] start in the noise: two players of one noise must differ
  * @returns {AudioBufferSourceNode}
  */
 export function playNoise(context, noise, offset_s = 0) {
@@ -117,11 +117,11 @@ export function playNoise(context, noise, offset_s = 0) {
 }
 
 /**
- * Give the base of an engine's wave below its strongest tone: a four-stroke engine repeats itself
+ * Return the partial of an engine's wave that is its strongest tone: a four-stroke engine repeats
  * every two turns, a motor with every pulse.
  *
  * @param {DriveTrain} train
- * @returns {number} the partial that is the strongest tone
+ * @returns {number} number of the partial
  */
 export function mainPartial(train) {
   return train.name === 'electric' ? 1 : 2 * train.order;
@@ -142,7 +142,7 @@ export function engineWave(context, train, falling) {
   for (let k = 1; k <= PARTIALS; k += 1) {
     const kind = main === 1 ? k % 2 : k % main === 0 ? 1 : k % (main / 2) === 0 ? 0.3 : 0.12;
     const amplitude = k < main ? 0.8 * kind * k / main : kind * (k / main) ** -falling;
-    // Phases that are spread evenly keep the crest low (Schroeder 1970).
+    // Evenly spread phases keep the crest factor low (Schroeder 1970).
     const phase = Math.PI * k * k / PARTIALS;
     real[k] = amplitude * Math.cos(phase);
     imag[k] = amplitude * Math.sin(phase);

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The way between a stage and the page that it lies in: one origin, which the server names. */
+/** The link between a stage and the page that frames it: one origin, set by the server. */
 
 /** @import { StageOrder, StageState } from './stage_messages.js' */
 /** @import { Store } from '../store.js' */
 
-/** Tells the page around this one, and hears it. */
+/** The sender and receiver of messages to the framing page. */
 export class FrameLink {
   #store;
   #told = '';
@@ -25,7 +25,7 @@ export class FrameLink {
   }
 
   /**
-   * Tell how it is, unless that was told already.
+   * Send the state if it has changed.
    *
    * @param {StageState} state
    */

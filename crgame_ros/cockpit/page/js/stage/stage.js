@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The bare page of somebody who only drives: it takes its seat and tells the page around it. */
+/** The bare page of a driver: it takes its seat and reports to the framing page. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { keepProfiles } from '../driving/gamepad_profile.js';
@@ -14,9 +14,9 @@ import { WORDS } from './stage_words.js';
 /** @import { StageOrder, StageState, StageView } from './stage_messages.js' */
 /** @import { StageTrouble } from './stage_words.js' */
 
-// The page around is told at most so often [ms].
+// Least interval of reports to the framing page [ms].
 const EVERY_MS = 100;
-// A seat that was refused is asked for again after so long [ms].
+// Time after which a refused seat is requested again [ms].
 const CLAIM_EVERY_MS = 1000;
 
 /** A stage; in `window.crgame.stage`. */
@@ -33,7 +33,7 @@ export class Stage {
   #refusal = '';
   #failed = '';
   #missing3d = false;
-  // Whether the driver has said to be ready, of which epoch.
+  // Epoch for which the driver has reported ready.
   #ready = { wanted: false, epoch: -1, sent: false };
 
   /**
@@ -55,7 +55,7 @@ export class Stage {
       this.#failed = level === 'error' ? text : this.#failed;
     });
     store.on('hello', () => {
-      // Another server may give the same id, and knows of no role.
+      // Another server may assign the same id, and does not know the role.
       this.#role = '';
       this.#takeRole();
     });
@@ -65,7 +65,7 @@ export class Stage {
     setInterval(() => this.#look(), EVERY_MS);
   }
 
-  /** Show what the address asks for, once all parts are there. */
+  /** Apply the address, once all parts are loaded. */
   async begin() {
     const { names, plans, map, mirrors, view, change, fieldOfView_deg, sound } = this.address;
     const { world, view3d } = window.crgame;
@@ -94,7 +94,7 @@ export class Stage {
     }
   }
 
-  /** Who only drives steers nothing: the server is told, and refuses the rest. */
+  /** Take the role of a driver, so that the server refuses all other rights. */
   #takeRole() {
     const { me, mode } = this.#store;
     if (me.id !== '' && mode === 'live' && this.#role !== me.id) {
@@ -119,7 +119,7 @@ export class Stage {
     }
   }
 
-  /** Take the seat while it is free, say what is wrong, and tell the page around. */
+  /** Take the seat while it is free, show any trouble, and report to the framing page. */
   #look() {
     const seat = this.#store.seats[this.address.seat];
     this.#leave();
@@ -143,8 +143,8 @@ export class Stage {
   }
 
   /**
-   * Leave another vehicle, in which a stage before this one has left the same person, and an AV
-   * that was taken over in the run before: its planner begins the next one.
+   * Leave another vehicle that the same person still has from an earlier stage, and an AV that
+   * was taken over in the run before: its planner starts the next run.
    */
   #leave() {
     const { seats, me, connected } = this.#store;
@@ -169,7 +169,7 @@ export class Stage {
     }
   }
 
-  /** A new run asks anew who is ready. */
+  /** Report ready; each run needs a new report. */
   async #sayReady() {
     const ready = this.#ready;
     const { epoch, seats } = this.#store;
@@ -183,7 +183,7 @@ export class Stage {
     this.#refusal = ok ? '' : text;
   }
 
-  /** Return whether it is in an AV that nobody here has taken over: then its planner drives. */
+  /** Return whether it is in an AV whose planner drives. */
   get #rides() {
     return !this.#has && this.#isAutonomous;
   }
@@ -206,7 +206,7 @@ export class Stage {
     return this.#has && this.#isAutonomous && this.#store.status?.n === 0;
   }
 
-  /** @returns {StageTrouble|null} what keeps the driver from driving */
+  /** @returns {StageTrouble|null} the reason why the driver cannot drive, null for none */
   #trouble() {
     const { connected, mode, status, scene, seats, me } = this.#store;
     const { seat } = this.address;
@@ -230,7 +230,7 @@ export class Stage {
       return null;
     }
     const away = driving?.away;
-    // Before a drive the page around it asks, and has the focus.
+    // Before a drive, the framing page shows its questions and has the focus.
     const isAsked = window.parent !== window && status?.run !== 'running' && !seats[seat]?.ready;
     return away === 'unplugged' || (away === 'focus' && !isAsked) ? away
       : status?.seats_lost?.[seat] && status.run === 'running' ? 'silent' : null;
@@ -261,7 +261,7 @@ export class Stage {
     };
   }
 
-  /** @returns {number|null} of the picture that is shown [s] */
+  /** @returns {number|null} time of the shown picture [s] */
   get #time_s() {
     const { view3d, world } = window.crgame;
     const t = view3d?.on ? view3d.stats?.t : world.shown?.t;
@@ -289,7 +289,7 @@ export class Stage {
  * @param {Store} store
  * @param {Connection} connection
  * @returns {Stage}
- * @throws {Error} if the address asks for none
+ * @throws {Error} if the address is not one of a stage
  */
 export function createStage(root, store, connection) {
   const address = readStage(window.location.search);

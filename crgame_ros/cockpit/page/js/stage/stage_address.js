@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the address of a stage asks for: the page as somebody who only drives sees it. */
+/** The settings in the address of a stage, the page for a driver. */
 
 import { VIEWPOINTS } from '../view3d/cameras.js';
 import { FIELD_OF_VIEW } from '../view3d/field_of_view.js';
@@ -13,19 +13,19 @@ import { FIELD_OF_VIEW } from '../view3d/field_of_view.js';
  * @property {StageView} view at first
  * @property {boolean} map whether the small map lies over a 3D view
  * @property {boolean} names whether vehicles are named
- * @property {boolean} plans whether what AVs plan, perceive and want is shown
- * @property {boolean} sound whether there is sound, where the game has any
+ * @property {boolean} plans whether plans, perception and goals of AVs are shown
+ * @property {boolean} sound whether there is sound, if the game has any
  * @property {boolean} mirrors whether the driver has them
  * @property {boolean} change whether V and C change the view
- * @property {number|null} fieldOfView_deg across the picture; null as this browser has it [deg]
- * @property {'en'|'de'} lang of what the stage says
+ * @property {number|null} fieldOfView_deg across the picture; null for the browser's own [deg]
+ * @property {'en'|'de'} lang of the texts of the stage
  */
 
 /**
  * Read a page's address.
  *
  * @param {string} query `?stage=hv0&view=driver&map=1&names=0&plans=0&sound=1&lang=en`
- * @returns {StageAddress|null} null for the page with everything
+ * @returns {StageAddress|null} null for the full page
  */
 export function readStage(query) {
   const values = new URLSearchParams(query);

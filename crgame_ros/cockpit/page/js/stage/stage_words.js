@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a stage says to its driver, in the language of the address. */
+/** Texts of a stage for its driver, in the language of the address. */
 
 /**
  * @typedef {'connecting'|'lost'|'focus'|'unplugged'|'silent'|'taken'|'no_seat'|'recording'

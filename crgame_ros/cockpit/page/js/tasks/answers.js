@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The ways in which a driver answers: Enter, a free button of gamepad or wheel, a finger. */
+/** The inputs by which a driver answers: Enter, a free button of gamepad or wheel, touch. */
 
 import { isTyping } from '../driving/focus.js';
 import { connectedPads } from '../driving/gamepad.js';
@@ -9,7 +9,7 @@ import { LIGHT_BUTTONS } from '../lights.js';
 /** @import { Profile } from '../driving/gamepad_profile.js' */
 
 export const ANSWER_KEY = 'Enter';
-// An older time of a gamepad is not that of the press that was just seen [ms].
+// An older time stamp of a gamepad does not belong to the press just seen [ms].
 const FRESH_MS = 200;
 
 /**
@@ -27,7 +27,7 @@ export function isTaken(profile, index) {
       (control) => control.kind === 'button' && control.index === index);
 }
 
-/** Listens while answers are wanted. */
+/** A listener that is active while answers are accepted. */
 export class Answers {
   #wanted;
   #take;
@@ -36,8 +36,8 @@ export class Answers {
   #polling = false;
 
   /**
-   * @param {() => boolean} wanted whether an answer is one now
-   * @param {(at_ms: number) => void} take told when somebody answered, by performance.now
+   * @param {() => boolean} wanted returns whether an answer is accepted now
+   * @param {(at_ms: number) => void} take called with the time of an answer, by performance.now
    */
   constructor(wanted, take) {
     this.#wanted = wanted;
@@ -46,7 +46,7 @@ export class Answers {
   }
 
   /**
-   * Let a finger or pointer on an element be an answer.
+   * Accept a touch or click on an element as an answer.
    *
    * @param {HTMLElement} node
    */
@@ -59,7 +59,7 @@ export class Answers {
     });
   }
 
-  /** Look at the buttons of gamepads in every picture while answers are wanted. */
+  /** Poll the buttons of gamepads in every frame while answers are accepted. */
   watch() {
     if (!this.#polling) {
       this.#polling = true;
@@ -90,7 +90,7 @@ export class Answers {
       const before = this.#pressed.get(pad.index);
       const pressed = pad.buttons.map((button) => button.pressed);
       this.#pressed.set(pad.index, pressed);
-      // Of the first look nobody knows what is pressed newly.
+      // The first poll cannot tell which buttons are newly pressed.
       const fresh = before !== undefined && device !== undefined && pressed.some(
         (down, i) => down && !before[i] && !isTaken(device.profile, i));
       if (fresh && this.#polling) {

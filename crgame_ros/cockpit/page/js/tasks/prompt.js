@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** One stimulus or request on this page: when it was first in a picture, and when answered. */
+/** One stimulus or request on this page: the times of its first picture and of its answer. */
 
 /** @import { GameTask, OpenPrompt, PageTimes } from './task_messages.js' */
 /** @import { RunningTime } from './running_time.js' */
 
 /** A prompt from its message to its end. All times are those of performance.now [ms]. */
 export class Prompt {
-  /** When the first picture with it was drawn; NaN before. */
+  /** Time at which the first picture with it was drawn; NaN before. */
   drawn_ms = NaN;
-  /** How long after that the next picture began. */
+  /** Time from then to the beginning of the next picture. */
   picture_ms = NaN;
   /** Whether it was answered here. */
   answered = false;
@@ -23,8 +23,8 @@ export class Prompt {
    * @param {OpenPrompt} open
    * @param {GameTask} task
    * @param {RunningTime} running
-   * @param {number} received_ms when the page heard of it
-   * @param {number} round_trip_ms to the server and back; NaN where it is not known
+   * @param {number} received_ms when its message arrived
+   * @param {number} round_trip_ms round-trip time to the server; NaN if unknown
    */
   constructor(open, task, running, received_ms, round_trip_ms) {
     this.open = open;
@@ -42,7 +42,7 @@ export class Prompt {
 
   /**
    * @param {number} now_ms
-   * @returns {number} how long it is to be seen, without pauses; NaN before it is drawn
+   * @returns {number} how long it has been visible, without pauses; NaN before it is drawn
    */
   since(now_ms) {
     return now_ms - this.drawn_ms - this.#paused(now_ms);
@@ -59,7 +59,7 @@ export class Prompt {
 
   /**
    * @param {number} now_ms
-   * @returns {boolean} whether an answer is one to it
+   * @returns {boolean} whether it accepts an answer
    */
   takes(now_ms) {
     const since_ms = this.since(now_ms);
@@ -84,9 +84,9 @@ export class Prompt {
 }
 
 /**
- * Do something just before a picture, and learn when that and the next one were drawn.
+ * Apply a change just before a picture, and measure when that and the next one were drawn.
  *
- * @param {() => void} change what makes the picture another one
+ * @param {() => void} change changes the picture
  * @returns {Promise<{drawn_ms: number, picture_ms: number}>} when it was drawn (the browser runs
  *   a message that is sent in an animation frame after it has painted that frame), and the time
  *   from the beginning of this frame to that of the next
@@ -103,7 +103,7 @@ export function inPicture(change) {
       };
       channel.port2.postMessage(null);
       requestAnimationFrame((next_ms) => {
-        // A busy page may come to the message late, never later than its next picture.
+        // A busy page may handle the message late, but never later than its next picture.
         resolve({ drawn_ms: Math.min(Number.isNaN(drawn_ms) ? next_ms : drawn_ms, next_ms),
           picture_ms: next_ms - frame_ms });
       });

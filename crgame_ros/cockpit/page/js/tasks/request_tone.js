@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The tone of a take-over request. */
 
-// Two beeps an octave above the engine's loudest tones, of which older ears hear all [Hz, s].
+// Two beeps an octave above the engine's loudest tones, audible to older drivers too [Hz, s].
 const PITCHES = [880, 1320];
 const BEEP_S = 0.12;
 const APART_S = 0.18;
@@ -11,7 +11,7 @@ const PAIRS = 3;
 const RISE_S = 0.008;
 const LOUDEST = 0.4;
 
-/** Sounds a request; browsers let it once somebody has touched the page. */
+/** The tone of a request; browsers allow it after a first gesture on the page. */
 export class RequestTone {
   /** @type {AudioContext|null} */
   #context = null;
@@ -52,7 +52,7 @@ export class RequestTone {
     }
   }
 
-  /** Be silent. */
+  /** Stop the tone. */
   stop() {
     for (const each of this.#sounding) {
       each.stop();

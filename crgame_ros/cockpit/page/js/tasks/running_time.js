@@ -2,21 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The page's clock without the pauses of the run. */
 
-/** Counts how long the run has stood still, so that no answer is timed over a pause. */
+/** A counter of the run's pauses, so that they do not count in the times of answers. */
 export class RunningTime {
   #paused_ms = 0;
   #since_ms = NaN;
 
-  /** Return whether the run stands still, as far as the page knows. */
+  /** Return whether the run stands still, according to the last status. */
   get stands() {
     return !Number.isNaN(this.#since_ms);
   }
 
   /**
-   * Take note of whether the run runs.
+   * Record whether the run is running.
    *
    * @param {boolean} runs
-   * @param {number} now_ms as performance.now gives it
+   * @param {number} now_ms from performance.now
    */
   note(runs, now_ms) {
     if (runs && this.stands) {
@@ -28,8 +28,8 @@ export class RunningTime {
   }
 
   /**
-   * @param {number} now_ms as performance.now gives it
-   * @returns {number} how long the run has stood still until then, since the page began [ms]
+   * @param {number} now_ms from performance.now
+   * @returns {number} total pause since the page was loaded [ms]
    */
   paused(now_ms) {
     return this.#paused_ms + (this.stands ? Math.max(now_ms - this.#since_ms, 0) : 0);

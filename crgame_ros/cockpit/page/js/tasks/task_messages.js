@@ -1,16 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the page and its server say to each other of tasks, as types: nothing here runs.
+ * Types of the messages about tasks between the page and its server: no code here.
  *
- * The other ends are crgame_ros/cockpit/scene.py, crgame_ros/game/task_documents.py and, of what
- * the page sends, crgame_ros/cockpit/page_messages.py.
+ * The server's side is crgame_ros/cockpit/scene.py, crgame_ros/game/task_documents.py and, for
+ * the page's messages, crgame_ros/cockpit/page_messages.py.
  *
- * @typedef {object} GameTask one of the game's
+ * @typedef {object} GameTask a task of the game
  * @property {string} name
  * @property {'detection_response'|'take_over'|'secondary_task'} kind
  * @property {string} label
- * @property {string} seat the vehicle whose driver it is for
+ * @property {string} seat vehicle of the driver that it is for
  * @property {number|null} shown_s longest time that a light is on, or a request after its lead
  * @property {number|null} latest_s until when a stimulus can be answered
  * @property {number|null} lead_s of a request

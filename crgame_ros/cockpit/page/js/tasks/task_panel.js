@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The tasks of the game as an experimenter sees them: which last, and a button for each. */
+/** The experimenter's panel of tasks: the active ones, and a button for each. */
 
 import { element, setAttribute, setText } from '../dom.js';
 import { fixed, oneLine } from '../panels/format.js';
@@ -15,7 +15,7 @@ const KINDS = { detection_response: 'Detection response', take_over: 'Take-over 
   secondary_task: 'Secondary task' };
 
 /**
- * Make the panel; without tasks there is none.
+ * Create the panel; without tasks there is none.
  *
  * @param {HTMLElement} root #panel-events
  * @param {Store} store

@@ -6,14 +6,14 @@ import { element, setText, svg } from '../dom.js';
 
 /** @import { Words } from './task_words.js' */
 
-// A wheel with two hands at it, 24 × 24.
+// A steering wheel with two hands, 24 × 24.
 const WHEEL = 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 2.2a6.8 6.8 0 0 1 6.7 5.6h-4.2a2.8 2.8 0 0 0'
   + '-5 0H5.3A6.8 6.8 0 0 1 12 5.2M5.3 13h3.9a2.8 2.8 0 0 0 1.7 1.6v4.1A6.8 6.8 0 0 1 5.3 13'
   + 'm7.8 5.7v-4.1a2.8 2.8 0 0 0 1.7-1.6h3.9a6.8 6.8 0 0 1-5.6 5.7';
 
-/** What a driver sees of tasks. Nothing of it is decided here. */
+/** The driver's view of tasks, without any logic. */
 export class TaskView {
-  /** @param {HTMLElement} stage over which it lies */
+  /** @param {HTMLElement} stage that it covers */
   constructor(stage) {
     this.light = element('div', { class: 'task-light', role: 'img', hidden: true });
     this.title = element('strong', { class: 'task-title' });
@@ -29,14 +29,14 @@ export class TaskView {
     this.note = element('p', { class: 'task-note', role: 'status', hidden: true });
     this.answerButton = element('button', { type: 'button', class: 'task-answer', tabindex: '-1',
       hidden: true });
-    // The light comes last: nothing hides it.
+    // The light comes last, so that nothing hides it.
     this.root = element('div', { id: 'tasks' }, this.frame, this.note, this.request,
       this.answerButton, this.light);
     stage.append(this.root);
   }
 
   /**
-   * Write the words that stay.
+   * Write the constant texts.
    *
    * @param {Words} words
    * @param {string} language
@@ -52,8 +52,8 @@ export class TaskView {
   /**
    * Show a request, or none.
    *
-   * @param {{label: string, hint: string, free: boolean}|null} request `free`: nobody has the
-   *   seat, so that it can be taken here
+   * @param {{label: string, hint: string, free: boolean}|null} request `free`: the
+   *   seat is free, so that it can be taken here
    */
   showRequest(request) {
     this.request.hidden = this.frame.hidden = request === null;
@@ -65,7 +65,7 @@ export class TaskView {
     }
   }
 
-  /** @param {string} text of the secondary tasks that last; empty for none */
+  /** @param {string} text of the active secondary tasks; empty for none */
   showNote(text) {
     setText(this.note, text);
     this.note.hidden = text === '';

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What drivers read of tasks, in their language. */
+/** Texts of tasks for drivers, in their language. */
 
 const WORDS = {
   en: {
@@ -19,8 +19,8 @@ const WORDS = {
 /**
  * Choose the language of a page.
  *
- * @param {string} search the address's part from ? on, in which `lang` may name one
- * @param {string|undefined} ofGame language that the game names
+ * @param {string} search query of the address, whose `lang` may name a language
+ * @param {string|undefined} ofGame language of the game
  * @returns {Language}
  */
 export function languageOf(search, ofGame) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The tasks of the driver at this page: what is seen of them, and answers timed by its clock. */
+/** The tasks of the driver at this page: their view, and answers timed by the page's clock. */
 
 import { Answers, ANSWER_KEY } from './answers.js';
 import { inPicture, Prompt } from './prompt.js';
@@ -13,7 +13,7 @@ import { TaskView } from './task_view.js';
 /** @import { Store } from '../store.js' */
 /** @import { GameTask, OpenPrompt, PageTimes } from './task_messages.js' */
 
-/** The part; in `window.crgame.tasks`. */
+/** The tasks of a page; in `window.crgame.tasks`. */
 export class Tasks {
   #store;
   #connection;
@@ -22,7 +22,7 @@ export class Tasks {
   #view;
   #answers;
   /**
-   * What is open and concerns this page, by task and number.
+   * The open prompts of this page, by task and number.
    *
    * @type {Map<string, Prompt>}
    */
@@ -55,7 +55,7 @@ export class Tasks {
     this.#begin();
   }
 
-  /** @returns {Prompt[]} what is open here now */
+  /** @returns {Prompt[]} the open prompts */
   get prompts() {
     return [...this.#prompts.values()];
   }
@@ -64,33 +64,34 @@ export class Tasks {
     return this.#store.connected && this.#store.status?.run === 'running';
   }
 
-  /** Whether an answer is taken now: a detection task of this driver's lasts, and the run runs. */
+  /** Return whether an answer is accepted: this driver's detection task and the run are active. */
   get #wanted() {
     return this.#runs && (this.#detecting !== undefined || this.#request?.free === true);
   }
 
-  /** @returns {GameTask[]} those of the game that this page's driver has to do with */
+  /** @returns {GameTask[]} the tasks of the game for this page's driver */
   get #mine() {
     const { mode, scene, seats, me } = this.#store;
     return mode !== 'live' || me.id === '' ? []
       : (scene?.tasks ?? []).filter(({ seat }) => seats[seat]?.holder === me.id);
   }
 
-  /** @returns {GameTask|undefined} the detection task of this driver's that lasts */
+  /** @returns {GameTask|undefined} this driver's active detection task */
   get #detecting() {
     const { running } = this.#store.tasks;
     return this.#mine.find(({ name, kind }) => kind === 'detection_response'
       && running.includes(name));
   }
 
-  /** The request that is to be seen here, and whether its seat is free to be taken. */
+  /** Return the request to show here, and whether its seat is free. */
   get #request() {
     const prompt = this.prompts.find(({ task }) => task.kind === 'take_over');
     return prompt && { prompt, free: this.#mayTake(prompt.task.seat) };
   }
 
   /**
-   * An AV that drives itself is asked for at every page whose person drives nothing else.
+   * Return whether the person may take a seat. A request of an AV goes to every page that does not
+   * drive.
    *
    * @param {string} seat
    */
@@ -115,7 +116,7 @@ export class Tasks {
     this.#update();
   }
 
-  /** Take in what is open, and let go of what is not any more. */
+  /** Add new prompts and remove closed ones. */
   #update() {
     const now_ms = performance.now();
     const mine = this.#mine;
@@ -154,12 +155,12 @@ export class Tasks {
     this.#prompts.set(key, prompt);
     const light = task.kind === 'detection_response';
     if (light && open.seen) {
-      // It was shown before this page was loaded anew: nobody could time an answer to it.
+      // It was shown before this page was reloaded, so an answer to it cannot be timed.
       prompt.answered = true;
       return;
     }
     inPicture(() => {
-      // Until then the picture is the one before.
+      // Until then, the previous picture is shown.
       prompt.draw(performance.now());
       this.#draw();
     }).then(({ drawn_ms, picture_ms }) => {
@@ -182,7 +183,7 @@ export class Tasks {
     this.#view.answerButton.hidden = this.#detecting === undefined;
   }
 
-  /** Look in every picture while there is something to look at. */
+  /** Update in every frame while there are prompts. */
   #look() {
     if (!this.#looking) {
       this.#looking = true;
@@ -201,7 +202,7 @@ export class Tasks {
     }
   }
 
-  /** Let be seen what is so now. */
+  /** Draw the current state. */
   #draw() {
     const now_ms = performance.now();
     this.#view.light.hidden = !this.prompts.some((prompt) => prompt.task.kind
@@ -220,7 +221,7 @@ export class Tasks {
     });
   }
 
-  /** @param {number} at_ms when somebody answered */
+  /** @param {number} at_ms time of the answer */
   #answer(at_ms) {
     const request = this.#request;
     if (request?.free) {
@@ -263,7 +264,7 @@ export class Tasks {
 }
 
 /**
- * Show the tasks of the game to whose driver sits at this page.
+ * Show the tasks of the game to the driver at this page.
  *
  * @param {HTMLElement} root `#stage`
  * @param {Store} store

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What drivers see of their own vehicle: bonnet, pillars, doors and the edge of the dashboard. */
+/** The driver's view of the own vehicle: bonnet, pillars, doors and the edge of the dashboard. */
 
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { geometryOf } from './instances.js';
@@ -17,7 +17,7 @@ const DASH = [0.025, 0.026, 0.03];
 const PILLAR_M = 0.05;
 
 /**
- * Make the inside of a vehicle, from its rear axle on the road.
+ * Make the inside of a vehicle, relative to its rear axle on the road.
  *
  * @param {Three} three
  * @param {SceneVehicle} vehicle
@@ -32,7 +32,7 @@ export function createCabin(three, vehicle, paint) {
   const cabin = new three.Mesh(geometryOf(three, mesh.arrays(false)),
     new three.MeshLambertMaterial({ vertexColors: true, side: three.DoubleSide }));
   cabin.frustumCulled = false;
-  // First: what it hides is not computed.
+  // Drawn first, so that hidden parts are not computed.
   cabin.renderOrder = -1;
   return cabin;
 }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** From where the 3D view looks: the poses of its cameras, in the map's coordinates. */
+/** The poses of the 3D view's cameras, in the map's coordinates. */
 
 const DEGREE = Math.PI / 180;
 const CHASE_BEHIND_M = 6.5;
@@ -9,7 +9,7 @@ const CHASE_PITCH = -12 * DEGREE;
 const BIRD_ABOVE_M = 55;
 const BIRD_AHEAD_M = 12;
 
-/** What one can look from. */
+/** The viewpoints. */
 export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
 
 /**
@@ -18,14 +18,14 @@ export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
  */
 
 /**
- * Where a vehicle stands: its rear axle on the road, its heading, and the way's slope upwards.
+ * The pose of a vehicle: its rear axle on the road, its heading, and the road's upward slope.
  *
  * @typedef {Point & {yaw: number, slope: number}} Stand [m, rad]
  */
 
 /**
- * Where a camera is and looks. It is turned with the vehicle, by yaw and slope, then within it to
- * the left and upwards; never rolled.
+ * The pose of a camera. It is turned with the vehicle, by yaw and slope, then within it to the
+ * left and upwards; never rolled.
  *
  * @typedef {Point & {yaw: number, slope: number, aside: number, pitch: number}} CameraPose
  *   [m, rad]
@@ -42,7 +42,7 @@ export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
  */
 export function mountedAt(stand, point, aside = 0, pitch = 0) {
   const { yaw, slope } = stand;
-  // How far on in the plane: what is higher on a vehicle that climbs is farther back.
+  // Distance ahead in the plane: on a climbing vehicle, higher points are farther back.
   const ahead = point.x * Math.cos(slope) - point.z * Math.sin(slope);
   return {
     x: stand.x + Math.cos(yaw) * ahead - Math.sin(yaw) * point.y,
@@ -53,7 +53,7 @@ export function mountedAt(stand, point, aside = 0, pitch = 0) {
 }
 
 /**
- * Follow a vehicle from behind and above.
+ * Return a camera behind and above a vehicle.
  *
  * @param {Stand} stand
  * @param {{front: number, rear: number}} ends of the vehicle ahead of its rear axle [m]
@@ -67,7 +67,7 @@ export function chasing(stand, { rear }, aside = 0) {
 }
 
 /**
- * Look down on a vehicle, which drives upwards in the picture.
+ * Return a camera above a vehicle, which drives upwards in the picture.
  *
  * @param {Stand} stand
  * @returns {CameraPose}

@@ -1,35 +1,35 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How much of the world a picture shows. */
+/** The field of view of a picture. */
 
 const DEGREE = Math.PI / 180;
-/** What can be chosen across the picture [deg]. */
+/** Range of the angle across the picture [deg]. */
 export const FIELD_OF_VIEW = { least: 30, usual: 75, most: 140 };
-// Taller, the roof over the driver's head would be nearer than what is drawn.
+// At a larger angle, the roof over the driver's head would be nearer than the near plane.
 const TALLEST = 95 * DEGREE;
 
 /**
- * What the driver says of screen and seat: then things are as large as in reality.
+ * The driver's screen and seat, with which things appear in their true size.
  *
  * @typedef {{screen_width_m: number, eye_distance_m: number}} Seat [m]
  */
 
 /**
- * Return the angle that a picture has in height when it has one in width.
+ * Return the vertical angle of a picture from its horizontal one.
  *
  * @param {number} across [rad]
  * @param {number} aspect width through height
- * @returns {number} [rad], so that neither side is more than a picture can bear
+ * @returns {number} [rad], limited in both directions
  */
 export function heightAngle(across, aspect) {
   return Math.min(2 * Math.atan(Math.tan(across / 2) / aspect), TALLEST);
 }
 
 /**
- * Return the angle under which the driver sees the picture on the screen, its middle in front.
+ * Return the angle under which the driver sees a picture that is centred in front.
  *
  * @param {Seat} seat
- * @param {number} share of the screen's width that the picture has
+ * @param {number} share of the screen's width that the picture covers
  * @returns {number} across the picture [rad]
  */
 export function trueAngle({ screen_width_m, eye_distance_m }, share) {
@@ -54,11 +54,11 @@ export function acrossAngle(seat, chosen_deg, width, screenWidth) {
 }
 
 /**
- * Read what somebody says of screen and seat.
+ * Read the entries about screen and seat.
  *
  * @param {string} width of the screen [cm]
  * @param {string} distance of the eyes from it [cm]
- * @returns {Seat|null} null if that is no screen
+ * @returns {Seat|null} null if they are not valid
  */
 export function readSeat(width, distance) {
   const screen_width_m = Number(width) / 100;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What all vehicles have alike: wheels, lamps that are on, and shadows. */
+/** Parts that all vehicles share: wheels, lit lamps, and shadows. */
 
 import { MeshBuilder } from './bodies/mesh_builder.js';
 import { Instances } from './instances.js';
@@ -22,10 +22,10 @@ const SHADOW_DARKNESS = 0.55;
 const SHADOW_ABOVE_M = 0.025;
 const SHADOW_BEYOND_M = 0.35;
 const PER_VEHICLE = 4;
-// Nobody counts a small wheel's corners.
+// Small wheels need few corners.
 const PLAIN_WHEELS_SOONER = 0.35;
 
-/** Instances of the parts; see Instances for what is own. */
+/** Instances of the parts; see Instances for `own`. */
 export class FittedParts {
   #three;
   #group;
@@ -71,12 +71,12 @@ export class FittedParts {
       2 * most);
     this.#shadows = new SeenInstances(this.#three, { near: [shadow], far: [plain[1]], sooner: 0 },
       Math.max(count, 1));
-    // After the road and its markings.
+    // Drawn after the road and its markings.
     this.#shadows.meshes.forEach((mesh) => { mesh.renderOrder = 5; });
     this.#group.add(...this.#lamps.meshes, ...this.#shadows.meshes);
   }
 
-  /** Nothing is shown until it is added anew. */
+  /** Remove all instances, before they are added anew. */
   clear() {
     for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
       parts?.clear();
@@ -104,7 +104,7 @@ export class FittedParts {
 
   /**
    * @param {number} slope upwards [rad]
-   * @returns {Matrix4} that turns what is level; the same one each time
+   * @returns {Matrix4} that pitches a level body; the same object each time
    */
   pitched(slope) {
     return this.#pitch.makeRotationY(-slope);
@@ -187,7 +187,7 @@ export class FittedParts {
 
 /**
  * @param {Three} three
- * @returns {Part} lamps that shine, whatever the light
+ * @returns {Part} lamps that shine, independent of the light
  */
 function lampPart(three) {
   return { geometry: new three.BoxGeometry(1, 1, 1), tinted: true,

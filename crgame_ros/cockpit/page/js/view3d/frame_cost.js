@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a picture takes until it is done, not only until it was ordered. */
+/** Measurement of the time until a picture is complete, not only until it was submitted. */
 
-// So many pictures, then one is measured: to wait for the graphics card costs time, too.
+// Pictures between two measurements: waiting for the graphics card costs time, too.
 const EVERY = 15;
 
-/** Measures some of the pictures of one context. */
+/** A meter for some of the pictures of one context. */
 export class FrameCost {
   #context;
   #count = 0;
@@ -26,21 +26,21 @@ export class FrameCost {
     if (this.#count % EVERY !== 0) {
       return false;
     }
-    // What was ordered before is not this picture's.
+    // Work submitted earlier does not belong to this picture.
     this.#wait();
     this.#begin_ms = performance.now();
     return true;
   }
 
   /**
-   * @returns {number} what the picture took [ms]
+   * @returns {number} time of the picture [ms]
    */
   end() {
     this.#wait();
     return performance.now() - this.#begin_ms;
   }
 
-  /** To read a pixel takes until all before is done; browsers don't wait at `finish`. */
+  /** Wait by reading a pixel, which completes all work; browsers do not wait at `finish`. */
   #wait() {
     const pixel = new Uint8Array(4);
     this.#context.readPixels(0, 0, 1, 1, this.#context.RGBA, this.#context.UNSIGNED_BYTE, pixel);

@@ -12,21 +12,21 @@ import { mergeable, SeenInstances } from './seen_instances.js';
 /** @import { Three } from './road/road_world.js' */
 /** @import { Part, Sight } from './seen_instances.js' */
 
-// By day people drive with low beam from this meteorological visibility on [m].
+// By day, low beam is on below this meteorological visibility [m].
 const FOGGY_M = 200;
 const FRONT = 0xfff4da;
 const REAR = 0xc81a10;
 const GLOW = { front: { color: 0xfff0d0, size_m: 1.5 }, rear: { color: 0xd01808, size_m: 0.8 } };
-// A lamp is so much brighter than what is white by day: fog has more to take from it.
+// How much brighter a lamp is than white by day, so that fog hides it later.
 const GLOW_BRIGHTNESS = 3;
 const GLOW_TEXELS = 32;
-// Low beam: what it reaches ahead of the lamps and to both sides [m].
+// Reach of the low beam ahead of the lamps and to both sides [m].
 const BEAM = { from: 1.2, to: 30, wide: 13, above: 0.04, near: 6, texels: 64 };
-// By how much it makes the road brighter, at dusk and by day; of colours as on the screen.
+// How much it brightens the road, at dusk and by day, in colours as on the screen.
 const BEAM_STRENGTH = { dusk: 0.95, day: 0.07 };
-// Of others the light on the road is seen up to here; more would be drawn than is seen [m].
+// Distance up to which the light of others on the road is drawn; farther it is hardly visible [m].
 const BEAM_SEEN_M = 60;
-// Who is that near shares the light on the road: many in a queue do not make it white [m].
+// Vehicles this near share the light on the road, so that a queue does not make it white [m].
 const SHARED_M = 20;
 
 /**
@@ -49,7 +49,7 @@ export class Headlights {
   #parts = [];
   /** @type {MeshBasicMaterial[]} */
   #materials = [];
-  // Light on the road of this picture that is not handed over yet.
+  // Light on the road in this picture that is not submitted yet.
   /** @type {{matrix: Matrix4, own: boolean}[]} */
   #beams = [];
   #visibility = Infinity;
@@ -92,13 +92,13 @@ export class Headlights {
     this.#parts = parts.map((part, i) => new SeenInstances(this.#three,
       { near: [part], far: [plain[i]], sooner: 0 }, i < 2 ? 4 * most : most));
     const [, glow, beams] = this.#parts;
-    // The light lies on road and markings; the glow is before all that is not glass.
+    // The light lies on road and markings; the glow is in front of everything but glass.
     beams.meshes.forEach((mesh) => { mesh.renderOrder = 4; });
     glow.meshes.forEach((mesh) => { mesh.renderOrder = 1001; });
     this.#group.add(...this.#parts.flatMap(({ meshes }) => meshes));
   }
 
-  /** Nothing shines until it is added anew. */
+  /** Remove all lights, before they are added anew. */
   clear() {
     this.#parts.forEach((part) => part.clear());
     this.#beams = [];
@@ -155,7 +155,7 @@ export class Headlights {
       const near = beams.filter(({ matrix: { elements: other } }) => (
         Math.hypot(other[12] - e[12], other[13] - e[13]) < SHARED_M)).length;
       const share = this.#strength / (own ? 1 : near);
-      // Who sits in the vehicle sees its light, too.
+      // The light is visible from inside the vehicle, too.
       this.#parts[2].add(matrix,
         this.#color.setRGB(share, share, share, this.#three.SRGBColorSpace), false);
     }
@@ -188,7 +188,7 @@ function lampPart(three) {
 
 /**
  * @param {Three} three
- * @returns {Part} light around a lamp, for who looks into it; its colour is what fog has left
+ * @returns {Part} glow around a lamp, seen from ahead; fog dims its colour
  */
 function glowPart(three) {
   const map = grey(three, GLOW_TEXELS, GLOW_TEXELS, (u, v) => {
@@ -202,7 +202,7 @@ function glowPart(three) {
 
 /**
  * @param {Three} three
- * @returns {Part} the light on the road, which makes brighter what is there: paint more than
+ * @returns {Part} the light on the road, which brightens the surface, paint more than
  *   asphalt
  */
 function beamPart(three) {
@@ -212,7 +212,7 @@ function beamPart(three) {
     const aside = (v - 0.5) * wide;
     const spread = 1.6 + 0.11 * ahead;
     const along = Math.min((ahead - from) / (near - from), 1) * Math.max(1 - u, 0) ** 0.8;
-    // To nothing at the edges of the patch.
+    // Fades to nothing at the edges of the patch.
     const edge = Math.min(2 - Math.abs(4 * v - 2), 1);
     return along * Math.max(edge, 0) * Math.exp(-0.5 * (aside / spread) ** 2);
   });

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Things of one mesh, whose painted triangles have a colour for each of them. */
+/** Instances of one mesh, whose painted triangles have a colour for each instance. */
 
 import { SeenInstances } from './seen_instances.js';
 
@@ -11,7 +11,7 @@ import { SeenInstances } from './seen_instances.js';
 
 const WHITE = 0xffffff;
 
-/** Instances are put in anew in each frame. */
+/** Instances that are added anew in each frame. */
 export class Instances {
   #color;
   #material;
@@ -22,7 +22,7 @@ export class Instances {
    * @param {Group} group gets the meshes
    * @param {MeshBuilder} mesh
    * @param {number} most how many there can be
-   * @param {MeshBuilder|null} [plain] what is drawn of those far away; null: the same
+   * @param {MeshBuilder|null} [plain] mesh of instances far away; null: the same
    * @param {number} [sooner] see Shapes
    */
   constructor(three, group, mesh, most, plain = null, sooner = 1) {

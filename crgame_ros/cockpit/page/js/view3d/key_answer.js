@@ -1,24 +1,24 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * Pictures out of turn: where the processor draws, they come seldom, and what a key does would be
- * seen only with the next. A few more, just when the vehicle answers, are cheap.
+ * Extra pictures after a key press. If the processor renders, pictures are rare, and the effect of
+ * a key would show only in the next. A few more, just when the vehicle answers, are cheap.
  */
 
-// A key is obeyed in the simulation's next cycle: that is simulated time [s]. Its way there and
-// back takes time of the wall, up to so much [s].
+// A key takes effect in the simulation's next cycle, in simulated time [s]. The round trip takes
+// wall time, up to this [s].
 const FIRST_S = 0.008;
 const WAY_S = 0.042;
 const MOST_PICTURES = 3;
 
-/** The simulation times at which the answer to a key is looked for. */
+/** The simulation times at which the answer to a key can appear. */
 export class KeyAnswer {
   #pressed_t = NaN;
   #last_s = 0;
   #left = 0;
 
   /**
-   * A key that drives has gone down or up.
+   * Record that a driving key was pressed or released.
    *
    * @param {number} newest_t of the newest state that has come [s]
    * @param {number} rate simulated seconds per second
@@ -40,7 +40,7 @@ export class KeyAnswer {
     return this.#left > 0 && since_s >= FIRST_S && since_s <= this.#last_s;
   }
 
-  /** A picture has been drawn out of turn. */
+  /** Record that an extra picture was drawn. */
   drawn() {
     this.#left -= 1;
   }

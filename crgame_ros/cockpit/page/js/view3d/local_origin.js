@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * Where the 3D view's coordinates begin.
+ * The origin of the 3D view's coordinates.
  *
- * They are the map's, x east, y north, and z up (also what three.js calls up, for all cameras),
- * in metres, but from a point amid the map: the graphics card computes in float32, which at the
- * 1e6 m of UTM coordinates knows steps of 0.1 m only.
+ * They are the map's, x east, y north, and z up (also three.js's up vector, for all cameras), in
+ * metres, but relative to a point in the middle of the map: the graphics card computes in float32,
+ * whose resolution at the 1e6 m of UTM coordinates is only 0.1 m.
  */
 
 /** @import { Scene } from '../messages.js' */

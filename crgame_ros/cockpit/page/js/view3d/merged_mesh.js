@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /**
  * Many things of one shape as a single mesh, filled anew for each picture. A graphics card draws
- * instances as fast; a renderer on the processor takes as long for an instance as for a call.
+ * instances as fast. A renderer on the processor needs as long for an instance as for a draw call.
  */
 
 /** @import { BufferAttribute, BufferGeometry, Mesh } from 'three' */
 /** @import { Part } from './seen_instances.js' */
 /** @typedef {typeof import('./three.js')} Three */
 
-// What is copied as it is, and how many numbers a corner has.
+// Attributes that are copied unchanged, and their numbers per corner.
 /** @type {Record<string, number>} */
 const COPIED = { uv: 2, rank: 1 };
 
@@ -142,7 +142,7 @@ export class MergedMesh {
     this.#count += 1;
   }
 
-  /** End a picture: what was added is drawn. */
+  /** End a picture, so that the added things are drawn. */
   end() {
     this.mesh.visible = this.#count > 0;
     this.mesh.geometry.setDrawRange(0, this.#corners.indices.length * this.#count);
@@ -155,7 +155,7 @@ export class MergedMesh {
     }
   }
 
-  /** Free what the graphics card holds, but for the material. */
+  /** Free the memory of the graphics card, except the material. */
   dispose() {
     this.mesh.removeFromParent();
     this.mesh.geometry.dispose();

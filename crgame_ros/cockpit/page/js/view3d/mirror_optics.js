@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a driver sees in a mirror: as a camera at the place where the mirror shows the eye. */
+/** The optics of a mirror: a camera at the mirror image of the driver's eye. */
 
 /** @import { DriverPlace } from '../messages.js' */
 /** @import { Point } from './cameras.js' */
@@ -8,7 +8,7 @@
 const DEGREE = Math.PI / 180;
 
 /**
- * A mirror of a vehicle, bent outwards as those at cars' sides are.
+ * A mirror of a vehicle, convex like the side mirrors of cars.
  *
  * @typedef {object} Mirror
  * @property {'left'|'right'|'inner'} name
@@ -16,7 +16,7 @@ const DEGREE = Math.PI / 180;
  * @property {number} width of its glass [m]
  * @property {number} height [m]
  * @property {number} radius of the sphere that it is part of; infinite for a flat one [m]
- * @property {number} aside where its middle shows: to the left of straight back [rad]
+ * @property {number} aside direction of its middle, to the left of straight back [rad]
  * @property {number} pitch above the horizon [rad]
  */
 
@@ -31,7 +31,7 @@ export const MIRRORS = Object.freeze([
 ]);
 
 /**
- * The camera of a mirror. What it sees is turned over, left to right, in the mirror.
+ * The camera of a mirror. Its picture is mirrored, left to right.
  *
  * @typedef {object} MirrorCamera
  * @property {Point} point ahead of the rear axle, to the left, above the road [m]
@@ -39,7 +39,7 @@ export const MIRRORS = Object.freeze([
  * @property {number} pitch above the horizon [rad]
  * @property {number} height angle of the picture in height [rad]
  * @property {number} aspect width of the picture through its height
- * @property {number} near nothing nearer than the glass is seen [m]
+ * @property {number} near near plane, at the glass [m]
  */
 
 /**

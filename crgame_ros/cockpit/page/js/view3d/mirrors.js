@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The three mirrors: each drawn into a picture of its own, in turn, and put over the view. */
+/** The three mirrors: each is drawn into its own picture, in turn, and laid over the view. */
 
 import { mirrorCamera, MIRRORS } from './mirror_optics.js';
 
@@ -9,7 +9,7 @@ import { mirrorCamera, MIRRORS } from './mirror_optics.js';
 /** @import { Mirror, MirrorCamera } from './mirror_optics.js' */
 /** @import { Three } from './road/road_world.js' */
 
-// Where they are on the screen: middle, and width, as shares of its width and height; from below.
+// Places on the screen: middle and width as shares of its width and height, from below.
 const PLACES = {
   left: { x: 0.105, y: 0.47, width: 0.19 },
   inner: { x: 0.62, y: 0.915, width: 0.25 },
@@ -24,14 +24,14 @@ const FRAME = 0x14161a;
  * @typedef {{left: number, bottom: number, width: number, height: number}} Rectangle [CSS px]
  */
 
-/** Mirrors of the vehicle whose driver looks. */
+/** Mirrors of the driver's vehicle. */
 export class Mirrors {
   #overlay;
   #flat;
   /** @type {ReturnType<typeof makeGlass>[]} */
   #glasses;
   #next = 0;
-  /** How many pictures of mirrors there were. */
+  /** Number of mirror pictures so far. */
   count = 0;
   /** Name of the one that was drawn last; empty before. */
   drawn = '';
@@ -88,7 +88,7 @@ export class Mirrors {
   }
 
   /**
-   * Draw one of them.
+   * Draw the next mirror.
    *
    * @param {WebGLRenderer} renderer
    * @param {Scene3} scene
@@ -102,7 +102,7 @@ export class Mirrors {
     this.#next = (this.#next + 1) % this.#glasses.length;
     if (optics !== null) {
       aim(camera, optics);
-      // Only now: what has another size is empty.
+      // Only now, because a resized target is empty.
       target.setSize(...size);
       renderer.setRenderTarget(target);
       renderer.render(scene, camera);

@@ -23,13 +23,13 @@ import { standOf } from './vehicle_stand.js';
 
 const NEAR_M = 0.2;
 const FAR_M = 3000;
-// In a mirror nobody can tell what is farther away [m].
+// Range of a mirror, beyond which things are indistinct [m].
 const FAR_IN_MIRROR_M = 300;
-// It has few pixels, too: there things are plain from this share of the distance on.
+// It also has few pixels: things are plain from this share of the distance on.
 const PLAIN_IN_MIRROR = 0.5;
 
 /**
- * What is to be drawn.
+ * The view to draw.
  *
  * @typedef {object} Looks
  * @property {Viewpoint} viewpoint
@@ -40,9 +40,9 @@ const PLAIN_IN_MIRROR = 0.5;
  * @property {boolean} plans whether the AVs' plans are shown
  */
 
-/** Draws what a store shows. */
+/** The picture of the state that a store shows. */
 export class Picture {
-  /** Of the last picture; `t` is the simulation time that it shows [s]. */
+  /** Figures of the last picture; `t` is the simulation time that it shows [s]. */
   stats = { frames: 0, t: NaN, draw_calls: 0, triangles: 0, frame_ms: 0, cost_ms: NaN, width: 0,
     height: 0, ratio: 1, renderer: '', software: false };
   mirrors;
@@ -93,12 +93,12 @@ export class Picture {
     this.store = store;
   }
 
-  /** Least time from picture to picture [ms]. */
+  /** Return the least time from picture to picture [ms]. */
   get period_ms() {
     return this.#quality.period_ms;
   }
 
-  /** @param {boolean} sharp whether all pixels of the screen are drawn, whatever that takes */
+  /** @param {boolean} sharp whether all pixels of the screen are drawn, at any cost */
   set sharp(sharp) {
     if (sharp !== this.#quality.sharp) {
       this.#quality.sharp = sharp;
@@ -107,17 +107,17 @@ export class Picture {
     }
   }
 
-  /** Return whether the graphics card took back what it had given. */
+  /** Return whether the graphics context is lost. */
   get lost() {
     return this.#renderer.getContext().isContextLost();
   }
 
-  /** The main camera, as it was when it drew last. */
+  /** Return the main camera, as of the last picture. */
   get camera() {
     return this.#camera;
   }
 
-  /** Where the cameras' coordinates begin in the map. */
+  /** Return the origin of the cameras' coordinates in the map. */
   get origin() {
     return this.#origin;
   }
@@ -138,7 +138,7 @@ export class Picture {
   /**
    * Draw one picture.
    *
-   * @param {Shown} shown what is to be seen
+   * @param {Shown} shown current rows
    * @param {number} now_ms the animation frame's time
    * @param {Looks} looks
    * @returns {boolean} false while nothing can be seen
@@ -199,8 +199,8 @@ export class Picture {
   #aim(camera, { x, y, z, yaw, slope, aside, pitch }) {
     camera.position.set(x - this.#origin.x, y - this.#origin.y, z);
     const { Euler, Quaternion } = this.#three;
-    // A camera looks down at rest, with its upper edge to the north: pitched, then turned in the
-    // vehicle, which is turned itself.
+    // At rest a camera looks down, with its upper edge to the north. It is pitched, then turned in
+    // the vehicle, which is turned itself.
     camera.quaternion.setFromEuler(new Euler(0, -slope, yaw, 'ZYX')).multiply(
       new Quaternion().setFromEuler(
         new Euler(Math.PI / 2 + pitch, 0, aside - Math.PI / 2, 'ZXY')));
@@ -223,7 +223,7 @@ export class Picture {
   }
 
   /**
-   * Hand over what a camera sees.
+   * Submit the things that a camera sees.
    *
    * @param {PerspectiveCamera} camera
    * @param {number} sooner share of the distance at which things are plain
@@ -235,7 +235,7 @@ export class Picture {
     this.#traffic.see(sight);
   }
 
-  /** Draw with the detail that is chosen. */
+  /** Apply the chosen detail. */
   #choose() {
     const { farthest_m, wheels_m, fine } = this.#quality.detail;
     this.#traffic.limits = { farthest_m, wheels_m };
@@ -286,7 +286,7 @@ export class Picture {
 
   /** @param {Scene} scene */
   #load(scene) {
-    // A reset sends the same scene again: its roads stay.
+    // A reset sends the same scene again, so its roads stay.
     if (this.#road === null || this.#document?.id !== scene.id) {
       this.#road?.group.removeFromParent();
       this.#road?.dispose();
@@ -303,7 +303,7 @@ export class Picture {
   }
 }
 
-/** The name of what draws, as far as the browser tells. */
+/** Return the name of the renderer, if the browser reveals it. */
 function rendererName() {
   const context = document.createElement('canvas').getContext('webgl2');
   if (context === null) {

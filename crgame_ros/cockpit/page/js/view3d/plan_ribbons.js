@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The AVs' newest plans as ribbons on the road, when somebody asks for them. */
+/** The AVs' newest plans as ribbons on the road, on request. */
 
 import { PLAN_WIDTH } from '../frames.js';
 import { themeColor } from '../world/palette.js';
@@ -66,7 +66,7 @@ export class PlanRibbons {
 /**
  * @param {number[]} positions
  * @param {PlanFrame} plan
- * @param {number} t simulation time that is shown; what of the plan is over is left out [s]
+ * @param {number} t simulation time that is shown; the past part of the plan is left out [s]
  * @param {Origin} origin
  * @param {HeightAt} heightAt
  */

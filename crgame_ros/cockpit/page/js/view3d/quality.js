@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * How good pictures are, so that drawing keeps up: by what they are measured to take, on any
- * machine. What draws is known by name only to begin with a good guess.
+ * The quality of pictures, adapted so that drawing keeps up. It follows the measured cost, on any
+ * machine. The renderer's name only provides a good first guess.
  */
 
 /**
- * What is left out of a picture.
+ * The level of detail of a picture.
  *
  * @typedef {object} Detail
  * @property {number} plain_m beyond it vehicles and trees have few triangles
@@ -17,7 +17,7 @@
  * @property {number} mirrorEvery a mirror is drawn with each picture, or with each second one
  */
 
-/** From all that there is to what is told from each other no more. @type {Detail[]} */
+/** From full detail to barely distinguishable things. @type {Detail[]} */
 export const DETAILS = [
   { plain_m: Infinity, farthest_m: 600, wheels_m: 600, fine: true, mirrorEvery: 1 },
   { plain_m: 60, farthest_m: 400, wheels_m: 90, fine: false, mirrorEvery: 1 },
@@ -25,26 +25,26 @@ export const DETAILS = [
 ];
 
 /**
- * Pixels of a picture to those that it could have, in each direction, and its detail: from the
- * best to the cheapest.
+ * Share of the possible pixels in each direction, and index of the detail, from the best to the
+ * cheapest.
  *
  * @type {[share: number, detail: number][]}
  */
 const RUNGS = [[1, 0], [0.85, 0], [0.7, 0], [0.7, 1], [0.6, 1], [0.5, 1], [0.42, 1], [0.42, 2],
   [0.35, 2], [0.3, 2], [0.25, 2]];
-// What a picture may take until it is done [ms].
+// Longest time until a picture is complete [ms].
 const BUDGET_MS = 9;
-// The rung to begin with. Pictures that the processor draws are taken from the simulation on the
-// same machine: they come no more often than that [ms].
+// The first rung. Pictures drawn by the processor take time from the simulation on the same
+// machine, so they have a least interval [ms].
 const HARDWARE = { period_ms: 0, start: 0 };
 const SOFTWARE = { period_ms: 33, start: 5 };
 const FINEST = 2;
 const TOO_MUCH = 1.2;
 const PLENTY = 0.8;
 const EVERY_MS = 800;
-// A rung that was too dear is tried again after so long, then after twice as long, and so on.
+// A rung that was too expensive is tried again after this time, then after twice that, and so on.
 const AGAIN_MS = 20_000;
-// Of the time, no more goes to pictures.
+// Largest share of the time that is spent on pictures.
 const MOST_SHARE = 0.3;
 const SLOWEST_MS = 50;
 
@@ -52,25 +52,25 @@ const SLOWEST_MS = 50;
 const SOFTWARE_NAMES = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /**
- * Return whether a renderer is no graphics card.
+ * Return whether a renderer is the processor.
  *
- * @param {string} name as WEBGL_debug_renderer_info gives it
+ * @param {string} name from WEBGL_debug_renderer_info
  * @returns {boolean}
  */
 export function isSoftware(name) {
   return SOFTWARE_NAMES.test(name);
 }
 
-/** Chooses the ratio of a picture's pixels to CSS pixels, and what is left out. */
+/** The choice of a picture's pixel ratio and detail. */
 export class Quality {
   #limits;
   #finest;
   #changed_ms = -Infinity;
   #rung;
   #cost_ms = 0;
-  /** By rung: not before that time again, and how long it was refused. */
+  /** By rung: time before which it is not tried again, and how long it was refused. */
   #refused = RUNGS.map(() => ({ until_ms: -Infinity, for_ms: AGAIN_MS }));
-  /** Whether nothing is saved, whatever a picture takes. */
+  /** Whether full quality is kept, at any cost. */
   sharp = false;
 
   /**
@@ -83,30 +83,30 @@ export class Quality {
     this.#rung = this.#limits.start;
   }
 
-  /** Pixels to a CSS pixel. */
+  /** Return the pixels per CSS pixel. */
   get ratio() {
     return this.sharp ? this.#finest : RUNGS[this.#rung][0] * this.#finest;
   }
 
-  /** What pictures leave out. */
+  /** Return the detail of pictures. */
   get detail() {
     return DETAILS[this.sharp ? 0 : RUNGS[this.#rung][1]];
   }
 
   /** Least time from picture to picture [ms]. */
   get period_ms() {
-    // Whoever has come down that far is taken for a processor, whatever its name.
+    // A renderer that has fallen this far is treated as a processor, whatever its name.
     const { period_ms } = this.detail === DETAILS[DETAILS.length - 1] ? SOFTWARE : this.#limits;
     return period_ms === 0 ? 0
       : Math.min(Math.max(this.#cost_ms / MOST_SHARE, period_ms), SLOWEST_MS);
   }
 
   /**
-   * Take note of what a picture took.
+   * Record the cost of a picture.
    *
-   * @param {number} cost_ms until it was done
+   * @param {number} cost_ms time until it was complete
    * @param {number} now_ms
-   * @returns {boolean} whether ratio or detail are others now
+   * @returns {boolean} whether ratio or detail have changed
    */
   take(cost_ms, now_ms) {
     this.#cost_ms = cost_ms;

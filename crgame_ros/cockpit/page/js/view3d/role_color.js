@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the map colours people, AVs and all others, for bodies seen from outside. */
+/** The map's colours of people, AVs and all others, for bodies seen from outside. */
 
 import { themeColor } from '../world/palette.js';
 
@@ -12,7 +12,7 @@ const NAMES = {
 };
 
 /**
- * Make a function that gives the colour of a role.
+ * Return a function that returns the colour of a role.
  *
  * @param {Three} three
  * @returns {(role: string, type: string) => number} of vehicles and objects of the scene

@@ -1,19 +1,19 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Keeps the windows of one seat in step: all show the simulation time of the first one. */
+/** Synchronisation of the windows of one seat: all show the simulation time of the leading one. */
 
 /** @import { Store } from '../store.js' */
 
 const CHANNEL = 'crgame-seat';
-// A leader that says nothing for so long is gone, or its window is hidden [ms].
+// After this silence, the leader is gone or its window is hidden [ms].
 const SILENCE_MS = 400;
 
 /**
- * What the leader says in each frame.
+ * The message of the leader in each frame.
  *
  * @typedef {object} Beat
  * @property {number} t simulation time that it shows [s]
- * @property {number} at_ms when, by the machine's clock
+ * @property {number} at_ms time of the message, by the machine's clock
  * @property {number} rate simulated seconds per second; 0 while it stands still
  * @property {number} epoch counts resets
  * @property {string|null} vehicle whose view it shows
@@ -24,7 +24,7 @@ const SILENCE_MS = 400;
  *   pause: () => void}} Player
  */
 
-/** Says, or hears, which time is shown. */
+/** The sender or receiver of the shown time. */
 export class SeatClock {
   #store;
   #channel = new BroadcastChannel(CHANNEL);
@@ -35,7 +35,7 @@ export class SeatClock {
 
   /**
    * @param {Store} store
-   * @param {boolean} follows whether this window goes with another one
+   * @param {boolean} follows whether this window follows another one
    * @param {string|null} wanted id of the vehicle whose leader is followed; null for any
    */
   constructor(store, follows, wanted) {
@@ -50,13 +50,13 @@ export class SeatClock {
     }
   }
 
-  /** The vehicle that the leader shows; null while nobody leads. */
+  /** Return the vehicle that the leader shows; null without a leader. */
   get vehicle() {
     return this.#leads(performance.now()) ? this.#heard?.vehicle ?? null : null;
   }
 
   /**
-   * Tell the windows that follow what is shown.
+   * Send the shown time to the followers.
    *
    * @param {number} now_ms the animation frame's time
    * @param {number} t simulation time that is shown [s]
@@ -76,7 +76,7 @@ export class SeatClock {
   }
 
   /**
-   * Before a frame: show what the leader shows, while there is one.
+   * Show the leader's time before a frame, while there is a leader.
    *
    * @param {number} now_ms the animation frame's time
    */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Instances of one shape, of which a picture draws those that its camera can see. */
+/** Instances of one shape, of which a picture draws those visible to its camera. */
 
 import { MergedMesh } from './merged_mesh.js';
 
@@ -9,8 +9,8 @@ import { MergedMesh } from './merged_mesh.js';
 /** @typedef {typeof import('./three.js')} Three */
 
 /**
- * What a picture is drawn of: instances that the camera cannot see are not handed over to who
- * draws, and those that are small in the picture have fewer triangles.
+ * The sight of a camera: instances out of sight are not submitted to the renderer, and those that
+ * are small in the picture have fewer triangles.
  *
  * @typedef {object} Sight
  * @property {Float64Array} planes six of them, four numbers each: a point within has
@@ -21,7 +21,7 @@ import { MergedMesh } from './merged_mesh.js';
  */
 
 /**
- * Return what a camera sees.
+ * Return the sight of a camera.
  *
  * @param {Three} three
  * @param {Camera} camera whose matrices are those of the picture
@@ -46,7 +46,7 @@ export function sightOf(three, camera, plain_m, own) {
  * @param {number} y
  * @param {number} z
  * @param {number} radius [m]
- * @returns {boolean} whether a ball may be seen
+ * @returns {boolean} whether a ball may be visible
  */
 export function isWithin(planes, x, y, z, radius) {
   for (let i = 0; i < 24; i += 4) {
@@ -58,7 +58,7 @@ export function isWithin(planes, x, y, z, radius) {
 }
 
 /**
- * Shapes of which one picture draws those near and those far, in parts of several materials.
+ * The shapes of near and far instances, in parts of several materials.
  *
  * @typedef {object} Part
  * @property {BufferGeometry} geometry
@@ -71,14 +71,14 @@ export function isWithin(planes, x, y, z, radius) {
  * @property {Part[]} [far] the plain ones, of one material; without them the near ones are drawn
  *   at any distance
  * @property {number} [sooner] share of a sight's `plain_m` at which the plain ones begin; with 0
- *   all are plain where any is
+ * all are plain if any is
  */
 
 /**
- * Return the same shape as a plain one, for what costs more by its number than by its triangles.
+ * Return a shape as a mergeable plain one, for things whose number costs more than their triangles.
  *
- * @param {Part} part of a material that knows no colours of corners
- * @returns {Part} whose material is to be freed, too
+ * @param {Part} part of a material without vertex colours
+ * @returns {Part} whose material has to be freed, too
  */
 export function mergeable({ geometry, material, tinted }) {
   const own = material.clone();
@@ -86,7 +86,7 @@ export function mergeable({ geometry, material, tinted }) {
   return { geometry: geometry.clone(), material: own, tinted };
 }
 
-/** Instances are put in anew whenever they move; `see` chooses among them. */
+/** Instances that are added anew whenever they move; `see` chooses among them. */
 export class SeenInstances {
   /** @type {Mesh[]} those of the near shape, then that of the plain one */
   meshes;
@@ -116,14 +116,14 @@ export class SeenInstances {
     this.meshes = [...this.#near.meshes, ...(this.#far === null ? [] : [this.#far.mesh])];
   }
 
-  /** Begin anew. */
+  /** Remove all instances. */
   clear() {
     this.#count = 0;
   }
 
   /**
    * @param {Matrix4} matrix
-   * @param {Color|null} color null: that of the one before at this place
+   * @param {Color|null} color null keeps the colour of the former instance at this index
    * @param {boolean} own whether it is of the vehicle in which the camera may be
    */
   add(matrix, color, own) {
@@ -133,13 +133,13 @@ export class SeenInstances {
     this.#count += 1;
   }
 
-  /** Hand all of them over, whatever a camera sees. */
+  /** Submit all of them, visible or not. */
   seeAll() {
     this.#choose(null);
   }
 
   /**
-   * Hand those over that a camera sees.
+   * Submit those that a camera sees.
    *
    * @param {Sight} sight
    */
@@ -155,7 +155,7 @@ export class SeenInstances {
       if (sight !== null && !this.#mayBeSeen(i, sight)) {
         continue;
       }
-      // Where all detail is there, nothing is plain, however soon.
+      // At full detail nothing is plain, whatever `sooner` is.
       if (sight !== null && this.#far !== null && sight.plain_m < Infinity
           && this.#distance(i, sight) > this.#sooner * sight.plain_m) {
         this.#far.add(this.#matrices, this.#colors, i);
@@ -211,7 +211,7 @@ export class SeenInstances {
     }
   }
 
-  /** Free what the graphics card holds, but for the materials. */
+  /** Free the memory of the graphics card, except the materials. */
   dispose() {
     for (const mesh of this.#near.meshes) {
       mesh.removeFromParent();
@@ -262,9 +262,9 @@ function createGroup(three, parts, most) {
   const meshes = parts.map(({ geometry, material, tinted }) => {
     const mesh = new three.InstancedMesh(geometry, material, 0);
     mesh.instanceMatrix = places;
-    // Set at once: the program of a mesh is made for instances with colours or without.
+    // Set at once, because the program of a mesh is built for instances with or without colours.
     mesh.instanceColor = tinted ? colors : null;
-    // Who is seen is chosen here.
+    // Culling is done by this class.
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = false;
     mesh.visible = false;

@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How far the front wheels of somebody are turned whose recording says only how it moves. */
+/** The steering angle of a recorded vehicle, derived from its motion. */
 
-// As far as those of cars go [rad].
+// Largest steering angle of cars [rad].
 const MOST = 0.65;
-// Slower, what is divided by says little: the wheels straighten up to a standstill [m/s].
+// Below this speed, the quotient is unreliable: the wheels straighten up to standstill [m/s].
 const SLOW = 1;
 
 /**
- * Return the angle at which a single-track model would move so: tan(angle) = wheelbase * yaw rate
- * / speed.
+ * Return the steering angle of a single-track model with this motion:
+ * tan(angle) = wheelbase * yaw rate / speed.
  *
  * @param {number} wheelbase [m]
  * @param {number} speed along its heading, below 0 backwards [m/s]

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** All vehicles and objects as bodies, where they are shown at this moment. */
+/** All vehicles and objects as bodies, at their current poses. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
@@ -29,19 +29,19 @@ import { steeringOf } from './steering.js';
  * @property {Instances} instances
  * @property {[x: number, y: number, z: number]} scale of the body
  * @property {number} role its colour on the map
- * @property {number} rolled how far its wheels have rolled [m]
+ * @property {number} rolled rolled distance of its wheels [m]
  * @property {number} wheelbase of the body as it is scaled; 0 without wheels [m]
- * @property {boolean} parked whether nobody is in it
+ * @property {boolean} parked whether it is parked, without a driver
  */
 
 /** @typedef {(x: number, y: number) => number} HeightAt of the road at a point of the map [m] */
 
 /** The bodies of one scene. */
 export class Traffic {
-  /** Whether bodies have the colours of the map, which tell who drives. */
+  /** Whether bodies have the map's colours, which show what drives them. */
   byRole = false;
   #three;
-  /** Beyond that nobody is drawn, and no wheel turns [m]. */
+  /** Distances beyond which no body is drawn, and no wheel turns [m]. */
   limits = { farthest_m: 0, wheels_m: 0 };
   #group;
   /** @type {Thing[]} */
@@ -64,7 +64,7 @@ export class Traffic {
   /**
    * @param {Three} three
    * @param {Group} group gets everything
-   * @param {Store} store whose scenario steps tell who brakes
+   * @param {Store} store whose scenario steps show which objects brake
    */
   constructor(three, group, store) {
     this.#three = three;
@@ -79,7 +79,7 @@ export class Traffic {
   /**
    * @param {Scene} scene
    * @param {Origin} origin of the coordinates in the group
-   * @param {(role: string, type: string) => number} colorOf what the map colours it
+   * @param {(role: string, type: string) => number} colorOf returns its colour on the map
    */
   load(scene, origin, colorOf) {
     this.#clear();
@@ -117,7 +117,7 @@ export class Traffic {
   }
 
   /**
-   * Put everybody where it is shown.
+   * Place all bodies at their current poses.
    *
    * @param {Shown} shown
    * @param {string|null} own id of the vehicle in which the camera may be
@@ -169,7 +169,7 @@ export class Traffic {
 
   /**
    * @param {string} id of a driven vehicle
-   * @returns {number} its colour, which tells nothing of who drives it
+   * @returns {number} its colour, which does not depend on its driver
    */
   paintOf(id) {
     return this.#vehicles.find((thing) => thing.id === id)?.look.paint ?? 0;
@@ -216,7 +216,7 @@ export class Traffic {
   #place(thing, { x, y, yaw, speed, steering, dt, brakes, lights, own, heightAt, eye }) {
     const px = x - this.#origin.x;
     const py = y - this.#origin.y;
-    // A thing that is not there yet, or no more, has no place.
+    // An absent thing has no place.
     const distance = Math.hypot(px - eye.x, py - eye.y);
     if (!(distance < this.limits.farthest_m)) {
       return;
@@ -243,7 +243,7 @@ export class Traffic {
 }
 
 /**
- * Stand on the road: its height amid two points along the way, and its slope between them.
+ * Return the height of the road midway between two points along the heading, and the slope.
  *
  * @param {number} x [m]
  * @param {number} y [m]

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Where a driven vehicle stands on the road. */
+/** The pose of a driven vehicle on the road. */
 
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { poseOf } from './traffic.js';
@@ -11,7 +11,7 @@ import { poseOf } from './traffic.js';
 /** @import { HeightAt } from './traffic.js' */
 
 /**
- * Return where a vehicle's rear axle is on the road, and how steep that is.
+ * Return the pose of a vehicle's rear axle on the road, and the slope.
  *
  * @param {Shown} shown
  * @param {number} index of the vehicle

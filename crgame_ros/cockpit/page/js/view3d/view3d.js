@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The 3D view beside the map: which of the two is drawn, from where, and when. */
+/** The 3D view beside the map: the choice of the two, the viewpoint and the times of drawing. */
 
 import { element } from '../dom.js';
 import { isTyping } from '../driving/focus.js';
@@ -18,9 +18,9 @@ import { readViewWindow } from './view_window.js';
 const MISSING = 'The 3D view needs three.js, which the server does not have: '
   + '`crgame page-libraries` fetches it.';
 const LOST = 'The graphics card took the 3D view back: it returns when the card is free.';
-// While nothing moves, the mirrors are still drawn one after the other.
+// While nothing moves, the mirrors are still drawn in turn.
 const PICTURES_AFTER_CHANGE = 7;
-// Animation frames come as they come: one that is that early is in time [ms].
+// Tolerance of animation frames that arrive early [ms].
 const EARLY_MS = 4;
 
 /** The 3D view of a page. */
@@ -28,7 +28,7 @@ export class View3d {
   /** @type {Picture|null} */
   picture = null;
   settings;
-  /** What this window shows alone; null in a page with map and panels. */
+  /** The settings of a window with only the view; null in a page with map and panels. */
   window = readViewWindow(window.location.search);
   /** Whether V and C change the view. */
   keys = true;
@@ -65,7 +65,7 @@ export class View3d {
     this.redraw();
     window.addEventListener('keydown', (event) => this.#pressed(event));
     for (const name of /** @type {const} */ (['keydown', 'keyup'])) {
-      // Driving keeps its keys from others behind it: they are seen before that.
+      // Driving stops its keys from propagating, so they are captured earlier.
       window.addEventListener(name, (event) => this.#awaitAnswer(event), true);
     }
     new ResizeObserver(() => this.#resize()).observe(stage);
@@ -78,12 +78,12 @@ export class View3d {
     }
   }
 
-  /** Return whether it is shown in place of the map. */
+  /** Return whether the 3D view is shown instead of the map. */
   get on() {
     return this.#on;
   }
 
-  /** From where it looks. */
+  /** Return the viewpoint. */
   get viewpoint() {
     return this.#viewpoint;
   }
@@ -93,12 +93,12 @@ export class View3d {
     this.redraw();
   }
 
-  /** What the last picture took; null before the view was first opened. */
+  /** Return the figures of the last picture; null before the view was first opened. */
   get stats() {
     return this.picture?.stats ?? null;
   }
 
-  /** Id of the vehicle from which it looks, null for none. */
+  /** Return the id of the vehicle from which it looks, null for none. */
   get vehicle() {
     const { driving, world } = window.crgame;
     const wanted = [this.window?.vehicle, this.#clock.vehicle, driving?.seat, world?.followed];
@@ -108,10 +108,10 @@ export class View3d {
   }
 
   /**
-   * Show it, or the map.
+   * Show the 3D view or the map.
    *
    * @param {boolean} on
-   * @returns {Promise<boolean>} whether it is shown: it cannot be without three.js and WebGL 2
+   * @returns {Promise<boolean>} whether it is shown: it needs three.js and WebGL 2
    */
   async show(on) {
     this.#on = on && await this.#load();
@@ -125,13 +125,13 @@ export class View3d {
     return this.#on;
   }
 
-  /** Look from the next viewpoint. */
+  /** Switch to the next viewpoint. */
   next() {
     this.viewpoint = VIEWPOINTS[(VIEWPOINTS.indexOf(this.#viewpoint) + 1) % VIEWPOINTS.length];
   }
 
   /**
-   * Draw once more, and give that as PNG: after a frame the browser forgets what was drawn.
+   * Draw once more and return it as PNG, because the browser discards the drawing after a frame.
    *
    * @returns {Promise<Blob|null>} null while nothing can be seen
    */
@@ -144,7 +144,7 @@ export class View3d {
     return new Promise((resolve) => { this.#canvas.toBlob(resolve); });
   }
 
-  /** Draw again though nothing has moved. */
+  /** Draw again even if nothing has moved. */
   redraw() {
     this.#due = PICTURES_AFTER_CHANGE;
     const { classList } = this.#stage;
@@ -153,7 +153,7 @@ export class View3d {
     for (const [name, on] of Object.entries(seen)) {
       classList.toggle(name, Boolean(on));
     }
-    // One switch for the picture and the small map in it: there nobody sees the map's buttons.
+    // One switch for the picture and the small map in it, which has no buttons.
     const { world } = window.crgame;
     world.insight = !this.#on || this.settings?.switches.plans === true;
     world.redraw();

@@ -20,7 +20,7 @@ const VIEWS = {
 };
 
 /**
- * Put them on the stage.
+ * Put the buttons on the stage.
  *
  * @param {HTMLElement} stage
  * @param {ViewSettings} settings

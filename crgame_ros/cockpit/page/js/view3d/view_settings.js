@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a person chooses of the 3D view; the browser remembers it. */
+/** The user's settings of the 3D view, which the browser remembers. */
 
 import { element, setAttribute } from '../dom.js';
 import { recall, remember } from '../panels/memory.js';
@@ -14,12 +14,12 @@ import { FIELD_OF_VIEW, readSeat } from './field_of_view.js';
 const SWITCHES = [
   { name: 'mirrors', text: 'Mirrors', on: true },
   { name: 'inset', text: 'Small map', on: true },
-  // What an AV plans or perceives is nothing that a driver could see.
+  // A driver could not see what an AV plans or perceives.
   { name: 'plans', text: 'What AVs plan and perceive', on: false },
   { name: 'sharp', text: 'Full resolution, however slow', on: false },
 ];
 
-/** The choices, and the form in which they are made. */
+/** The settings and their form. */
 export class ViewSettings {
   /** @type {Record<Switch, boolean>} */
   switches = { mirrors: true, inset: true, plans: false, sharp: false };
@@ -52,7 +52,7 @@ export class ViewSettings {
     this.#read();
   }
 
-  /** @param {boolean} open whether the form is seen */
+  /** @param {boolean} open whether the form is visible */
   open(open) {
     setAttribute(this.node, 'hidden', !open);
   }
@@ -72,7 +72,7 @@ export class ViewSettings {
   }
 
   /**
-   * Choose for this page alone: the browser does not remember it.
+   * Choose for this page only: the browser does not remember it.
    *
    * @param {Record<Switch, boolean>} switches
    * @param {number|null} fieldOfView_deg null leaves it as it is [deg]

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Windows that show nothing but a view: side and rear screens of one seat. */
+/** Windows with only a view: side and rear screens of one seat. */
 
 import { VIEWPOINTS } from './cameras.js';
 import { FIELD_OF_VIEW } from './field_of_view.js';
@@ -10,13 +10,13 @@ import { FIELD_OF_VIEW } from './field_of_view.js';
 const DEGREE = Math.PI / 180;
 
 /**
- * What a window shows.
+ * The settings of a window.
  *
  * @typedef {object} ViewWindow
  * @property {Viewpoint} viewpoint
  * @property {number} aside to the left of straight ahead [rad]
- * @property {string|null} vehicle id; null for the one that the first window of the seat shows
- * @property {number|null} fieldOfView_deg across the window; null as it is set for all [deg]
+ * @property {string|null} vehicle id; null for the vehicle of the seat's first window
+ * @property {number|null} fieldOfView_deg across the window; null for the common setting [deg]
  */
 
 /**

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What is on the map, in words: for those who do not see it, and for tests. */
+/** The content of the map in words, for users who cannot see it and for tests. */
 
 import { element, setText } from '../dom.js';
 import { VEHICLE, VEHICLE_WIDTH } from '../frames.js';
@@ -11,7 +11,7 @@ import { driverSight } from './driver_sight.js';
 /** @import { Shown, Store } from '../store.js' */
 
 const EVERY_MS = 1000;
-// Who is farther away is not told of [m].
+// Objects farther away are left out [m].
 const REACH = 100;
 const MOST_TOLD = 5;
 const KMH = 3.6;
@@ -21,12 +21,12 @@ const STANDING = 0.3;
 /** @typedef {{id: string, x: number, y: number, yaw: number, speed: number}} Body [m, rad, m/s] */
 
 /**
- * Say who is around a vehicle, the nearest first.
+ * Describe the objects around a vehicle, the nearest first.
  *
  * @param {Body} own
  * @param {Body[]} others
  * @param {boolean} driven whether this page drives it
- * @param {number} [range] how far one sees [m]
+ * @param {number} [range] visibility [m]
  * @returns {string}
  */
 export function describeAround(own, others, driven, range = Infinity) {
@@ -49,7 +49,7 @@ function pace(speed) {
 }
 
 /**
- * In one of eight directions, as seen by its driver.
+ * Return one of eight directions, as seen by the driver.
  *
  * @param {Body} own
  * @param {Body} other
@@ -62,7 +62,7 @@ function directionOf(own, other) {
 }
 
 /**
- * Keep the text up to date, once a second at most; it is read out only when that is asked for.
+ * Keep the text up to date, once a second at most; it is read out only on request.
  *
  * @param {HTMLElement} root #around
  * @param {Store} store
@@ -102,7 +102,7 @@ export function createAround(root, store) {
 /**
  * @param {Store} store
  * @param {Shown} shown
- * @returns {Body[]} whoever is there
+ * @returns {Body[]} the present bodies
  */
 function bodiesOf({ scene }, { vehicles, objects }) {
   const driven = (scene?.vehicles ?? []).map(({ id }, i) => {

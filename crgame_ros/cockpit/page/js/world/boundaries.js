@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The boundary lines of all lanelets, each once, though two neighbours describe it. */
+/** The boundary lines of all lanelets, each once, although two neighbours describe it. */
 
 /** @import { Lanelet } from '../messages.js' */
 
 // Neighbours' bounds are the same line when their ends are this close [m].
 const SAME_M = 0.3;
 
-// What is more to be seen goes before what is less.
+// Order of markings by visibility.
 const RANK = [
   'no_marking', 'unknown', 'dashed', 'dashed_dashed', 'solid', 'lowered_curb', 'curb',
   'dashed_solid', 'solid_dashed', 'solid_solid', 'broad_dashed', 'broad_solid',
@@ -16,7 +16,7 @@ const RANK = [
 /**
  * @typedef {object} Boundary
  * @property {number[]} line flat
- * @property {string} marking as CommonRoad calls it
+ * @property {string} marking CommonRoad's name
  * @property {number} owner index of its lanelet
  * @property {boolean} inner between two lanelets
  */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Whose brake lights are on: the pedal says so, or how fast a vehicle slows down. */
+/** The state of brake lights, from the pedal or from the deceleration. */
 
 import { OBJECT_WIDTH, VEHICLE } from '../frames.js';
 
@@ -24,9 +24,9 @@ export class BrakeLights {
   }
 
   /**
-   * Learn from a scenario step which objects slow down.
+   * Update from a scenario step which objects slow down.
    *
-   * @param {Pick<ObjectsFrame, 'k'|'t'|'objects'>} step as the store got it
+   * @param {Pick<ObjectsFrame, 'k'|'t'|'objects'>} step as received by the store
    */
   takeStep(step) {
     const last = this.#lastStep;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Where the world is looked at from: a point, a scale, and the direction that is up. */
+/** The camera of the map: a point, a scale, and the direction that is up. */
 
 import { turn } from '../interpolation.js';
 
@@ -10,12 +10,12 @@ const NORTH = Math.PI / 2;
 const MIN_SCALE = 0.02;
 const MAX_SCALE = 120;
 const FIT_SHARE = 0.92;
-// Time constant of camera moves that are not the hand's own [ms].
+// Time constant of camera moves that are not drags [ms].
 const SETTLE_MS = 90;
-// Followed with its heading up, a vehicle stands this far down what is free, the road before it.
+// With heading up, a followed vehicle is this far down the free area, with the road ahead of it.
 const FOLLOW_DOWN = 0.8;
 const MIDDLE = 0.5;
-// The free height shows a followed vehicle so much road [m], and more the faster it is [s].
+// Road length on the free height for a followed vehicle [m], and additional time of travel [s].
 const FOLLOW_HEIGHT = 70;
 const FOLLOW_TIME = 2.8;
 
@@ -27,7 +27,7 @@ export class Camera {
   width = 1;
   height = 1;
   covered = 0;
-  /** What is shown now: the point at the anchor [m], scale [px/m], map angle that is up [rad]. */
+  /** The current view: the point at the anchor [m], scale [px/m], map angle that is up [rad]. */
   x = 0;
   y = 0;
   scale = 4;
@@ -39,7 +39,7 @@ export class Camera {
   b = 0;
   c = 0;
   d = -1;
-  /** What can be seen, as an axis-parallel box in the map [m]. */
+  /** The visible area, as an axis-parallel box in the map [m]. */
   left = 0;
   bottom = 0;
   right = 0;
@@ -51,7 +51,7 @@ export class Camera {
   #updated_ms = NaN;
   #still = window.matchMedia('(prefers-reduced-motion: reduce)');
 
-  /** Where on the canvas the camera's point is [px]. */
+  /** Return the camera's point on the canvas [px]. */
   get anchorX() {
     return MIDDLE * this.width;
   }
@@ -60,15 +60,15 @@ export class Camera {
     return (this.#aim.down + this.#slack.down) * this.#free;
   }
 
-  /** Return whether it is still on its way. */
+  /** Return whether it is still moving. */
   get moves() {
     const { x, y, scale, up, down } = this.#slack;
     return x !== 0 || y !== 0 || scale !== 0 || up !== 0 || down !== 0;
   }
 
   /**
-   * Take over the canvas's size, and how much of it is covered from below [CSS px]. The map stays
-   * where it is on the canvas; a vehicle that is followed moves to what is its place now.
+   * Set the canvas's size, and how much of it is covered from below [CSS px]. The map stays where
+   * it is on the canvas; a followed vehicle moves to its new place.
    *
    * @param {number} width
    * @param {number} height
@@ -86,7 +86,7 @@ export class Camera {
   }
 
   /**
-   * Move on towards where it was sent.
+   * Move on towards the target.
    *
    * @param {number} now_ms the animation frame's time
    */
@@ -136,7 +136,7 @@ export class Camera {
    * @param {Pose} pose where it is
    * @param {boolean} headingUp whether the map turns with it
    * @param {boolean} zoomed choose the scale anew
-   * @param {boolean} animated glide there
+   * @param {boolean} animated move gradually
    */
   beginFollowing({ x, y, yaw, speed }, headingUp, zoomed, animated) {
     this.headingUp = headingUp;
@@ -179,7 +179,7 @@ export class Camera {
   }
 
   /**
-   * Move the map with the hand [px].
+   * Drag the map [px].
    *
    * @param {number} dx
    * @param {number} dy
@@ -253,7 +253,7 @@ export class Camera {
   }
 
   /**
-   * Return whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be seen.
+   * Return whether a box [xmin, ymin, xmax, ymax] of the map, or part of it, may be visible.
    *
    * @param {Box} box
    */
@@ -263,7 +263,7 @@ export class Camera {
   }
 
   /**
-   * Return whether something within a radius [m] of a point may be seen; false for NaN.
+   * Return whether something within a radius [m] of a point may be visible; false for NaN.
    *
    * @param {number} x
    * @param {number} y
@@ -275,7 +275,7 @@ export class Camera {
   }
 
   /**
-   * Let a context draw in metres around a point of the map, exact wherever that is.
+   * Set a context to metres around a point of the map, exact at any distance from the origin.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {number} ratio
@@ -288,7 +288,7 @@ export class Camera {
   }
 
   /**
-   * Let a context draw in metres at a pose, x forward; enlarged, and shifted down [px].
+   * Set a context to metres at a pose, x forward; enlarged, and shifted down [px].
    *
    * @param {CanvasRenderingContext2D} context
    * @param {number} ratio

@@ -1,18 +1,18 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Who of the others a driver sees through the air, on the map and in words as in 3D. */
+/** The limit of a driver's sight by visibility, on the map and in words as in 3D. */
 
 import { OBJECT_WIDTH, VEHICLE_WIDTH } from '../frames.js';
 
 /** @import { Shown, Store } from '../store.js' */
 
-/** @typedef {{id: string, range: number}} Sight from a vehicle, as far as air lets it [m] */
+/** @typedef {{id: string, range: number}} Sight from a vehicle, limited by visibility [m] */
 
 /**
- * Tell from which seat this page's person looks.
+ * Return the seat from which this page's person looks.
  *
- * @param {Store} store its scene says how far one sees
- * @returns {Sight|null} null for who looks from no seat and sees all: directors, spectators
+ * @param {Store} store its scene has the visibility
+ * @returns {Sight|null} null without a seat, which sees all: directors, spectators
  */
 export function driverSight({ scene }) {
   const { driving, stage, view3d } = window.crgame;
@@ -22,10 +22,10 @@ export function driverSight({ scene }) {
 }
 
 /**
- * Take out whoever is too far away to be seen: as if they were not there.
+ * Remove the objects that are too far away to be visible.
  *
- * @param {Pick<Shown, 'vehicles'|'objects'>} shown x of those who are not seen becomes NaN
- * @param {number} own index of the vehicle from which one looks; nothing is done for none
+ * @param {Pick<Shown, 'vehicles'|'objects'>} shown x of invisible objects becomes NaN
+ * @param {number} own index of the own vehicle; without one, nothing is done
  * @param {number} range [m]
  */
 export function hideBeyond({ vehicles, objects }, own, range) {
@@ -34,7 +34,7 @@ export function hideBeyond({ vehicles, objects }, own, range) {
   for (const [rows, width] of /** @type {const} */ ([
     [vehicles, VEHICLE_WIDTH], [objects, OBJECT_WIDTH]])) {
     for (let i = 0; i < rows.length; i += width) {
-      // Not for NaN: where nobody looks from, nobody is too far away.
+      // False for NaN: without an own vehicle, no object is too far away.
       if (Math.hypot(rows[i] - x, rows[i + 1] - y) > range) {
         rows[i] = NaN;
       }

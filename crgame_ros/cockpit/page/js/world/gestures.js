@@ -4,11 +4,11 @@
 
 const WHEEL_ZOOM = 0.0015;
 const LINE_PX = 30;
-// A hand that only clicks moves less than this [px].
+// A click moves less than this [px].
 const CLICK_PX = 4;
 
 /**
- * All in CSS pixels and rad, counter-clockwise on the screen.
+ * The actions of gestures, in CSS pixels and rad, counter-clockwise on the screen.
  *
  * @typedef {object} Actions
  * @property {(dx: number, dy: number) => void} pan
@@ -21,7 +21,7 @@ const CLICK_PX = 4;
 /** @typedef {Place & {moved: number}} Hand */
 
 /**
- * Let pointers move a camera.
+ * Make pointers move a camera.
  *
  * @param {HTMLCanvasElement} canvas receives the pointers
  * @param {Actions} actions
@@ -93,8 +93,8 @@ export function attachGestures(canvas, actions) {
 }
 
 /**
- * @param {Place} before of the hand that moves
- * @param {Place} other of the one that rests
+ * @param {Place} before of the moving pointer
+ * @param {Place} other of the resting pointer
  * @param {Place} now
  * @param {Actions} actions
  */
@@ -111,7 +111,7 @@ function pinch(before, other, now, actions) {
 }
 
 /**
- * Counter-clockwise on the screen, whose y points down.
+ * Return the angle counter-clockwise on the screen, whose y points down.
  *
  * @param {number} x
  * @param {number} y

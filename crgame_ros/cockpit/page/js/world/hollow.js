@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Things that somebody does not see: dashed outlines, and a ring around people. */
+/** The drawing of unseen things: dashed outlines, and a ring around people. */
 
 /** @import { View } from './painter.js' */
 /** @import { Thing } from './vehicle_layer.js' */
@@ -8,7 +8,7 @@
 const FILL_ALPHA = 0.1;
 const LINE_PX = 1.8;
 const DASH_PX = [4, 3];
-// A person is small: the ring is so far around [px].
+// Radius of the ring around a person, who is small [px].
 const RING_PX = 7;
 const RING_DASH_PX = [5, 4];
 
@@ -22,7 +22,7 @@ const RING_DASH_PX = [5, 4];
  * @param {number} y [m]
  * @param {number} yaw [rad]
  * @param {number} leastPx its least length on the screen [px]
- * @returns {number} by how much it is enlarged
+ * @returns {number} factor by which it is enlarged
  */
 export function drawOutline(context, { camera, palette, ratio }, thing, x, y, yaw, leastPx) {
   const { look } = thing;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Keys of the world; those that drive (W A S D, arrows, space, R) are none of them. */
+/** Keys of the world; the driving keys (W A S D, arrows, space, R) are not among them. */
 
 import { isTyping } from '../driving/focus.js';
 
@@ -10,7 +10,7 @@ const ZOOM_STEP = 1.25;
 const TURN_STEP = Math.PI / 12;
 
 /**
- * Let keys move the camera.
+ * Make keys move the camera.
  *
  * @param {WorldActions} actions
  * @returns {() => void} ends it

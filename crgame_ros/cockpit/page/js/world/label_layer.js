@@ -10,14 +10,14 @@ import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 // Objects' ids are not drawn where they would cover each other [px/m].
 const OBJECTS_FROM = 1.5;
 const FONT_REM = 0.85;
-// Labels that make room for each other: more than this are a crowd anyway.
+// Most labels that make room for each other.
 const MOST_PLACED = 24;
 const NEXT = /** @type {const} */ ({ vehicles: 'all', all: 'none', none: 'vehicles' });
 
 /** Ids of driven vehicles, and of objects on request. */
 export class LabelLayer {
   /**
-   * Which ids are shown.
+   * The ids that are shown.
    *
    * @type {'none'|'vehicles'|'all'}
    */
@@ -29,7 +29,7 @@ export class LabelLayer {
   #places = [];
   #placed = 0;
 
-  /** Show the next of the three. */
+  /** Switch to the next of the three settings. */
   next() {
     this.shown = NEXT[this.shown];
   }
@@ -75,7 +75,7 @@ export class LabelLayer {
   }
 
   /**
-   * Move a label down until it covers no other; gives its y [px].
+   * Move a label down until it covers no other; return its y [px].
    *
    * @param {number} px
    * @param {number} py
@@ -118,7 +118,7 @@ export class LabelLayer {
     }
     const height = 1.35 * Math.max(12, FONT_REM * palette.rem_px);
     const px = camera.toX(x, y);
-    // Below it on the screen: with its heading up, what lies before a vehicle stays free.
+    // Below it on the screen, so that with heading up the area ahead of a vehicle stays free.
     let py = camera.toY(x, y) + Math.max(0.6 * thing.look.extent * camera.scale, 9)
       + 0.6 * height;
     py = this.#free(px, py, width + 12, height + 3);

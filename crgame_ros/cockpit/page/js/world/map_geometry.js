@@ -15,7 +15,7 @@ const ARROW_EVERY_M = 32;
 const SHORTEST_FOR_ARROW_M = 9;
 const ZEBRA_M = 0.5;
 
-/** Surfaces from the lowest to the highest, by what they are called in the palette. */
+/** Surfaces from the lowest to the highest, by their names in the palette. */
 export const SURFACES = /** @type {const} */ (['walk', 'parking', 'cycle', 'road', 'junction']);
 
 const PATH_OF_STROKE = /** @type {const} */ (
@@ -34,7 +34,7 @@ const SURFACE_OF_TYPE = {
  */
 
 /**
- * Build the paths of a scene, each chunk around its own point, so that float32 suffices.
+ * Build the paths of a scene, each chunk relative to its own point, so that float32 suffices.
  *
  * @param {Pick<Scene, 'lanelets'>} scene the scene document
  * @returns {Chunk[]}
@@ -83,7 +83,7 @@ function emptyChunk(x, y) {
 }
 
 /**
- * Tell what a lanelet is paved for.
+ * Return the surface of a lanelet.
  *
  * @param {Pick<Lanelet, 'types'|'intersection'>} lanelet
  * @returns {Surface}
@@ -115,7 +115,7 @@ function addSurface(chunk, lanelet, outline) {
 }
 
 /**
- * Return the stripes of a crossing, along the traffic, which is across the way of those who walk.
+ * Return the stripes of a crossing, along the traffic and across the path of pedestrians.
  *
  * @param {Pick<Lanelet, 'left'|'right'>} lanelet
  * @returns {number[][]} flat polygons
@@ -151,7 +151,7 @@ function addArrows(chunk, center) {
 }
 
 /**
- * A slender arrow on the lane, 3.6 m long.
+ * Add a slender arrow on the lane, 3.6 m long.
  *
  * @param {Chunk} chunk
  * @param {{x: number, y: number, yaw: number}} pose

@@ -15,18 +15,18 @@ const WIDTH = {
   lines: 0.13, broad: 0.28, curbs: 0.16, seams: 0.08, stop: 0.4, casing: 0.45, slit: 0.06,
 };
 const LEAST_PX = 0.9;
-// Scales [px/m] from which on, and fully by which, details are shown.
+// Scales [px/m] from which details appear, and at which they are fully shown.
 const MARKS = [0.6, 2.2];
 const ARROWS = [2.2, 5];
 const KERBS = [0.8, 2.5];
-// Far out a road stays this wide on the screen [px].
+// Least width of a road on the screen [px].
 const ROAD_PX = 1.5;
 const GRID_PX = 90;
 const GOAL_DASH = [1.2, 0.8];
 
 /** @typedef {{x: number, y: number, box: Box, path: Path2D}} Local a path around (x, y) */
 
-/** The part of the world that stays as it is during a run. */
+/** The part of the world that does not change during a run. */
 export class MapLayer {
   /** @type {Chunk[]} */
   #chunks = [];
@@ -75,7 +75,7 @@ export class MapLayer {
   }
 
   /**
-   * A faint grid, by which one sees motion where there is no road.
+   * Draw a faint grid, which shows motion where there is no road.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {View} view
@@ -105,7 +105,7 @@ export class MapLayer {
   }
 
   /**
-   * Edges first and all surfaces over them: what remains is the outer edge of the road.
+   * Draw edges first and all surfaces over them, so that the outer edge of the road remains.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {View} view
@@ -132,7 +132,7 @@ export class MapLayer {
         context.stroke(gap.path);
       }
     }
-    // Slits of a few centimetres between neighbours close under a thin stroke.
+    // A thin stroke closes slits of a few centimetres between neighbours.
     context.lineWidth = Math.max(WIDTH.slit, (1 - kerbs) * ROAD_PX / camera.scale);
     for (const surface of SURFACES) {
       context.fillStyle = palette[surface];
@@ -238,7 +238,7 @@ export class MapLayer {
 const NO_DASH = [];
 
 /**
- * A path around the middle of its points.
+ * Return a path relative to the middle of its points.
  *
  * @param {number[]} points
  * @param {typeof addPolygon} add

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * How CommonRoad's line markings are painted: widths, dashes and gaps.
+ * The layout of CommonRoad's line markings: widths, dashes and gaps.
  *
- * They are those of the German guideline RMS (Richtlinien für die Markierung von Straßen), which
- * knows motorways, country roads and roads in towns.
+ * They follow the German guideline RMS (Richtlinien für die Markierung von Straßen), which
+ * distinguishes motorways, country roads and roads in towns.
  */
 
 /** @import { Lanelet } from '../messages.js' */
@@ -31,15 +31,15 @@ const LAYOUTS = {
 };
 const KERB_M = 0.16;
 const SEAM_M = 0.08;
-// Of the two lines of a double one from their middle.
+// Offset of the two lines of a double line from their middle.
 const DOUBLE_LINE_M = 0.13;
 const MOTORWAY_TYPES = ['interstate', 'highway', 'mainCarriageWay', 'accessRamp', 'exitRamp'];
-// From 95 and 65 km/h on; at half-way between two limits [m/s].
+// From 95 and 65 km/h on, half-way between two limits [m/s].
 const MOTORWAY_MPS = 95 / 3.6;
 const COUNTRY_MPS = 65 / 3.6;
 
 /**
- * Tell what kind of road a lanelet is part of: by its types, and how fast one may drive.
+ * Return the class of a lanelet's road, from its types and its speed limit.
  *
  * @param {Pick<Lanelet, 'types'|'speed_limit'>} lanelet
  * @returns {RoadClass}
@@ -56,7 +56,7 @@ export function roadClass({ types, speed_limit }) {
 }
 
 /**
- * Return what is painted, or built, along a boundary.
+ * Return the strokes or kerb along a boundary.
  *
  * @param {Pick<Boundary, 'marking'|'inner'>} boundary
  * @param {Lanelet} lanelet whose boundary it is
@@ -83,7 +83,7 @@ export function strokesOf({ marking, inner }, lanelet) {
     case 'dashed_solid':
       return [line(left, DOUBLE_LINE_M), line(right, -DOUBLE_LINE_M)];
     default:
-      // Without a line, lanes side by side must still be told apart.
+      // Lanes side by side must be distinguishable even without a line.
       return inner && !lanelet.intersection
         ? [{ kind: 'seam', offset: 0, width: SEAM_M, dash: null }] : [];
   }

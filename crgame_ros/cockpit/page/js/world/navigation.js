@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Whom the camera follows, and what hands and keys do to it. */
+/** The navigation of the camera: following a vehicle, gestures and keys. */
 
 /** @import { Box, Pose, Scene } from '../messages.js' */
 /** @import { Camera } from './camera.js' */
 /** @import { Actions } from './gestures.js' */
 
-/** Moves the camera of a world. */
+/** The navigation of one world's camera. */
 export class Navigation {
   /**
    * Id of the followed vehicle or object, null while the camera is free.
@@ -27,8 +27,8 @@ export class Navigation {
   #changed;
 
   /**
-   * @param {Camera} camera is moved
-   * @param {() => void} changed called after each move that was asked for
+   * @param {Camera} camera that is moved
+   * @param {() => void} changed called after each requested move
    */
   constructor(camera, changed) {
     this.#camera = camera;
@@ -41,7 +41,7 @@ export class Navigation {
   }
 
   /**
-   * Take a scene over; the view stays as it is where the map is the same as before.
+   * Load a scene; the view stays as it is if the map is the same as before.
    *
    * @param {Scene} scene the scene document
    * @param {boolean} follow begin with the first vehicle instead of the whole map
@@ -61,7 +61,7 @@ export class Navigation {
   }
 
   /**
-   * See World.follow; a vehicle that is followed already keeps the scale.
+   * Follow a vehicle, see World.follow; if it is followed already, the scale stays.
    *
    * @param {string|null} id
    * @param {boolean} [headingUp]
@@ -81,7 +81,7 @@ export class Navigation {
     }
   }
 
-  /** Bring the followed vehicle, or else the first, back to where it belongs. */
+  /** Return the view to the followed vehicle, or else to the first. */
   recenter() {
     this.follow(this.followed ?? this.#ids[0] ?? null);
     this.#zoomed = true;
@@ -111,7 +111,7 @@ export class Navigation {
     }
   }
 
-  /** Heading up instead of north up, or the other way round. */
+  /** Toggle between heading up and north up. */
   toggleHeading() {
     if (this.followed === null) {
       this.#camera.northUp();
@@ -142,7 +142,7 @@ export class Navigation {
   }
 
   /**
-   * What hands do, for attachGestures.
+   * Return the actions of gestures, for attachGestures.
    *
    * @returns {Omit<Actions, 'pick'>}
    */
@@ -163,7 +163,7 @@ export class Navigation {
         this.#changed();
       },
       rotate: (angle, x, y) => {
-        // Two fingers that pinch always turn a little: that must not end heading up.
+        // A pinch always turns a little, which must not end heading up.
         if (x === undefined || !camera.headingUp) {
           camera.rotate(angle, x, y);
           this.#changed();
@@ -176,7 +176,7 @@ export class Navigation {
    * Keep up with the followed vehicle.
    *
    * @param {Pose|null} pose {x, y, yaw, speed} as shown, null while absent
-   * @param {boolean} animated glide to it at first
+   * @param {boolean} animated move gradually to it at first
    */
   steer(pose, animated) {
     if (pose === null) {
@@ -191,7 +191,7 @@ export class Navigation {
     }
   }
 
-  /** Frame the scene anew after the canvas got its first size. */
+  /** Fit the scene again after the canvas got its first size. */
   reframe() {
     if (this.#bounds !== null && this.followed === null) {
       this.#camera.fit(this.#bounds, false);

@@ -7,13 +7,13 @@
 /** @import { Colors } from './palette.js' */
 
 const LONGEST_BAR_REM = 6.5;
-// On a canvas that is narrower they would cover what it shows: the small map.
+// On a narrower canvas, such as the small map, they would cover the content.
 const NARROW_REM = 21;
 const lengths = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000];
 const texts = lengths.map((length) => (length < 1000 ? `${length} m` : `${length / 1000} km`));
 
 /**
- * Draw both where there is room.
+ * Draw both if there is room.
  *
  * @param {CanvasRenderingContext2D} context of the world
  * @param {Pick<View, 'camera'|'palette'|'ratio'>} view camera, palette and ratio

@@ -16,7 +16,7 @@ import { VehicleLayer } from './vehicle_layer.js';
 /** @import { Colors } from './palette.js' */
 
 /**
- * What layers draw from.
+ * The input of layers.
  *
  * @typedef {object} View
  * @property {Camera} camera enterMap and enterPose set a context up for metres
@@ -26,11 +26,11 @@ import { VehicleLayer } from './vehicle_layer.js';
  * @property {Scene|null} scene
  * @property {Shown|null} shown
  * @property {number} now_ms
- * @property {boolean} insight whether what AVs plan, perceive and want may be drawn
+ * @property {boolean} insight whether plans, perception and goals of AVs may be drawn
  */
 
 /**
- * @typedef {View & {scene: Scene, shown: Shown}} LiveView once there is something to be seen
+ * @typedef {View & {scene: Scene, shown: Shown}} LiveView once there is something to show
  * @typedef {(context: CanvasRenderingContext2D, view: LiveView) => void} DrawLayer
  * @typedef {'below'|'above'} Place below or above the vehicles
  * @typedef {Map<string, {draw: DrawLayer, on: boolean}>} Layers by name
@@ -55,7 +55,7 @@ export class Painter {
   }
 
   /**
-   * Add a layer of somebody else's, in place of one of the same name; see World.addLayer.
+   * Add an external layer, which replaces one of the same name; see World.addLayer.
    *
    * @param {string} name
    * @param {DrawLayer} draw
@@ -70,7 +70,7 @@ export class Painter {
   /**
    * Show or hide a layer.
    *
-   * @param {string} name as World.setLayer takes it
+   * @param {string} name as for World.setLayer
    * @param {boolean} on whether it is shown
    * @throws {RangeError} when there is no such layer
    */

@@ -12,14 +12,14 @@ const NAMES = /** @type {const} */ ([
 ]);
 
 /**
- * Resolve a custom property to a colour that canvas and plots understand.
+ * Resolve a custom property to a colour for canvas and plots.
  *
  * @param {string} name without the leading dashes
  * @returns {string} a CSS colour without variables
  */
 export function themeColor(name) {
   const probe = document.createElement('span');
-  // Else, where the system forces its colours upon pages, all would be one.
+  // Else all colours would be equal if the system forces its own colours.
   probe.style.forcedColorAdjust = 'none';
   probe.style.color = `var(--${name})`;
   document.documentElement.append(probe);
@@ -29,7 +29,7 @@ export function themeColor(name) {
 }
 
 /**
- * Call a function whenever the theme changes: the system's, or data-theme on <html>.
+ * Call a function at each change of the system's theme or of data-theme on <html>.
  *
  * @param {() => void} changed called after the new colours are in force
  * @returns {() => void} ends it
@@ -67,7 +67,7 @@ export class Palette {
   }
 
   /**
-   * Make a palette whose colours have been read.
+   * Return a palette with the current colours.
    *
    * @returns {Colors}
    */

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The AVs' plans: a line with dots that fade with time, and the width that will be swept. */
+/** The AVs' plans: a line with dots that fade with time, and the swept width. */
 
 import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 
@@ -9,8 +9,8 @@ import { PLAN_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 /** @import { LiveView } from './painter.js' */
 /** @import { DrawnVehicle } from './vehicle_layer.js' */
 
-// Dots stand at whole multiples of this simulation time, so they stay where they are when a new
-// plan says the same as the one before [s].
+// Dots are at multiples of this simulation time, so they stay in place if a new plan equals the
+// one before [s].
 const DOT_EVERY_S = 0.5;
 const DOT_M = 0.26;
 const DOT_PX = [1.8, 5];
@@ -26,10 +26,10 @@ export class PlanLayer {
   on = true;
 
   /**
-   * Learn from the events that have fired which AVs' plans are hidden.
+   * Update which AVs' plans are hidden, from the fired events.
    *
-   * @param {Scene|null} scene whose events say what each does
-   * @param {FiredEvent[]} fired the events that have taken effect, in their order
+   * @param {Scene|null} scene scene with the definitions of the events
+   * @param {FiredEvent[]} fired fired events, in order
    */
   takeEvents(scene, fired) {
     this.#hidden.clear();
@@ -54,7 +54,7 @@ export class PlanLayer {
   }
 
   /**
-   * Draw what of each plan is still to come.
+   * Draw the future part of each plan.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {LiveView} view
@@ -110,7 +110,7 @@ export class PlanLayer {
 }
 
 /**
- * Index of the first value of the first point after a time [s].
+ * Return the index of the first value of the first point after a time [s].
  *
  * @param {PlanFrame} plan
  * @param {number} now_t
@@ -124,7 +124,7 @@ function firstAfter({ t, points }, now_t) {
 }
 
 /**
- * From the vehicle's rear axle as it is, along the plan, to where its front will be.
+ * Add the band from the vehicle's current rear axle along the plan to its future front.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {Float64Array} points

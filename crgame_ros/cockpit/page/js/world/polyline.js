@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Polylines as flat lists x0, y0, x1, y1, … [m], added to paths. */
 
-/** @typedef {Pick<Path2D, 'moveTo'|'lineTo'>} Lines what takes them in */
+/** @typedef {Pick<Path2D, 'moveTo'|'lineTo'>} Lines receiver of lines */
 
 /**
  * @param {number[]} line flat polyline
@@ -21,7 +21,7 @@ export function lengthOf(line) {
  *
  * @param {number[]} line flat polyline
  * @param {number} distance from its start [m]
- * @returns {{x: number, y: number, yaw: number}} on the line, at its end beyond it
+ * @returns {{x: number, y: number, yaw: number}} on the line; beyond its end, the end
  */
 export function poseAlong(line, distance) {
   let rest = distance;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the planners are told about the future of others: lines that end in an outline. */
+/** Predictions in the planners' requests: lines that end in an outline. */
 
 /** @import { LiveView, View } from './painter.js' */
 /** @import { Thing, VehicleLayer } from './vehicle_layer.js' */
@@ -9,13 +9,13 @@ const STRIDE = 3;
 const LINE_ALPHA = 0.65;
 const END_ALPHA = 0.8;
 
-/** Predictions that the AVs' requests carried; off unless asked for. */
+/** The layer of predictions in the AVs' requests; off by default. */
 export class PredictionLayer {
   /** Whether predictions are shown. */
   on = false;
 
   /**
-   * Draw what of each prediction is still to come.
+   * Draw the future part of each prediction.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {LiveView} view

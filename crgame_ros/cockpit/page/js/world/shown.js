@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What is drawn, kept: the store refills its own arrays for whoever asks next. */
+/** A copy of the drawn state: the store refills its own arrays at the next call. */
 
 /** @import { Shown } from '../store.js' */
 
 /**
- * Copy what is to be seen into what was seen before.
+ * Copy the current state into the kept one.
  *
  * @param {Shown|null} kept of the frame before, refilled; null makes a new one
- * @param {Shown|null} shown as Store.displayed gives it
+ * @param {Shown|null} shown of Store.displayed
  * @returns {Shown|null} {t, n, k, epoch, vehicles, objects}
  */
 export function keepShown(kept, shown) {

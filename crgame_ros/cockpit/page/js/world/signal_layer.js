@@ -7,7 +7,7 @@
 
 /** @type {Record<string, string[]|undefined>} */
 const LIT = { red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'], green: ['green'] };
-// Lamps tell by their place too, for those who don't tell red from green.
+// Lamps differ in place too, for colour-blind users.
 const LAMPS = [['red', '#ff4b3e'], ['yellow', '#ffc933'], ['green', '#19c37d']];
 const OFF = '#3a3f47';
 const HOUSING = '#14171b';
@@ -35,7 +35,7 @@ export class SignalLayer {
   }
 
   /**
-   * Draw the bars on the road, which vehicles cover.
+   * Draw the bars on the road, under the vehicles.
    *
    * @param {CanvasRenderingContext2D} context
    * @param {View} view

@@ -17,7 +17,7 @@ const ICONS = {
 };
 
 /**
- * What keys and buttons do.
+ * The actions of keys and buttons.
  *
  * @typedef {object} WorldActions
  * @property {(factor: number) => void} zoomBy
@@ -85,7 +85,7 @@ export function createToolbar(root, actions) {
 /**
  * Make a button of the toolbar.
  *
- * @param {HTMLElement} root group that gets it
+ * @param {HTMLElement} root group that receives it
  * @param {string} strokes SVG path of its picture in a square of 24
  * @param {string} title what it does
  * @param {() => void} action called by a click
@@ -96,7 +96,7 @@ export function toolButton(root, strokes, title, action) {
     type: 'button', title, 'aria-label': title, on: {
       click: () => {
         action();
-        // The keyboard stays with the world: a button that kept it would take the space bar.
+        // The keyboard stays with the world: a focused button would take the space bar.
         button.blur();
       },
     },
@@ -109,10 +109,10 @@ export function toolButton(root, strokes, title, action) {
 }
 
 /**
- * Show whether what a button switches is on.
+ * Show whether the switch of a button is on.
  *
  * @param {HTMLElement} button
- * @param {boolean} pressed whether it is
+ * @param {boolean} pressed whether it is on
  */
 export function press(button, pressed) {
   button.setAttribute('aria-pressed', String(pressed));

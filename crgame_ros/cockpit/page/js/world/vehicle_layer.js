@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Humans' vehicles, AVs, obstacles and pedestrians, where they are shown at this moment. */
+/** The layer of humans' vehicles, AVs, obstacles and pedestrians at their current poses. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
@@ -14,11 +14,11 @@ import { lookOf, TYRE } from './vehicle_shape.js';
 /** @import { ColorName } from './palette.js' */
 /** @import { Look } from './vehicle_shape.js' */
 
-// Far out, things stay this long on the screen [px]: driven vehicles, people
+// Least length of things on the screen [px]: driven vehicles, people
 // on foot or bicycles, and all others.
 /** @type {Record<string, number>} */
 const LEAST_PX = { driven: 15, vulnerable: 14, other: 6 };
-// Below this length on the screen a thing is its body only [px].
+// Below this length on the screen only the body of a thing is drawn [px].
 const DETAIL_PX = 13;
 const TYRE_INSET_M = 0.2;
 const SHADOW_PX = 2;
@@ -27,7 +27,7 @@ const SHADOW_PX = 2;
  * @typedef {{look: Look, color: ColorName}} Appearance
  * @typedef {SceneVehicle & Appearance} DrawnVehicle
  * @typedef {SceneObject & Appearance} DrawnObject
- * @typedef {Appearance & {id: string, rear_to_center?: number}} Thing either of them
+ * @typedef {Appearance & {id: string, rear_to_center?: number}} Thing a vehicle or an object
  * @typedef {(view: LiveView) => Uint8Array|null} ChooseHollow
  */
 
@@ -39,7 +39,7 @@ export class VehicleLayer {
   /** @type {DrawnObject[]} */
   objects = [];
   /**
-   * Chooses in each frame what is drawn hollow; see World.drawHollow.
+   * Chooses in each frame which things are drawn hollow; see World.drawHollow.
    *
    * @type {ChooseHollow}
    */
@@ -63,7 +63,7 @@ export class VehicleLayer {
    * Return the pose of the centre of a driven vehicle or an object in the frame shown last.
    *
    * @param {string} id of it
-   * @param {Shown} shown as Store.displayed gives it
+   * @param {Shown} shown of Store.displayed
    * @returns {Pose|null} null while it is absent
    */
   poseOf(id, shown) {
@@ -80,7 +80,7 @@ export class VehicleLayer {
   }
 
   /**
-   * Find what is at a point of the canvas.
+   * Return the vehicle or object at a point of the canvas.
    *
    * @param {number} px
    * @param {number} py
@@ -215,7 +215,7 @@ function drawLook(context, { camera, palette, ratio }, thing, x, y, yaw, braking
 }
 
 /**
- * The front wheels, turned by the steering angle.
+ * Draw the front wheels, turned by the steering angle.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {View} view
@@ -241,7 +241,7 @@ function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, stee
 }
 
 /**
- * Indicators at the corners, and the sound of the horn as arcs before the front.
+ * Draw indicators at the corners, and the horn as arcs ahead of the front.
  *
  * @param {CanvasRenderingContext2D} context in the vehicle's coordinates
  * @param {LiveView} view

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What things look like from above: paths in metres around the centre, x forward. */
+/** Shapes of things from above: paths in metres around the centre, x forward. */
 
 /** @import { Shape } from '../messages.js' */
 
@@ -45,7 +45,7 @@ export function lookOf(type, shape, moves) {
   if (kind === 'rectangle' && LONG_VEHICLES.has(type)) {
     return { ...longVehicle(length, width, type === 'truck'), ...rest };
   }
-  // What is no vehicle by its proportions gets no windscreen.
+  // A thing without the proportions of a vehicle gets no windscreen.
   if (kind === 'rectangle' && CARS.has(type) && (moves || type === 'parkedVehicle')
       && length > 2 && length < 9 && width > 1 && width < 3.2) {
     return { ...car(length, width), ...rest };
@@ -106,7 +106,7 @@ function lamps(l, w) {
  * @param {number} width
  */
 function corners(length, width) {
-  // Half beyond the body, so that they are seen from afar and on a vehicle of any colour.
+  // Half beyond the body, so that they are visible from afar and on any colour.
   const l = length / 2;
   const deep = 0.3 * width;
   const along = 0.16 * length;

@@ -21,16 +21,16 @@ import { createToolbar } from './toolbar.js';
 /** @import { ChooseHollow, DrawnVehicle } from './vehicle_layer.js' */
 
 const FRAMES_KEPT = 600;
-// A canvas that is so many times as high as before is another map [-].
+// A canvas whose height changes by more than this factor counts as a new map [-].
 const OTHER_SIZE = 1.6;
 const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'prediction', 'perception',
   'signals', 'status', 'seats', 'events', 'epoch', 'hello']);
 
 /**
  * @typedef {object} Options
- * @property {Connection|null} [connection] told which layers are wanted
- * @property {boolean} [keys] whether it has them
- * @property {boolean} [toolbar] whether it has one
+ * @property {Connection|null} [connection] receives the wanted layers
+ * @property {boolean} [keys] whether keys are active
+ * @property {boolean} [toolbar] whether there is a toolbar
  * @property {boolean} [follow] begin with the first vehicle instead of the whole map
  * @property {HTMLElement|null} [covered] an element that lies over the lower edge
  * @property {() => Sight|null} [sight] asked in each frame from which seat one looks; none sees
@@ -39,10 +39,10 @@ const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'predictio
 
 /** One canvas that shows what a store holds. */
 export class World {
-  /** Script time of the last frames [ms], a ring: frame i is at i % its length. */
+  /** Script time of the last frames [ms], a ring buffer: frame i is at i % its length. */
   stats = { frames: 0, frame_ms: new Float32Array(FRAMES_KEPT) };
   /**
-   * Exactly as drawn last, without whom one does not see; null before.
+   * The state exactly as drawn last, without invisible objects; null before.
    *
    * @type {Shown|null}
    */
@@ -61,7 +61,7 @@ export class World {
   #follow;
   #sight;
   #dirty = true;
-  // While something else is shown in its place nothing is drawn.
+  // While something else is shown in its place, nothing is drawn.
   #away = false;
   /** @type {View} */
   #view;
@@ -97,12 +97,12 @@ export class World {
     return this.#navigation.followed;
   }
 
-  /** Return whether what AVs plan is drawn. */
+  /** Return whether AVs' plans are drawn. */
   get showsPlans() {
     return this.#painter.plans.on && this.insight;
   }
 
-  /** Whether what AVs plan, perceive and want may be drawn; which layers are on stays as it is. */
+  /** Return whether plans, perception and goals of AVs may be drawn, if their layers are on. */
   get insight() {
     return this.#view.insight;
   }
@@ -117,7 +117,7 @@ export class World {
   /**
    * Keep the camera on a vehicle or object.
    *
-   * @param {string|null} id null lets the camera go
+   * @param {string|null} id null releases the camera
    * @param {boolean} [headingUp] turn the map so that it drives upwards; as before by default
    */
   follow(id, headingUp) {
@@ -166,9 +166,9 @@ export class World {
   }
 
   /**
-   * Add a layer of one's own.
+   * Add an external layer.
    *
-   * @param {string} name by which setLayer knows it
+   * @param {string} name for setLayer
    * @param {DrawLayer} draw called in each frame
    * @param {Place} [where]
    */
@@ -178,7 +178,7 @@ export class World {
   }
 
   /**
-   * Let a function choose what is drawn as an outline only.
+   * Set a function that chooses which things are drawn as outlines.
    *
    * @param {ChooseHollow} choose called in each frame with what layers get; gives 1 for each
    *   vehicle, then object, that is to be hollow, null for none
@@ -188,12 +188,12 @@ export class World {
     this.redraw();
   }
 
-  /** Draw again in the next frame though nothing has come. */
+  /** Draw again in the next frame even without new data. */
   redraw() {
     this.#dirty = true;
   }
 
-  /** End it: no more frames, keys or events. */
+  /** Stop the world: no more frames, keys or events. */
   close() {
     cancelAnimationFrame(this.#frame);
     this.#ends.forEach((end) => end());
@@ -274,7 +274,7 @@ export class World {
     }
     const ratio = window.devicePixelRatio || 1;
     const first = this.camera.width <= 1;
-    // Setting the size clears a canvas, even to the size that it has.
+    // Setting the size clears a canvas, even if the size is the same.
     if (this.#canvas.width !== Math.round(width * ratio)
         || this.#canvas.height !== Math.round(height * ratio)) {
       this.#canvas.width = Math.round(width * ratio);
@@ -287,7 +287,7 @@ export class World {
     if (first) {
       this.#navigation.reframe();
     } else if (this.followed !== null && Math.max(height / before, before / height) > OTHER_SIZE) {
-      // It has become the small map, or is so no more: as much of the road is seen.
+      // It has become the small map or the large one: the visible length of road stays the same.
       this.camera.zoom(height / before);
     }
     this.redraw();

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Which body a vehicle or object has, how large, and in which colours. */
+/** The choice of a vehicle's or object's body, its size and its colours. */
 
 import { bus, car, truck, van, withLamps } from './motor_vehicles.js';
 import { bicycle, motorcycle, pedestrian, prism } from './others.js';
@@ -10,19 +10,19 @@ import { bicycle, motorcycle, pedestrian, prism } from './others.js';
 
 /**
  * @typedef {object} Appearance
- * @property {string} key things of one key share their body
+ * @property {string} key things with the same key share their body
  * @property {() => Body} build the body, at its own size
- * @property {number|null} length to which it is stretched; null as it is [m]
+ * @property {number|null} length to which it is stretched; null for its own size [m]
  * @property {number|null} width [m]
  * @property {number|null} height [m]
- * @property {number} paint its colour, which tells nothing but one thing from another
+ * @property {number} paint its colour, which only distinguishes things
  */
 
-// As cars are painted: silver, grey, black, white, red, blue, brown, green.
+// Usual colours of cars: silver, grey, black, white, red, blue, brown, green.
 const PAINTS = [0xb9bec4, 0x6d737b, 0x22252a, 0xe9eaec, 0x8f1d22, 0x24426f, 0x5a4636, 0x2f4f43];
 const CLOTHES = [0x3f6ea8, 0xa33c3c, 0x4b7f52, 0xc79a3a, 0x6b5a8e, 0xd9d4c8];
 const STATIC_PAINT = 0xc8641e;
-// Heights of things whose type says more than their outline [m].
+// Heights of things whose type defines them better than their outline [m].
 /** @type {Record<string, number|undefined>} */
 const HEIGHTS = {
   building: 8, pillar: 4, median_strip: 0.2, medianStrip: 0.2, roadBoundary: 0.8,
@@ -55,7 +55,7 @@ export function ofVehicle({ id, shape, wheelbase, rear_to_center: rear, driver_p
 }
 
 /**
- * Choose the body of an object by its type and size, as CommonRoad gives them.
+ * Choose the body of an object by its type and size, from CommonRoad.
  *
  * @param {SceneObject} object
  * @returns {Appearance}

@@ -1,20 +1,19 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Triangles of a body, with the colour of each and normals that keep its edges. */
+/** Builder of a body's triangles, with their colours and with normals that keep edges. */
 
 /** @typedef {[x: number, y: number, z: number]} Point [m] */
 /**
- * Share of the light given back, and whether it is in the vehicle's own colour: then a shade of
- * that.
+ * Reflected share of the light, and whether it is a shade of the vehicle's own colour.
  *
  * @typedef {[red: number, green: number, blue: number, isPaint?: boolean]} Tint
  */
 
-// Faces that meet at less than this look like one that is curved.
+// Faces that meet at a smaller angle are shaded as one curved face.
 const SMOOTH_BELOW = Math.cos((38 * Math.PI) / 180);
 const ROUNDED = 1000;
 
-/** Collects triangles; counter-clockwise ones are seen from outside. */
+/** A collection of triangles; counter-clockwise ones are visible from outside. */
 export class MeshBuilder {
   /** @type {number[]} */
   #positions = [];
@@ -122,7 +121,7 @@ export class MeshBuilder {
   }
 
   /**
-   * Return the triangles that are painted, or all others.
+   * Return the painted triangles, or all others.
    *
    * @param {boolean} painted
    * @returns {{positions: Float32Array, normals: Float32Array, colors: Float32Array}} of all

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What cars, vans, trucks and buses look like: x ahead, y left, z up, around their middle. */
+/** Bodies of cars, vans, trucks and buses: x ahead, y left, z up, around their middle. */
 
 import { MeshBuilder } from './mesh_builder.js';
 
 /** @import { Point, Tint } from './mesh_builder.js' */
 
 /**
- * A body as its size says, and where its wheels and lamps are.
+ * A body of a given size, with the places of its wheels and lamps.
  *
  * @typedef {object} Body
  * @property {MeshBuilder} mesh around its middle, at size `length` by `width` by `height`
@@ -15,7 +15,7 @@ import { MeshBuilder } from './mesh_builder.js';
  * @property {number} width [m]
  * @property {number} height [m]
  * @property {{front: number, rear: number, track: number, radius: number, width: number}|null
- *   } wheels axles ahead of the middle, tyres' outer faces from each other, their size [m]
+ *   } wheels axles ahead of the middle, distance of the tyres' outer faces, their size [m]
  * @property {{front: Point, rear: Point, size: [width: number, height: number]}|null} lamps the
  *   left ones; the right ones mirror them [m]
  */
@@ -206,7 +206,7 @@ function ends(mesh, sections) {
   const back = outline(sections[0]);
   const front = outline(sections[sections.length - 1]);
   mesh.polygon(back, PAINT).polygon(front.reverse(), PAINT);
-  // The floor, seen only where a vehicle stands higher than the eye.
+  // The floor, visible only if a vehicle stands higher than the eye.
   const floor = sections.map(({ x, half, sill }) => [x, 0.96 * half, sill]);
   for (let i = 0; i + 1 < floor.length; i += 1) {
     const [x0, y0, z0] = floor[i];
@@ -243,7 +243,7 @@ function arches(mesh, { front, rear, radius }, half) {
 }
 
 /**
- * Return a vehicle its lamps, as they are when they are out: headlights and red lenses.
+ * Add the unlit lamps to a vehicle: headlights and red lenses.
  *
  * @param {Body} body
  * @returns {Body} the same

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What two-wheelers, people and things look like: x ahead, y left, z up, around their middle. */
+/** Bodies of two-wheelers, people and things: x ahead, y left, z up, around their middle. */
 
 import { MeshBuilder } from './mesh_builder.js';
 
@@ -55,7 +55,7 @@ export function motorcycle() {
 }
 
 /**
- * Somebody on foot.
+ * A pedestrian.
  *
  * @returns {Body}
  */
@@ -74,7 +74,7 @@ export function pedestrian() {
 }
 
 /**
- * A thing of which nothing but its outline is known.
+ * A thing of which only the outline is known.
  *
  * @param {number[]} vertices of its outline, flat, either way around [m]
  * @param {number} height [m]
@@ -99,7 +99,7 @@ export function prism(vertices, height) {
     const next = (i + 1) % low.length;
     mesh.polygon([corner, low[next], high[next], high[i]], PAINT);
   });
-  // Stripes all around, as on what closes a road.
+  // Stripes all around, as on a road barrier.
   const middle = 0.62 * height;
   low.forEach(([x, y], i) => {
     const [x1, y1] = low[(i + 1) % low.length];

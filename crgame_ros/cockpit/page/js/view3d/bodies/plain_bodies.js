@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The same motor vehicles with few triangles, for those that are small in the picture. */
+/** Motor vehicles with few triangles, for use where they are small in the picture. */
 
 import { MeshBuilder } from './mesh_builder.js';
 
@@ -38,11 +38,11 @@ const SKINS = {
 };
 
 /**
- * Make the plain shape of a body: as large, its windows, wheels and lamps where they are.
+ * Make the plain shape of a body, with the same size and places of windows, wheels and lamps.
  *
  * @param {string} key of its appearance, which begins with its kind
  * @param {Body} body
- * @returns {MeshBuilder|null} null where it has few triangles anyhow
+ * @returns {MeshBuilder|null} null if it has few triangles anyway
  */
 export function plainBody(key, body) {
   const [kind] = key.split(' ');

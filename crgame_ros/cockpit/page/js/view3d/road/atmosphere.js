@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Light and air: the sky, the sun, and the fog in which everything fades. */
+/** Light and air: the sky, the sun and the fog. */
 
 import { airFog, extinction, fogAsAirDoes } from './fog.js';
 
@@ -13,7 +13,7 @@ import { airFog, extinction, fogAsAirDoes } from './fog.js';
 const HAZE_M = 250;
 
 /**
- * How a time of day looks; colours as on the screen.
+ * The look of a time of day; colours as on the screen.
  *
  * @typedef {object} Daylight
  * @property {number} zenith
@@ -22,7 +22,7 @@ const HAZE_M = 250;
  * @property {number} sun
  * @property {number} sun_light
  * @property {[number, number, number]} sun_from
- * @property {number} ground what it throws back
+ * @property {number} ground light that it reflects
  * @property {number} sky_light
  */
 
@@ -44,7 +44,7 @@ vec3 skyTone(vec3 toward) {
   tone += sunTone * (0.16 * pow(near, 12.0) + 4.0 * smoothstep(0.99955, 0.9998, near));
   return mix(fogTone, tone, exp(-haze / max(up, 0.004)));
 }`;
-// As far as can be, whatever the camera's place and range.
+// At the far plane, whatever the camera's place and range.
 const SKY_PLACE = `
   gl_Position = (projectionMatrix * mat4(mat3(viewMatrix)) * vec4(position, 1.0)).xyww;`;
 const SKY_VERTEX = `
@@ -61,7 +61,7 @@ void main() {
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
 }`;
-// The same at corners, and evenly between them: a fraction of the time where a processor draws.
+// The same at vertices, interpolated between them: a fraction of the time on a processor.
 const PLAIN_VERTEX = `
 ${SKY_TONE}
 uniform float encoded;
@@ -76,7 +76,7 @@ varying vec3 vTone;
 void main() {
   gl_FragColor = vec4(vTone, 1.0);
 }`;
-// Where the plain sky has corners: near the horizon it changes most [deg].
+// Elevations of the plain sky's vertices: it changes most near the horizon [deg].
 const RINGS_DEG = [-90, -1, 0, 0.4, 0.9, 1.8, 3.2, 5.5, 9, 14, 22, 34, 50, 70, 90];
 const AROUND = 24;
 
@@ -94,7 +94,7 @@ export class Atmosphere {
   constructor(three) {
     fogAsAirDoes(three);
     this.#three = three;
-    /** Every material that is drawn fades into it. */
+    /** The fog of every material. */
     this.fog = airFog(three);
     this.group = new three.Group();
     const color = () => ({ value: new three.Color() });
@@ -105,14 +105,14 @@ export class Atmosphere {
       const mesh = new three.Mesh(geometry, new three.ShaderMaterial({ vertexShader,
         fragmentShader, side: three.DoubleSide, depthWrite: false, uniforms }));
       mesh.frustumCulled = false;
-      // Behind all else: nothing that is hidden by roads is computed.
+      // Drawn last, so that parts hidden by roads are not computed.
       mesh.renderOrder = 1000;
       return mesh;
     };
     this.#sky = sky(new three.IcosahedronGeometry(1, 3), SKY_VERTEX, SKY_FRAGMENT);
     this.#plainSky = sky(ringed(three), PLAIN_VERTEX, PLAIN_FRAGMENT);
     this.#plainSky.onBeforeRender = (renderer) => {
-      // A mirror's picture holds light, the screen's holds sRGB.
+      // A mirror's picture holds linear light, the screen's holds sRGB.
       uniforms.encoded.value = renderer.getRenderTarget() === null ? 1 : 0;
       this.#plainSky.material.uniformsNeedUpdate = true;
     };
@@ -154,7 +154,7 @@ export class Atmosphere {
     this.fog.density = extinction(visibility);
     this.#sun.color.set(look.sun);
     this.#sun.position.set(...look.sun_from);
-    // What fog takes from the sun comes from everywhere.
+    // The sunlight that fog scatters comes from all directions.
     this.#sun.intensity = look.sun_light * clear;
     this.#ambient.color.set(0xffffff).lerp(new Color(look.zenith), 0.18);
     this.#ambient.groundColor.set(look.ground);

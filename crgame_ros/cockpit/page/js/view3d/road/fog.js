@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** How fog takes contrast away (Koschmieder), as a number and as three.js draws it. */
+/** The loss of contrast in fog (Koschmieder), as a number and for three.js. */
 
 /** @import { FogExp2 } from 'three' */
 /** @typedef {typeof import('../three.js')} Three */
 
 /**
- * Give what air takes of a contrast: at the meteorological visibility 5 % of it is left, for which
- * 3 stands in place of -ln 0.05 = 2.996, as is usual.
+ * Return the extinction of air: at the meteorological visibility 5 % of a contrast is left. As
+ * usual, 3 replaces -ln 0.05 = 2.996.
  *
  * @param {number} visibility meteorological [m]
  * @returns {number} extinction coefficient [1/m]
@@ -26,10 +26,10 @@ export function contrastLeft(distance, visibility) {
   return Math.exp(-extinction(visibility) * distance);
 }
 
-// three.js fogs by exp(-(density * depth)^2), along the view's axis and between colours as they
-// are encoded for the screen; air does by exp(-density * distance), between lights.
-// Light is fogged before it is encoded: encoding is the dearest part of a pixel that a processor
-// draws, and is done once.
+// three.js fogs by exp(-(density * depth)^2), along the view's axis and between colours encoded
+// for the screen. Air attenuates by exp(-density * distance), in linear light.
+// Fog is applied before encoding, because encoding is the most expensive part of a pixel on a
+// processor, and is then done once.
 const DECLARED = `#ifdef USE_FOG
   varying vec3 vFromEye;
 #endif`;
@@ -61,7 +61,7 @@ const FRAGMENT = `#ifdef USE_FOG
 #endif`;
 
 /**
- * Let every material of the library be fogged as air does; before the first picture is drawn.
+ * Change the fog of all the library's materials to that of air; call before the first picture.
  *
  * @param {Three} three the library
  */
@@ -74,8 +74,8 @@ export function fogAsAirDoes(three) {
 }
 
 /**
- * Make the fog of a scene: materials get its light, where the library would give them the colour
- * as encoded for the screen.
+ * Make the fog of a scene. Materials get its linear light, where the library would pass the colour
+ * encoded for the screen.
  *
  * @param {Three} three the library
  * @returns {FogExp2} of no density

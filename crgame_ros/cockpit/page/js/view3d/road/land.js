@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The land in which the roads lie: flat, or below every road of a map with heights. */
+/** The land around the roads: flat, or below every road of a map with heights. */
 
 import { MeshParts } from './mesh_parts.js';
 import { randomFrom } from './random.js';
@@ -9,24 +9,24 @@ import { randomFrom } from './random.js';
 /** @import { Origin } from '../local_origin.js' */
 /** @import { Heights, Rgb } from './mesh_parts.js' */
 
-// Beyond the map the land goes on for so long [m].
+// How far the land continues beyond the map [m].
 const MARGIN_M = 1200;
 const MOST_CELLS = 72;
 const LEAST_CELL_M = 15;
 // Tiles along an edge.
 const TILES = 4;
 const BELOW_M = 0.04;
-// Below roads on hills, which the land's triangles follow by halves only [m].
+// Depth below roads on hills, which the land's triangles follow only roughly [m].
 const UNDER_HILLS_M = 0.4;
 /** @type {Rgb} */
 const MEADOW = [104, 124, 78];
 /** @type {Rgb} */
 const FIELD = [140, 138, 94];
-// Under everything else that is flat.
+// Rank under everything else that is flat.
 const RANK = -2;
 
 /**
- * Build the land of a scene, in tiles of which a picture draws those that are in it.
+ * Build the land of a scene in tiles, of which a picture draws the visible ones.
  *
  * @param {Scene} scene the scene document
  * @param {Origin} origin
@@ -76,13 +76,13 @@ export function buildLand(scene, origin) {
 
 /**
  * @typedef {(parts: MeshParts, row: number, column: number) => number} Corner adds one of the
- *   land's corners, and gives its index
+ * land's corners, and returns its index
  */
 
 /**
  * @param {number} first
  * @param {number} last
- * @returns {number[]} both, and all between them
+ * @returns {number[]} both and all numbers between them
  */
 function rangeOf(first, last) {
   return Array.from({ length: last - first + 1 }, (_, i) => first + i);
@@ -117,8 +117,8 @@ function buildTile(parts, corner, rows, columns) {
 }
 
 /**
- * Let the land lie under the roads: each corner under the lowest one of the cells around it, and
- * where there is none as high as the corners around it.
+ * Compute the heights of the land under the roads: each corner is under the lowest road of the
+ * cells around it, or, without one, as high as the corners around it.
  *
  * @param {Scene} scene
  * @param {number} x0
@@ -167,9 +167,9 @@ function lower(lowest, width, row, column, height) {
 }
 
 /**
- * Fill what is unknown from its neighbours, ring by ring.
+ * Fill unknown heights from their neighbours, ring by ring.
  *
- * @param {Float64Array} heights Infinity where unknown
+ * @param {Float64Array} heights Infinity if unknown
  * @param {number} width
  * @returns {Float64Array}
  */

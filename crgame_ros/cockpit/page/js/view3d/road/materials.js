@@ -11,15 +11,15 @@ import { randomFrom } from './random.js';
 const GRAIN_PX = 256;
 /** The edge of the grain's square on the road [m]. */
 export const GRAIN_M = 6;
-// One rank is so much nearer in normalised depth: some 30 steps of a buffer of 24 bits, and at
-// 100 m, seen from a car, 3 mm of height.
+// Offset of one rank in normalised depth: some 30 steps of a buffer of 24 bits, and at 100 m,
+// seen from a car, 3 mm of height.
 const RANK_DEPTH = 4e-6;
 
-/** Of the grain where it is fine; it is what a processor takes longest for. */
+/** Anisotropy of the grain in fine pictures; it is the most expensive part for a processor. */
 export const GRAIN_ANISOTROPY = 8;
 
 /**
- * Grain as of asphalt: by its passing one sees speed.
+ * Return a grain as of asphalt, whose motion conveys speed.
  *
  * @param {Three} three
  * @returns {DataTexture} grey, repeated, never darker than two thirds
@@ -45,7 +45,7 @@ export function grainTexture(three) {
 }
 
 /**
- * Let ranks decide which of two flat things at one height is seen.
+ * Make ranks decide which of two flat things at one height is visible.
  *
  * @template {Material} M
  * @param {M} material of meshes with an attribute `rank`
@@ -63,7 +63,7 @@ export function ranked(material) {
 }
 
 /**
- * Make the material of everything that is coloured by its vertices.
+ * Return the material of everything that is coloured by its vertices.
  *
  * @param {Three} three
  * @param {DataTexture|null} map
@@ -74,7 +74,7 @@ export function paintedMaterial(three, map) {
 }
 
 /**
- * Hand parts to the graphics card.
+ * Return the geometry of parts.
  *
  * @param {Three} three
  * @param {MeshParts} parts
@@ -100,7 +100,7 @@ export function geometryOf(three, { positions, normals, colors, ranks, indices }
   return geometry;
 }
 
-// three.js computes with light, of which sRGB's bytes are no measure (IEC 61966-2-1).
+// three.js computes with linear light, while sRGB is not linear (IEC 61966-2-1).
 const LINEAR = Float32Array.from({ length: 256 }, (_, byte) => {
   const value = byte / 255;
   return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;

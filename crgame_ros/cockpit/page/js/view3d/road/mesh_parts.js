@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Triangles gathered to be drawn at once: positions, normals, colours and ranks. */
+/** Triangles that are drawn at once: positions, normals, colours and ranks. */
 
 /** @typedef {[red: number, green: number, blue: number]} Rgb 0 to 255, as in sRGB */
 /** @typedef {(x: number, y: number) => number} Heights the height at a point of the map [m] */
@@ -8,7 +8,7 @@
 /** @type {readonly [number, number, number]} */
 const UP = [0, 0, 1];
 
-/** Gathers triangles; points are given in the map's coordinates, kept from the origin. */
+/** A collection of triangles; points are passed in map coordinates and kept from the origin. */
 export class MeshParts {
   /** @type {number[]} x, y, z from the origin [m] */
   positions = [];
@@ -68,7 +68,7 @@ export class MeshParts {
   }
 
   /**
-   * Add a polygon, to be seen from above.
+   * Add a polygon that is visible from above.
    *
    * @param {number[]} ring flat polygon
    * @param {ArrayLike<number>} faces three indices of its points for each triangle
@@ -85,7 +85,7 @@ export class MeshParts {
       const [a, b, c] = [2 * faces[i], 2 * faces[i + 1], 2 * faces[i + 2]];
       const turn = (ring[b] - ring[a]) * (ring[c + 1] - ring[a + 1])
         - (ring[b + 1] - ring[a + 1]) * (ring[c] - ring[a]);
-      // Faces are seen from where they go round counterclockwise: from above.
+      // Faces are visible from the side on which they run counterclockwise: from above.
       const [second, third] = turn > 0 ? [b, c] : [c, b];
       this.indices.push(first + a / 2, first + second / 2, first + third / 2);
     }
@@ -94,7 +94,7 @@ export class MeshParts {
   /**
    * Add an upright band along a line: the side of a kerb, or of an embankment.
    *
-   * @param {number[]} line flat polyline; it is seen from its right
+   * @param {number[]} line flat polyline; the wall is visible from its right
    * @param {Heights} bottom
    * @param {Heights} top
    * @param {Rgb} color

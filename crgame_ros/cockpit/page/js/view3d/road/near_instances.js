@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Things that there are hundreds of, drawn at once: always those that are nearest to the eye. */
+/** Instances of things that exist in hundreds: the nearest to the eye are drawn at once. */
 
 import { SeenInstances } from '../seen_instances.js';
 
@@ -9,7 +9,7 @@ import { SeenInstances } from '../seen_instances.js';
 /** @typedef {typeof import('../three.js')} Three */
 
 const CELL_M = 100;
-// The eye may go so far until those around it are looked for again [m].
+// How far the eye moves before the nearest are searched again [m].
 const MOVED_M = 40;
 
 /**
@@ -18,11 +18,11 @@ const MOVED_M = 40;
  * @property {number} y
  * @property {number} z of its foot [m]
  * @property {number} yaw [rad]
- * @property {[number, number, number]} size what its unit shape is stretched by
+ * @property {[number, number, number]} size scale of its unit shape
  * @property {number} color as on the screen; multiplies the shape's own
  */
 
-/** Draws instances of one shape in one call, or in two where those far away are plainer. */
+/** Instances of one shape, drawn in one call, or in two if those far away are plainer. */
 export class NearInstances {
   /** @type {Map<string, Instance[]>} */
   #cells = new Map();
@@ -38,7 +38,7 @@ export class NearInstances {
    * @param {BufferGeometry} shape of which every instance is one
    * @param {Material} material
    * @param {Instance[]} instances
-   * @param {number} most are drawn at a time
+   * @param {number} most number drawn at a time
    * @param {number} reach within which they are drawn [m]
    * @param {BufferGeometry|null} [plain] the shape of those far away; null: the same
    */
@@ -61,14 +61,14 @@ export class NearInstances {
     return this.#seen.meshes;
   }
 
-  /** Triangles when as many as can be are drawn. */
+  /** Return the largest number of triangles. */
   get triangles() {
     const { index, attributes } = this.#shape;
     return this.#most * (index?.count ?? attributes.position.count) / 3;
   }
 
   /**
-   * Draw those around the eye.
+   * Choose the instances around the eye.
    *
    * @param {{x: number, y: number}} eye
    */

@@ -14,14 +14,14 @@ import { addBox } from './scenery_shapes.js';
 
 /** @typedef {{row: number, rows: number, column: number, columns: number}} Block of cells */
 
-// Nobody says how high they are: as kerbs and fences that one looks over [m].
+// Their height is unknown: that of kerbs and low fences, which do not block the view [m].
 const HEIGHT_M = 0.35;
 /** @type {Rgb} */
 const COLOR = [150, 146, 140];
-// More blocks than this are not drawn: noise, which no map of walls is.
+// More blocks than this are not drawn: such a map is noise.
 const MOST_BLOCKS = 6000;
 
-/** Draws the newest map of obstacles. */
+/** The newest map of obstacles. */
 export class Obstacles {
   #three;
   #origin;
@@ -43,7 +43,7 @@ export class Obstacles {
     this.mesh.visible = false;
   }
 
-  /** @param {OccupancyFrame|null} map as the store has it */
+  /** @param {OccupancyFrame|null} map of the store */
   update(map) {
     if (map === this.#map) {
       return;
@@ -79,7 +79,7 @@ export class Obstacles {
 }
 
 /**
- * Join the occupied cells to blocks: along rows, and rows that are alike.
+ * Join the occupied cells to blocks, along rows and across equal rows.
  *
  * @param {Pick<OccupancyFrame, 'rows'|'columns'|'bits'>} map
  * @returns {Block[]} that hold each occupied cell once, MOST_BLOCKS at most

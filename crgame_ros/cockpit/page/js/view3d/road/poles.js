@@ -1,18 +1,18 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Where signs and traffic lights stand: at their places, but never on a lane. */
+/** Places of the poles of signs and traffic lights: as in the map, but never on a lane. */
 
 /** @import { Lanelet, Light, Scene, Sign } from '../../messages.js' */
 /** @import { RoadIndex } from './road_index.js' */
 
 /**
- * A pole with what is on it, for who drives the way `yaw`.
+ * A pole with its plates or lamps, for traffic with heading `yaw`.
  *
  * @typedef {object} Pole
  * @property {number} x
  * @property {number} y
  * @property {number} yaw [rad]
- * @property {boolean} hangs above the road, where there is no room beside it
+ * @property {boolean} hangs above the road, if there is no room beside it
  */
 
 /** @typedef {Pole & {plates: {kind: string, value: string}[]}} SignPole */
@@ -22,12 +22,12 @@
 const ROOM_M = 0.45;
 const FARTHEST_M = 14;
 const STEP_M = 0.25;
-// Nearer than this the same sign is not put up twice, for the same way [m].
+// Least distance of two equal signs for the same heading [m].
 const SAME_SIGN_M = 15;
 const LIGHTS_APART_M = 0.7;
 
 /**
- * Find a place for a pole: where the map has it, or else to the right of its readers, or the left.
+ * Find a place for a pole: as in the map, else to the right of its traffic, or the left.
  *
  * @param {{x: number, y: number, yaw: number}} wanted
  * @param {RoadIndex} index
@@ -49,8 +49,8 @@ export function poleAt({ x, y, yaw }, index) {
 /**
  * Place the signs of a scene.
  *
- * What the map says of each lanelet alone, as of most limits, one plate says to all lanes, where
- * it begins to hold.
+ * A sign that the map repeats for each lanelet, as most limits, gets one plate for all lanes,
+ * where it begins to apply.
  *
  * @param {Pick<Scene, 'signs'|'lanelets'>} scene the scene document
  * @param {RoadIndex} index of its lanelets
@@ -79,7 +79,7 @@ export function placeSigns({ signs, lanelets }, index) {
 }
 
 /**
- * Place the traffic lights of a scene; those at one place beside each other.
+ * Place the traffic lights of a scene; those at one place stand side by side.
  *
  * @param {Pick<Scene, 'lights'>} scene the scene document
  * @param {RoadIndex} index of its lanelets
@@ -99,7 +99,7 @@ export function placeLights({ lights }, index) {
   return placed;
 }
 
-/** Knows which signs say what a sign before, or beside, has said. */
+/** A record of signs, to find those that repeat a sign before or beside them. */
 class ToldBefore {
   /** @type {Map<number, Set<string>>} what the signs of a lanelet say */
   #said = new Map();
@@ -128,7 +128,7 @@ class ToldBefore {
 
   /**
    * @param {Sign} sign
-   * @returns {boolean} whether all of its readers know it already
+   * @returns {boolean} whether all of its lanelets have it already
    */
   has(sign) {
     const says = (/** @type {number} */ id) => this.#said.get(id)?.has(wordsOf(sign)) ?? false;

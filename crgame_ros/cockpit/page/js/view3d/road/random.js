@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Random numbers that are the same for the same seed, everywhere. */
+/** Random numbers that are reproducible from a seed on every machine. */
 
 /**
- * Begin a sequence.
+ * Start a sequence.
  *
  * @param {string} seed any text
- * @returns {() => number} gives the next number, from 0 to below 1
+ * @returns {() => number} returns the next number, from 0 to below 1
  */
 export function randomFrom(seed) {
   // FNV-1a for the text, mulberry32 (T. Ettinger) for the sequence.

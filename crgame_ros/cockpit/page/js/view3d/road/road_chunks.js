@@ -14,7 +14,7 @@ import { COLOR, pavementOf, RANK, reversed, RoadPaint } from './road_paint.js';
 
 const LEAST_CELL_M = 150;
 const MOST_CELL_M = 450;
-// Along the longer side of a map that is neither small nor large.
+// Chunks along the longer side of a medium-sized map.
 const CELLS = 5;
 const BANK_M = 2;
 
@@ -91,16 +91,16 @@ function addPavement(parts, lanelet, heights, triangulate) {
  * @param {Heights} heights
  */
 function addBank(parts, line, isLeft, heights) {
-  // From the outside one looks to its road.
+  // Visible from outside, facing away from the road.
   const seen = isLeft ? reversed(line) : line;
   parts.addWall(seen, (x, y) => heights(x, y) - BANK_M, heights, COLOR.bank);
 }
 
 /**
- * Triangulate a lanelet from bound to bound, as its heights are: between points abreast.
+ * Triangulate a lanelet from bound to bound, between points abreast, as its heights require.
  *
  * @param {Pick<Lanelet, 'left'|'right'>} lanelet
- * @returns {number[]} indices into its outline, which goes back along the right bound
+ * @returns {number[]} indices into its outline, which returns along the right bound
  */
 export function ladder({ left, right }) {
   const [there, back] = [sharesOf(left), sharesOf(right)];

@@ -1,20 +1,20 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Where the roads of a scene are: what stands beside them asks, and who drives on hills. */
+/** A spatial index of a scene's roads, for roadside objects and for heights. */
 
 import { boxOf, contains, outlineOf } from '../../outline.js';
 
 /** @import { Box, Lanelet } from '../../messages.js' */
 
 const CELL_M = 25;
-// A bound's own points are on the road, too [m].
+// Tolerance, because a bound's own points are on the road, too [m].
 const ON_M = 0.05;
-// So far beside a road its height is that of the land [m].
+// How far beside a road its height applies [m].
 const BESIDE_M = 60;
 
 /** @typedef {{lanelet: Lanelet, ring: number[], box: Box}} Place */
 
-/** Finds lanelets by place. */
+/** An index of lanelets by place. */
 export class RoadIndex {
   /** @type {Map<number, Map<number, Place[]>>} */
   #rows = new Map();
@@ -35,7 +35,7 @@ export class RoadIndex {
   }
 
   /**
-   * Return the lanelets whose box is not farther from a point than so much.
+   * Return the lanelets whose box is within a distance of a point.
    *
    * @param {number} x
    * @param {number} y
@@ -91,7 +91,7 @@ export class RoadIndex {
   }
 
   /**
-   * Give the height of the road: where bridges cross of the highest one, beside it of the nearest.
+   * Return the height of the road: of the highest bridge at a crossing, beside it of the nearest.
    *
    * @param {number} x
    * @param {number} y
@@ -142,7 +142,7 @@ export class RoadIndex {
 }
 
 /**
- * Return a lanelet's height at a point: between what both bounds have beside it.
+ * Return a lanelet's height at a point, interpolated between both bounds.
  *
  * @param {Lanelet} lanelet
  * @param {number} x

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What roads are paved with, by the types of their lanelets, and what is painted on them. */
+/** The pavement of roads, by the types of their lanelets, and their painted markings. */
 
 import { surfaceOf, zebraStripes } from '../../world/map_geometry.js';
 import { strokesOf } from '../../world/marking_strokes.js';
@@ -13,7 +13,7 @@ import { paintedPieces, stripOf } from './strips.js';
 /** @import { Heights, MeshParts, Rgb } from './mesh_parts.js' */
 /** @import { RoadIndex } from './road_index.js' */
 
-/** Of flat things the higher rank is on top. */
+/** Ranks of flat things: the higher one is on top. */
 export const RANK = { road: 1, special: 2, seam: 3, line: 4, across: 5 };
 
 /**
@@ -30,14 +30,14 @@ const STOP_LINE_M = 0.5;
 const WAIT_LINE_M = 0.3;
 /** @type {[number, number]} */
 const WAIT_DASH = [0.5, 0.25];
-// Where the centre line is yellow.
+// Countries with a yellow centre line.
 const YELLOW_CENTRES = ['USA', 'PRI', 'CAN', 'MEX', 'BRA', 'ARG', 'CHN'];
-// A kerb, or an edge of which nothing is known, ends where another lanelet begins.
+// A kerb, or an edge of unknown marking, ends where another lanelet begins.
 const STEP_M = 1.5;
 const WITHIN_M = 0.3;
 
 /**
- * Tell the pavement of a lanelet, and its rank.
+ * Return the pavement of a lanelet and its rank.
  *
  * @param {Pick<Lanelet, 'types'|'intersection'>} lanelet
  * @returns {[color: Rgb, rank: number]}
@@ -54,7 +54,7 @@ export function pavementOf(lanelet) {
   return [COLOR.road, RANK.road];
 }
 
-/** Paints the boundaries of a scene, and what lies across its lanes. */
+/** A painter of a scene's boundaries and of markings across its lanes. */
 export class RoadPaint {
   #index;
   #heights;
@@ -72,7 +72,7 @@ export class RoadPaint {
   }
 
   /**
-   * Paint, or build, what is along a boundary.
+   * Add the paint or kerb along a boundary.
    *
    * @param {MeshParts} parts
    * @param {Boundary} boundary
@@ -90,7 +90,7 @@ export class RoadPaint {
         this.#addStrips(parts, [line], stroke.width, COLOR.seam, RANK.seam);
       }
     }
-    // Of what nothing is known there is a worn line: without any, nobody could keep a lane.
+    // An unknown marking becomes a worn line: without any line, a driver could not keep the lane.
     if (boundary.marking === 'unknown' && !lanelet.intersection) {
       this.#addWorn(parts, boundary, lanelet);
     }
@@ -163,7 +163,7 @@ export class RoadPaint {
   }
 
   /**
-   * Return a line without what leads through lanelets other than those beside it.
+   * Return the pieces of a line that do not lead through other lanelets.
    *
    * @param {number[]} line
    * @param {Lanelet} lanelet
@@ -188,7 +188,7 @@ export class RoadPaint {
 }
 
 /**
- * Return whether a boundary parts two directions.
+ * Return whether a boundary separates two directions.
  *
  * @param {Boundary} boundary
  * @param {Lanelet} lanelet
@@ -216,7 +216,7 @@ export function densified(line, step) {
 }
 
 /**
- * Leave out the points of a line that lie between their neighbours.
+ * Return a line without the points that lie straight between their neighbours.
  *
  * @param {number[]} line flat polyline
  * @returns {number[]}
@@ -238,7 +238,7 @@ function straightened(line) {
 
 /**
  * @param {number[]} line flat polyline
- * @returns {number[]} from its end
+ * @returns {number[]} in reverse order
  */
 export function reversed(line) {
   const back = [];

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The world of the vehicles in the 3D view: roads and what stands at them, land, sky. */
+/** The surroundings in the 3D view: roads, roadside objects, land and sky. */
 
 import { localOrigin } from '../local_origin.js';
 import { Atmosphere } from './atmosphere.js';
@@ -23,7 +23,7 @@ import { TrafficLights } from './traffic_lights.js';
 
 const LAND_ORDER = 900;
 
-/** @typedef {typeof import('../three.js')} Three the library, as three.js exports it */
+/** @typedef {typeof import('../three.js')} Three the library three.js */
 /** @typedef {{x: number, y: number, z: number}} Point from the local origin [m] */
 
 /**
@@ -40,13 +40,13 @@ const LAND_ORDER = 900;
  * @property {(x: number, y: number) => number} heightAt of the road at a point of the map [m]
  * @property {(fine: boolean) => void} setFine see Detail
  * @property {number} triangles in the whole group, at most
- * @property {number} drawCalls at most, when all of it is seen
- * @property {number} build_ms what making it took
- * @property {() => void} dispose frees what the graphics card holds
+ * @property {number} drawCalls at most, if all of it is visible
+ * @property {number} build_ms build time
+ * @property {() => void} dispose frees the memory of the graphics card
  */
 
 /**
- * Make the world of a scene.
+ * Build the world of a scene.
  *
  * @param {Three} three the library
  * @param {Scene} scene the scene document
@@ -73,7 +73,7 @@ export function createRoadWorld(three, scene) {
   };
   const [tiles, plainTiles] = [land.tiles, land.plain].map((parts) => parts.map(meshOf));
   for (const mesh of [...tiles, ...plainTiles]) {
-    // After the roads: where they are, no land is computed.
+    // Drawn after the roads, so that the land under them is not computed.
     mesh.renderOrder = LAND_ORDER;
   }
   plainTiles.forEach((mesh) => { mesh.visible = false; });
@@ -129,13 +129,13 @@ export function createRoadWorld(three, scene) {
 
 /**
  * @param {Three} three
- * @returns {(ring: number[]) => number[]} gives three indices for each triangle of a polygon
+ * @returns {(ring: number[]) => number[]} returns three indices for each triangle of a polygon
  */
 function triangulator(three) {
   return (ring) => {
     const corners = [];
     for (let i = 0; i < ring.length; i += 2) {
-      // From its first point: float32 does not matter here, but far coordinates cancel badly.
+      // Relative to its first point, because large coordinates cause cancellation.
       corners.push(new three.Vector2(ring[i] - ring[0], ring[i + 1] - ring[1]));
     }
     return three.ShapeUtils.triangulateShape(corners, []).flat();

@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What stands beside the roads without the map saying so, by which one sees how fast one drives.
+ * Invented roadside objects, which are not in the map and convey the speed.
  *
- * Nothing of it stands on a lanelet, or hides one part of the roads around it from another: firs
- * and houses stand beyond a line that has all of these roads on its other side, or outside of the
- * map; other trees have no branches as low as drivers' eyes.
+ * None of them stands on a lanelet or blocks the view between roads around it. Firs and houses
+ * stand beyond a line that has all of these roads on its other side, or outside of the map. Other
+ * trees have no branches at the height of drivers' eyes.
  */
 
 import { collectBoundaries } from '../../world/boundaries.js';
@@ -20,15 +20,14 @@ import { densified } from './road_paint.js';
 /** @import { RoadIndex } from './road_index.js' */
 
 /**
- * Something that stands in the land: its middle in the map's coordinates, where it faces, and how
- * large it is.
+ * An object in the land: its middle in map coordinates, its direction and its size.
  *
  * @typedef {object} Stand
  * @property {number} x
  * @property {number} y
  * @property {number} yaw away from the road, of posts and lamps along it [rad]
  * @property {[length: number, width: number, height: number]} size [m]
- * @property {number} shade 0 to 1, by which colours differ
+ * @property {number} shade 0 to 1, variation of the colour
  */
 
 /** @typedef {Record<'posts'|'lamps'|'trees'|'firs'|'houses', Stand[]>} Roadside */
@@ -40,7 +39,7 @@ const LAMP_EVERY_M = 32;
 const LAMP_BESIDE_M = 0.9;
 const TREE_EVERY_M = 8;
 const HOUSE_EVERY_M = 13;
-/** Within this distance nothing hides roads from each other [m]. */
+/** Within this distance, no object blocks the view between roads [m]. */
 export const SIGHT_M = 60;
 const SIGHT_CELL_M = 30;
 const NEAREST_TREE_M = { motorway: 9, country: 4.5, town: 2.6 };
@@ -48,7 +47,7 @@ const GROUPS_AROUND = 90;
 const AROUND_M = 350;
 const TREE_SHARE = { motorway: 0.75, country: 0.65, town: 0.3 };
 
-/** Where roads are, to find those around a place. */
+/** Points of the roads, to find those around a place. */
 class RoadPoints {
   /** @type {Map<string, number[]>} */
   #cells = new Map();
@@ -73,7 +72,7 @@ class RoadPoints {
    *
    * @param {number} x of a point of the line
    * @param {number} y
-   * @param {number} yaw square to the line, to its far side [rad]
+   * @param {number} yaw normal of the line, to its far side [rad]
    */
   areBefore(x, y, yaw) {
     const cos = Math.cos(yaw);
@@ -95,13 +94,13 @@ class RoadPoints {
   }
 }
 
-/** Finds out whether something stands too near already. */
+/** A record of occupied circles. */
 class Taken {
   /** @type {Map<string, {x: number, y: number, radius: number}[]>} */
   #cells = new Map();
 
   /**
-   * Take a circle, unless another one touches it.
+   * Occupy a circle, unless another one touches it.
    *
    * @param {number} x
    * @param {number} y
@@ -125,7 +124,7 @@ class Taken {
 }
 
 /**
- * Place everything, always alike for the same scene.
+ * Place all objects, always alike for the same scene.
  *
  * @param {Pick<Scene, 'id'|'bounds'|'lanelets'>} scene the scene document
  * @param {RoadIndex} index of its lanelets
@@ -185,7 +184,7 @@ class Edge {
 
   /**
    * @param {number} spacing [m]
-   * @returns {number[]} distances along the line at which its road has a multiple of the spacing
+   * @returns {number[]} distances along the line at which the road's station is a multiple of the spacing
    */
   multiples(spacing) {
     const found = [];
@@ -198,10 +197,10 @@ class Edge {
 }
 
 /**
- * Count metres along the roads: a lanelet begins where one before it ends.
+ * Return the stations along the roads: a lanelet begins where its predecessor ends.
  *
  * @param {Lanelet[]} lanelets
- * @returns {Map<number, number>} of each start, by id [m]
+ * @returns {Map<number, number>} station of each start, by id [m]
  */
 export function stationsOf(lanelets) {
   const byId = new Map(lanelets.map((lanelet) => [lanelet.id, lanelet]));
@@ -288,7 +287,7 @@ function placeHouses(houses, edge, index, points, taken, random) {
     const front = beyond(edge.at(s), 4 + 5 * far);
     const pose = beyond(front, length / 2);
     const radius = Math.hypot(length, width) / 2;
-    // Its corners may be nearer to the road than its front's middle, where that bends.
+    // In a bend, its corners may be nearer to the road than the middle of its front.
     if (index.isClear(pose.x, pose.y, radius - 1) && points.areBefore(front.x, front.y, front.yaw)
         && taken.take(pose.x, pose.y, radius)) {
       houses.push({ ...pose, shade, size: [length, width, height] });
@@ -297,7 +296,8 @@ function placeHouses(houses, edge, index, points, taken, random) {
 }
 
 /**
- * Plant groups of trees outside of the map, which is convex: no line of sight leads there.
+ * Place groups of trees outside of the map's box, which is convex, so that no line of sight
+ * crosses them.
  *
  * @param {Roadside} roadside
  * @param {Box} bounds of the map
@@ -328,7 +328,7 @@ function placeAround({ trees, firs }, [xmin, ymin, xmax, ymax], taken, random) {
 
 /**
  * @param {EdgePose} pose
- * @param {number} distance the way it looks [m]
+ * @param {number} distance in its direction [m]
  * @returns {EdgePose}
  */
 function beyond({ x, y, yaw }, distance) {

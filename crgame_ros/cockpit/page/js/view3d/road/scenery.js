@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What stands beside roads: posts, lamps, trees and houses, of each kind those that are near. */
+/** Roadside objects: posts, lamps, trees and houses; of each kind, the near ones are drawn. */
 
 import { geometryOf } from './materials.js';
 import { NearInstances } from './near_instances.js';
@@ -19,7 +19,7 @@ const WALLS = [0xe6ddc9, 0xd9d3c6, 0xe9e4dc, 0xd8c3a2, 0xc9b49a, 0xdfe3e2];
 const NEAREST = { posts: [240, 700], lamps: [200, 500], trees: [420, 650], firs: [320, 650],
   houses: [220, 800] };
 
-/** Draws all of it. */
+/** The instances of all roadside objects. */
 export class Scenery {
   /** @type {NearInstances[]} */
   #kinds = [];

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The shapes of what stands beside roads; trees and houses are one unit large. */
+/** The shapes of roadside objects; trees and houses have unit size. */
 
 import { MeshParts } from './mesh_parts.js';
 
@@ -12,15 +12,15 @@ const COLOR = {
   lamp: [226, 224, 210], bark: [92, 74, 58], leaves: [255, 255, 255], wall: [255, 255, 255],
   roof: [120, 66, 54], window: [70, 84, 98],
 };
-// Corners of what is round.
+// Corners of round parts.
 const ROUND = 7;
-// Of what is small in the picture.
+// Corners of round parts that are small in the picture.
 const PLAIN_ROUND = 6;
 
 const shapeParts = () => new MeshParts({ x: 0, y: 0 });
 
 /**
- * Add a part that goes around the vertical: a trunk, a cone, a ball of a few rings.
+ * Add a body of revolution around the vertical: a trunk, a cone, a ball of a few rings.
  *
  * @param {MeshParts} parts
  * @param {[radius: number, height: number][]} profile from below
@@ -89,7 +89,7 @@ export function lamp() {
   return parts;
 }
 
-/** A tree: its crown begins above the eyes of who drives a car. */
+/** A tree, whose crown begins above the eyes of car drivers. */
 export function tree() {
   const parts = shapeParts();
   addRound(parts, [[0.05, -0.05], [0.035, 0.45]], COLOR.bark);

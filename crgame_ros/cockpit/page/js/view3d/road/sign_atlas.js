@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** All plates of a scene on one canvas, for one texture. */
+/** An atlas of all plates of a scene on one canvas, for one texture. */
 
 import { SYMBOLS } from './sign_symbols.js';
 
@@ -38,7 +38,7 @@ const OUTLINES = {
   wide: [-1, -0.5, 1, -0.5, 1, 0.5, -1, 0.5], tall: [-0.8, -1, 0.8, -1, 0.8, 1, -0.8, 1],
 };
 
-/** Draws each face once. */
+/** An atlas that draws each face once. */
 export class SignAtlas {
   canvas = document.createElement('canvas');
   /** @type {Map<string, Cell>} */
@@ -83,7 +83,7 @@ export class SignAtlas {
     if (known !== undefined) {
       return known;
     }
-    // Maps with more plates than there is room for share the last one.
+    // If a map has more plates than cells, the rest share the last cell.
     const at = Math.min(this.#cells.size, COLUMNS * ROWS - 1);
     const [column, row] = [at % COLUMNS, Math.floor(at / COLUMNS)];
     const context = /** @type {Context} */ (this.canvas.getContext('2d'));
@@ -112,7 +112,7 @@ function outline(context, shape, size) {
     context.arc(0, 0, size, 0, 2 * Math.PI);
   } else {
     const corners = OUTLINES[shape];
-    // Triangles shrink towards their middle, which lies a third above their base.
+    // Triangles shrink towards their centroid, a third above their base.
     const middle = shape === 'triangle' ? 0.29 : shape === 'yield' ? -0.29 : 0;
     for (let i = 0; i < corners.length; i += 2) {
       context.lineTo(size * corners[i], middle + size * (corners[i + 1] - middle));
@@ -227,7 +227,7 @@ function lines(context, text) {
 }
 
 /**
- * Write text as large as it fits.
+ * Write text as large as fits.
  *
  * @param {Context} context
  * @param {string} text

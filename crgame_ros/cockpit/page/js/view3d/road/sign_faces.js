@@ -1,16 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
 /**
- * What the plate of a sign looks like, by the name that commonroad-io gives its kind.
+ * The look of a sign's plate, by commonroad-io's name of its kind.
  *
- * The names are those of TrafficSignIDGermany, which the enumerations of other countries share as
- * far as they know the sign, and of TrafficSignIDUsa.
+ * The names are those of TrafficSignIDGermany, which the enumerations of other countries share for
+ * common signs, and of TrafficSignIDUsa.
  */
 
 /** @typedef {'circle'|'triangle'|'yield'|'octagon'|'diamond'|'square'|'wide'|'tall'} PlateShape */
 
 /**
- * A plate: its outline, how that is painted, and what is on it.
+ * A plate: its outline, its style and its content.
  *
  * @typedef {object} Face
  * @property {PlateShape} shape
@@ -34,10 +34,10 @@ const blue = (symbol, text = '') => ({ shape: 'square', style: 'blue', symbol, t
 const wide = (style, text) => ({ shape: 'wide', style, symbol: '', text });
 
 const KMH = 3.6;
-// Limits are multiples of this, which files round [km/h].
+// Limits are multiples of this; files contain rounded values [km/h].
 const EVEN_KMH = 5;
 const NEARLY_KMH = 0.3;
-// Other words on a plate than its name, at most so many letters.
+// Most letters of a name on a plate.
 const LONGEST = 24;
 
 /** @type {Record<string, (value: string, country: string) => Face>} */
@@ -119,10 +119,10 @@ const FACES = {
 /**
  * Return the plate of a sign.
  *
- * @param {string} kind as commonroad-io names it
- * @param {string} value what it says besides, as in the file
+ * @param {string} kind name in commonroad-io
+ * @param {string} value additional value, as in the file
  * @param {string} country three letters
- * @returns {Face} for a kind that has no drawing a white plate with its name
+ * @returns {Face} for an unknown kind, a white plate with its name
  */
 export function faceOf(kind, value, country) {
   if (Object.hasOwn(FACES, kind)) {
@@ -137,10 +137,10 @@ export function faceOf(kind, value, country) {
 }
 
 /**
- * Write a speed as signs do.
+ * Return a speed as written on signs.
  *
  * @param {string} value [m/s], as the file has it
- * @returns {string} [km/h], a multiple of 5 if it is nearly one; what is no number as it is
+ * @returns {string} [km/h], a multiple of 5 if it is nearly one; other text unchanged
  */
 export function speedText(value) {
   const kmh = Number(value) * KMH;

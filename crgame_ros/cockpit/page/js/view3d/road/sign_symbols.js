@@ -31,7 +31,7 @@ function dot(context, x, y, radius) {
 }
 
 /**
- * An arrow upwards, turned by so many quarters to the right.
+ * Draw an upward arrow, turned by some quarter turns to the right.
  *
  * @type {(context: Context, quarters: number) => void}
  */
@@ -43,7 +43,7 @@ function arrow(context, quarters) {
 }
 
 /**
- * An arrow that turns: up, then to a side.
+ * Draw an arrow that leads up, then to a side.
  *
  * @type {(context: Context, side: number) => void}
  */

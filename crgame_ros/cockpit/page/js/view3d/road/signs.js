@@ -18,7 +18,7 @@ import { faceOf } from './sign_faces.js';
 /** @import { Sight } from '../seen_instances.js' */
 /** @typedef {typeof import('../three.js')} Three */
 
-// Lower edges of the lowest plate, and of one above a road [m].
+// Heights of the lower edge of the lowest plate, and of one above a road [m].
 const LOWEST_M = 2.0;
 const HANGING_M = 5.2;
 const GAP_M = 0.06;
@@ -32,7 +32,7 @@ const STEEL = 0x8f9499;
 const MOST_POLES = 400;
 const REACH_M = 600;
 
-/** Draws all signs of a scene. */
+/** All signs of a scene. */
 export class Signs {
   #texture;
   #plates;
@@ -59,7 +59,7 @@ export class Signs {
     this.#texture = plateTexture(three, atlas.canvas);
     this.#plates = new three.Mesh(quads.geometry(three), new three.MeshLambertMaterial({
       map: this.#texture, alphaTest: 0.5,
-      // Signs throw light back, and are read at dusk.
+      // Signs are retroreflective, and readable at dusk.
       emissive: 0xffffff, emissiveMap: this.#texture, emissiveIntensity: 0.22 }));
     const shape = new MeshParts({ x: 0, y: 0 });
     addRound(shape, [[0.038, -0.3], [0.038, 1]], [255, 255, 255]);
@@ -154,9 +154,9 @@ export class PlateQuads {
    * @param {number} x of its middle
    * @param {number} y
    * @param {number} z [m]
-   * @param {number} yaw the way that those look who see it [rad]
+   * @param {number} yaw heading of the traffic that sees it [rad]
    * @param {number} size [m]
-   * @param {Cell} cell what is on it
+   * @param {Cell} cell its picture
    */
   add(x, y, z, yaw, size, [u0, v0, u1, v1]) {
     const left = { x: -Math.sin(yaw) * size / 2, y: Math.cos(yaw) * size / 2 };

@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Painted lines as strips of their width, cut into their dashes. */
+/** Conversion of painted lines to strips of their width, cut into dashes. */
 
 import { addDashes, shifted } from '../../world/polyline.js';
 
 /** @import { Dash } from '../../world/marking_strokes.js' */
 
-/** Takes in what `addDashes` draws: each piece as a flat polyline. */
+/** A path that collects the pieces of `addDashes` as flat polylines. */
 class Pieces {
   /** @type {number[][]} */
   list = [];
@@ -29,7 +29,7 @@ class Pieces {
 }
 
 /**
- * Cut a line into what is painted of it.
+ * Return the painted pieces of a line.
  *
  * @param {number[]} line flat polyline [m]
  * @param {Dash|null} dash null for all of it
@@ -41,7 +41,7 @@ export function paintedPieces(line, dash) {
   }
   const pieces = new Pieces();
   addDashes(pieces, line, 0, 0, ...dash);
-  // Where a line ends with a gap, a dash was begun that has one point only.
+  // If a line ends with a gap, the last dash has only one point.
   return pieces.list.filter((piece) => piece.length > 2);
 }
 

@@ -17,7 +17,7 @@ import { SYMBOLS } from './sign_symbols.js';
 /** @import { Sight } from '../seen_instances.js' */
 /** @typedef {typeof import('../three.js')} Three */
 
-/** Lamps from above, and which of them each state lights. */
+/** Lamps from the top, and the lit ones of each state. */
 export const LAMPS = /** @type {const} */ (['red', 'yellow', 'green']);
 /** @type {Record<string, readonly string[]|undefined>} */
 export const LIT = { red: ['red'], redYellow: ['red', 'yellow'], yellow: ['yellow'],
@@ -38,7 +38,7 @@ const ARROWS = { left: ['across-left'], right: ['across-right'], straight: ['up'
   leftStraight: ['across-left', 'up'], straightRight: ['up', 'across-right'],
   leftRight: ['across-left', 'across-right'], all: [] };
 
-/** Draws all traffic lights of a scene. */
+/** All traffic lights of a scene. */
 export class TrafficLights {
   #three;
   #lights;
@@ -139,7 +139,7 @@ export class TrafficLights {
 }
 
 /**
- * Draw what a lamp shines through, by direction.
+ * Draw the masks of lamps, by direction.
  *
  * @returns {{canvas: HTMLCanvasElement, cells: Record<string, Cell>}}
  */
