@@ -101,10 +101,7 @@ class Check:
 
 
 def run_checks(runs: Path | None = None) -> list[Check]:
-    """
-    Return the results of all checks, after some seconds; recordings go to `runs`, by default
-    ./runs.
-    """
+    """Run all checks, in some seconds; recordings go to `runs`, by default ./runs."""
     prepare_environment()
     return [check_python(), *check_packages(share_directory()),
             check_imports(), check_page_libraries(), check_ros(), check_profile(), check_devices(),

@@ -1,8 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The JavaScript libraries of pages, three.js and Plotly: their folder, and fetching them by npm.
-"""
+"""The JavaScript libraries of pages, three.js and Plotly: their folder, and fetching by npm."""
 
 from collections.abc import Iterator, Sequence
 import hashlib

@@ -134,7 +134,7 @@ class ModelRegistry:
                 path, f'crgame_ros_user_{self.kind.replace(" ", "_")}_{path.stem}')
         except Exception as error:
             raise InputError(f'cannot be read ({type(error).__name__}: {error})', label,
-                             'mend the file') from error
+                             'correct the file') from error
         return _attribute(module, attribute, label)
 
 
@@ -169,8 +169,8 @@ def _from_module(target: str, label: str) -> Any:
                              'apt install gcc python3-dev, then delete .venv') from error
         package = isinstance(error, ImportError) and PACKAGES.get((error.name or '').split('.')[0])
         if package:
-            raise InputError(f'needs the package {package}, which does not come by itself', label,
-                             planner_packages_install()) from error
+            raise InputError(f'needs the package {package}, which is not installed with crgame_ros',
+                             label, planner_packages_install()) from error
         raise InputError(f'cannot import {module_name} ({type(error).__name__}: {error})',
                          label, 'check the name and what it imports') from error
     return _attribute(module, attribute, label)

@@ -92,7 +92,7 @@ def _check(values: argparse.Namespace) -> None:
     if values.latency < 0:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     if values.live and (values.latency or values.human != 'inputs'):
-        raise InputError('repeats the inputs, and planners take the time they take', '--live',
+        raise InputError('always repeats the inputs, with real computing times', '--live',
                          'leave --latency and --human out')
     if values.headless and not values.live:
         raise InputError('goes with --live', '--headless')

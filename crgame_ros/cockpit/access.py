@@ -55,7 +55,7 @@ class Access:
 
     @property
     def refusal(self) -> str:
-        """Return the text that tells a browser without a cookie what to do."""
+        """Return the instruction for a browser without a cookie."""
         return WITH_TOKEN if self.invitations is None else UNKNOWN
 
     def at_port(self, port: int) -> 'Access':
@@ -105,7 +105,7 @@ class Access:
 
     def rights(self, cookie: str | None) -> Rights | None:
         """
-        Return what a browser may do.
+        Return the rights of a browser.
 
         :param cookie: the cookie that it presents.
         :return: None if it is not admitted.

@@ -144,7 +144,7 @@ class WatchedSite(web.BaseSite):
         return f'{"https" if self._ssl_context else "http"}://{self._host}:{self._port}'
 
     async def start(self) -> None:
-        """Begin to listen."""
+        """Start listening."""
         await super().start()
         server = self._runner.server
         assert server is not None

@@ -48,7 +48,7 @@ def encode_state(epoch: int, n: int, k: int, t: float, vehicles: ArrayLike) -> b
     :param vehicles: (V, 13) x, y [m], yaw [rad] of the rear axle, speed [m/s], steering angle
         [rad], acceleration [m/s^2], yaw rate, steering rate [rad/s], then the command in force:
         throttle, brake, steering, reverse, lights (bits: 1 left indicator, 2 right indicator,
-        4 horn); NaN where there is none.
+        4 horn); NaN if there is none.
     :raises InputError: if the array has another width.
     """
     return _rows(FrameKind.STATE, epoch, n, k, t, (), vehicles, STATE_COLUMNS)

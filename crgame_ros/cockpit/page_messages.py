@@ -289,7 +289,7 @@ def _axis(value: Any, low: float) -> float:
 
 
 def _words(message: Mapping[str, Any], field: str, length: int = MAX_DEVICE) -> str:
-    """Read a text that others will see; empty if there is none."""
+    """Return a text that others will see; empty if there is none."""
     value = message.get(field, '')
     if not isinstance(value, str):
         raise _wrong(field, 'is no text')

@@ -67,7 +67,7 @@ class SensorMounts:
             self._states.popitem(last=False)
 
     def sensor(self, frame_id: str) -> tuple[str, Mount] | None:
-        """Return AV and mount of a sensor by its frame `<av>/<sensor>`; None if there is none."""
+        """Return AV and mount of a sensor by its frame `<av>/<sensor>`; None if it is unknown."""
         av, _, name = frame_id.partition('/')
         mount = self._mounts.get(av, {}).get(name)
         return None if mount is None else (av, mount)

@@ -58,7 +58,7 @@ class Rights:
         """
         deed = _DEEDS.get(action or kind, '')
         if kind == 'control' and action == 'start' and (self.directs or self.drives):
-            # A driver may report that they are ready; other requests are refused later.
+            # A driver starts to report ready; the handler of the order refuses any other start.
             return ''
         if kind == 'runs' and not (self.directs or self.drives):
             return f'only a driver or a director can look at past runs; you are a {self.role}'

@@ -13,7 +13,7 @@ from crgame_ros.messages.status_values import Status, status_truth
 OK, ERROR = 0, 2
 # Late traffic is reported at each late tick, and its end is never reported [s].
 LATE_TRAFFIC_S = 2.0
-# A vehicle stopped by a contact that touches the same object within this time has one contact [s].
+# A stopped vehicle that touches the same object again within this time has one contact [s].
 SAME_CONTACT_S = 1.0
 _WORST, _OF, _THRESHOLD = 'worst_', '_of', 'threshold_'
 TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')

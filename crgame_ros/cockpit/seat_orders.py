@@ -50,7 +50,7 @@ class SeatOrders:
             self._orders[seat] = _Order(demand, now_s, now_s)
 
     def answered(self, seats: Seats, tenants: Tenants) -> None:
-        """Remove the orders that the new content of `/seats` fulfils."""
+        """Remove the orders that the new content of `/seats` fulfils or makes void."""
         self._orders = {
             seat: order for seat, order in self._orders.items()
             if seat in seats and not _is_so(order.demand, seats[seat], tenants.get(seat))

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which objects every driven vehicle touches (CRG III-D a).
+Finds the objects that each driven vehicle touches (CRG III-D a).
 
-Far objects are sorted out by their enclosing circles on arrays, near ones are tested by the
-CommonRoad drivability checker. The narrow test works relative to the vehicle, so that it stays
-exact on maps whose coordinates are large.
+A broad test on arrays excludes far objects by their enclosing circles; the CommonRoad drivability
+checker tests near ones. This narrow test uses coordinates relative to the vehicle, so that it
+stays exact on maps with large coordinates.
 """
 
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ from crgame_ros.geometry.rigid_transform import Pose
 from crgame_ros.geometry.shape import Shape
 import numpy as np
 
-# Enclosing circles of objects that only just touch may miss each other by rounding.
+# Enclosing circles of objects that barely touch may miss each other by rounding.
 CIRCLE_SLACK = 1e-6
 
 
 class CollisionDetector:
     """
-    Tests V driven vehicles against each other and against M other objects.
+    A collision test of V driven vehicles against each other and against M other objects.
 
     :param driven: (V) shapes of the driven vehicles.
     :param others: (M) shapes of all other objects, in the order of their states.
@@ -46,9 +46,9 @@ class CollisionDetector:
 
     def set_objects(self, states: ObjectStates) -> None:
         """
-        Take the poses and velocities of the other objects at a scenario tick.
+        Set the poses and velocities of the other objects at a scenario tick.
 
-        :raises InputError: if there are more or fewer than were announced.
+        :raises InputError: if their number is not M.
         """
         expected = (len(self._others), 3)
         if states.poses.shape != expected or states.velocities.shape != expected:
@@ -59,7 +59,7 @@ class CollisionDetector:
         self._velocities[:] = states.velocities.T
 
     def move(self, seconds_since_tick: float) -> None:
-        """Carry the other objects on from the tick at their velocities [s]."""
+        """Move the other objects on from the tick at their velocities [s]."""
         if self._others:
             np.multiply(self._velocities, seconds_since_tick, out=self._moved)
             self._moved += self._poses
@@ -67,11 +67,11 @@ class CollisionDetector:
     def hits(self, centers: Sequence[Pose]
              ) -> tuple[list[list[int]], list[list[int]]]:
         """
-        Find who touches whom; a pose with NaN is an absent vehicle and touches nobody.
+        Find all contacts; a pose with NaN is an absent vehicle and touches nothing.
 
         :param centers: (V) centre x [m], y [m], yaw [rad] of the driven vehicles.
-        :return: for every driven vehicle the indices of the driven vehicles it touches, and for
-            every driven vehicle those of the other objects.
+        :return: for every driven vehicle the indices of the driven vehicles that it touches, and
+            for every driven vehicle those of the other objects.
         """
         among: list[list[int]] = [[] for _ in centers]
         with_others: list[list[int]] = []
@@ -87,7 +87,7 @@ class CollisionDetector:
         dx, dy = other_pose[0] - pose[0], other_pose[1] - pose[1]
         own, other = self._driven[index], self._driven[other_index]
         reach = own.radius + other.radius + CIRCLE_SLACK
-        # Written so that NaN is far away.
+        # In this form, NaN counts as far away.
         return dx * dx + dy * dy <= reach * reach and math.isfinite(pose[2] + other_pose[2]) \
             and _overlap(own.at(0.0, 0.0, pose[2]), other.at(dx, dy, other_pose[2]))
 

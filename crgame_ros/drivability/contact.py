@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a contact of two bodies was: where it touched, of which kind, and who could have avoided it.
+Classifies a contact of two bodies: the side touched, the kind, and whether it was avoidable.
 
-The kinds are those of nuPlan's closed-loop score. Whether somebody could have avoided a contact is
-answered by driving again: had he braked with his full deceleration from the moment the other was
-in his way, would they have touched? The other does what it did.
+The kinds are those of nuPlan's closed-loop score. A contact is avoidable by a body if the motion,
+computed again, has no contact when the body brakes with its full deceleration from the moment
+the other was in its way. The other body moves as it did.
 """
 
 from dataclasses import dataclass
@@ -24,22 +24,22 @@ FloatArray: TypeAlias = NDArray[np.float64]
 Side: TypeAlias = Literal['front', 'rear', 'left', 'right']
 Kind: TypeAlias = Literal['stopped ego', 'stopped track', 'active front', 'rear', 'lateral']
 
-# How far before and behind the contact is looked at [s], and how finely.
+# Times before and after the contact that are examined, and their sampling [s].
 _BEFORE_S, _AFTER_S, _STRIDE_S = 10.0, 3.0, 0.02
-# The way of a body reaches so far beyond its last footprint [m].
+# A body's swept area reaches this far beyond its last footprint [m].
 _BEYOND = 0.5
 
 
 @dataclass(frozen=True)
 class Course:
     """
-    How a body moved.
+    The motion of a body.
 
     :param shape: its footprint around the centre.
-    :param poses: (n, 3) of its centre x [m], y [m], yaw [rad] at each step; NaN where absent.
+    :param poses: (n, 3) its centre's x [m], y [m], yaw [rad] at each step; NaN where absent.
     :param speeds: (n) [m/s]
-    :param braking: the deceleration that it can brake with; 0 if it cannot [m/s^2]
-    :param reaction_s: time until it brakes [s]
+    :param braking: its greatest deceleration; 0 if it cannot brake [m/s^2]
+    :param reaction_s: reaction time until it brakes [s]
     """
 
     shape: Shape
@@ -51,10 +51,10 @@ class Course:
 
 def touched_side(mine: Course, other: Course, step: int) -> Side:
     """
-    Return which side of a body another touched.
+    Return the side of a body that another touched.
 
-    That side beyond which all of the other was, furthest, one step before; where they overlapped
-    from the start, the one through which the way out is shortest.
+    It is the side beyond which the whole other body was one step before, by the largest distance.
+    If they overlapped from the start, it is the side through which the way out is shortest.
 
     :param step: the first at which they touch.
     """
@@ -74,11 +74,11 @@ def touched_side(mine: Course, other: Course, step: int) -> Side:
 
 def kind_of(speed: float, other_speed: float, side: Side) -> Kind:
     """
-    Name a contact as nuPlan does.
+    Return the kind of a contact as nuPlan defines it.
 
-    :param speed: of the vehicle that is judged (the ego) [m/s]
-    :param other_speed: of what it touches (the track) [m/s]
-    :param side: of the vehicle that is judged.
+    :param speed: speed of the vehicle that is judged (the ego) [m/s]
+    :param other_speed: speed of the body that it touches (the track) [m/s]
+    :param side: side touched of the vehicle that is judged.
     """
     if abs(speed) <= REST:
         return 'stopped ego'
@@ -89,12 +89,13 @@ def kind_of(speed: float, other_speed: float, side: Side) -> Kind:
 
 def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
     """
-    Return whether a body would not have touched another, had it braked when that was in its way.
+    Return whether a body could have avoided the contact by braking when the other was in its way.
 
-    It brakes along the path that it took, from its reaction time after the other came into that
-    path (ahead of it, up to where they touched) and stayed, and is then never faster than it was.
-    False for what cannot brake, and where the other was never in its way: whoever is hit from
-    behind or from the side cannot brake it away. Steering is not considered.
+    The other is in its way once it came into the path ahead, up to the place of contact, and
+    stayed there. After its reaction time the body brakes along the path that it took, and is then
+    never faster than it was. The result is False for a body that cannot brake, and where the
+    other was never in its way: braking does not help against a hit from behind or from the side.
+    Steering is not considered.
 
     :param step: the first at which they touch.
     :param dt_s: time between the steps [s]
@@ -121,7 +122,7 @@ def could_avoid(mine: Course, other: Course, step: int, dt_s: float) -> bool:
 
 def _in_the_way_since(mine: Course, other: Course, step: int, stride: int,
                       most: int) -> int | None:
-    """Find the first step of those, up to the contact, at which the other is in my way."""
+    """Find the first step of the last interval before the contact with the other in the way."""
     since = None
     for index in range(step - stride, max(step - most, 0) - 1, -stride):
         if not np.isfinite((mine.poses[index], other.poses[index])).all() \
@@ -132,7 +133,7 @@ def _in_the_way_since(mine: Course, other: Course, step: int, stride: int,
 
 
 def _way(mine: Course, first: int, last: int, stride: int) -> shapely.Geometry:
-    """Return what a body covers from its centre at one step to beyond its front at another."""
+    """Return the area that a body sweeps from its centre at one step to its front at another."""
     centers = mine.poses[[*range(first, last, stride), last]]
     yaw = float(centers[-1, 2])
     reach = 0.5 * mine.shape.length + _BEYOND

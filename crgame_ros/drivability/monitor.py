@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The drivability of every driven vehicle at one simulation step (CRG III-D).
+Checks the drivability of every driven vehicle at each simulation step (CRG III-D).
 
-Live in its node and offline in lockstep the same code runs. States come in simulation coordinates.
-A contact is judged there, for a rigid transform of all changes none; the road, which no transform
-moves, is looked at through the vehicle's (CRG 28).
+The same code runs live in its node and offline in lockstep. States are in simulation coordinates.
+Contacts are checked in these coordinates, because a rigid transform of all bodies changes none.
+The road is checked in scenario coordinates, through the vehicle's transform (CRG 28).
 """
 
 from collections.abc import Sequence
@@ -34,7 +34,8 @@ class VehicleDrivability(NamedTuple):
     :param vehicle_id: hv0, av0, …
     :param collision: True while its footprint touches another object's.
     :param off_road: True while a part of its footprint is off the road.
-    :param hit: sorted ids of what it touches, and last `PERMANENT_OBSTACLE` for any curb or fence.
+    :param hit: sorted ids of the bodies it touches, and last `PERMANENT_OBSTACLE` for any curb or
+        fence.
     :param n: simulation step of the states that were checked.
     :param stop_requested: True if this is a human's violation and violations end the run.
     """
@@ -48,12 +49,12 @@ class VehicleDrivability(NamedTuple):
 
     @property
     def is_valid(self) -> bool:
-        """Return whether nothing is violated."""
+        """Return whether there is no violation."""
         return not (self.collision or self.off_road)
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Return what is violated, for people."""
+        """Return the violations as text."""
         return tuple(text for wrong, text in (
             (self.collision, 'collision with ' + ', '.join(self.hit)),
             (self.off_road, 'off the road')) if wrong)
@@ -61,15 +62,15 @@ class VehicleDrivability(NamedTuple):
 
 class DrivabilityMonitor:
     """
-    Checks humans and AVs against each other, all other objects, permanent obstacles and the road.
+    A check of driven vehicles against each other, other objects, permanent obstacles and the road.
 
     :param driven: (V) the driven vehicles, in the order of their states.
     :param others: (M) everything else that can appear, in the order of its states.
     :param lanelet_network: the road; None leaves the road unchecked.
-    :param spec: which checks run, and whether a human's violation asks for a stop.
-    :param occupancy: the map of permanent obstacles, if there is one; to touch one is a collision.
+    :param spec: which checks run, and whether a human's violation requests a stop.
+    :param occupancy: the map of permanent obstacles, if there is one; touching one is a collision.
     :param transforms: (V) from simulation to the scenario coordinates in which each is checked
-        against the road (`road_transforms`); none are the identity.
+        against the road (`road_transforms`); empty for the identity.
     """
 
     def __init__(self, driven: Sequence[ObjectDescription], others: Sequence[ObjectDescription],
@@ -99,7 +100,7 @@ class DrivabilityMonitor:
 
     @property
     def changed(self) -> tuple[VehicleDrivability, ...]:
-        """Return those of them that say something new (`changes`)."""
+        """Return the verdicts that differ from the previous ones (`changes`)."""
         return self._changed
 
     @property
@@ -109,7 +110,7 @@ class DrivabilityMonitor:
 
     def prepare(self, vehicle_states: NDArray[np.float64]) -> None:
         """
-        Make road boundary and map ready around the vehicles; call it at setup, never in a cycle.
+        Prepare road boundary and map around the vehicles; call it at setup, never in a cycle.
 
         :param vehicle_states: (V, 8) rear-axle states, columns as in `StateColumn`.
         """
@@ -123,7 +124,7 @@ class DrivabilityMonitor:
 
     def observe(self, n: int, since_tick_s: float, vehicle_states: NDArray[np.float64],
                 objects: ObjectStates | None) -> None:
-        """Judge a published state (`RunObserver`)."""
+        """Check a published state (`RunObserver`)."""
         if objects is not None:
             self.set_objects(objects)
         before, self._verdicts = self._verdicts, self.check(n, since_tick_s, vehicle_states)
@@ -131,12 +132,12 @@ class DrivabilityMonitor:
         self._violations.extend(self._changed)
 
     def report(self) -> tuple[VehicleDrivability, ...]:
-        """Return every verdict that said something new, in order."""
+        """Return all changed verdicts so far, in order."""
         return tuple(self._violations)
 
     def set_objects(self, states: ObjectStates) -> None:
         """
-        Take the other objects' states at a scenario tick.
+        Set the other objects' states at a scenario tick.
 
         :param states: (M) poses and velocities in the order of `others`.
         :raises InputError: if their number is not that of `others`.
@@ -147,10 +148,10 @@ class DrivabilityMonitor:
     def check(self, n: int, seconds_since_tick: float, vehicle_states: NDArray[np.float64]
               ) -> tuple[VehicleDrivability, ...]:
         """
-        Judge every driven vehicle; other objects move on at their velocities since the tick.
+        Check every driven vehicle; other objects move on at their velocities since the tick.
 
-        Before the first `set_objects` nothing but the driven vehicles is there. A vehicle with
-        NaN in its pose is absent and valid.
+        Before the first `set_objects` there are only driven vehicles. A vehicle with NaN in its
+        pose is absent and valid.
 
         :param n: simulation step.
         :param seconds_since_tick: simulated time since the states of `set_objects` [s]
@@ -171,7 +172,7 @@ class DrivabilityMonitor:
         return tuple(verdicts)
 
     def _centers(self, vehicle_states: NDArray[np.float64]) -> list[tuple[float, float, float]]:
-        """Find x, y and yaw of the vehicles' centres."""
+        """Return x, y and yaw of the vehicles' centres."""
         if vehicle_states.shape != (len(self._ids), STATE_WIDTH):
             raise InputError(f'states of shape {vehicle_states.shape} for {len(self._ids)} '
                              'driven vehicles', 'vehicle states',
@@ -215,11 +216,11 @@ class DrivabilityMonitor:
 
 def road_transforms(humans: int, avs: Sequence[RigidTransform]) -> tuple[RigidTransform, ...]:
     """
-    Choose through which transform each driven vehicle is checked against the road (CRG 28).
+    Return the transform with which each driven vehicle is checked against the road (CRG 28).
 
-    An AV's is its own; humans take that of the first AV, for the paper has but one.
+    An AV has its own; humans use that of the first AV, because the paper has only one AV.
 
-    :return: of the humans, then of the AVs.
+    :return: transforms of the humans, then of the AVs.
     """
     return (*[avs[0] if avs else RigidTransform()] * humans, *avs)
 
@@ -227,7 +228,7 @@ def road_transforms(humans: int, avs: Sequence[RigidTransform]) -> tuple[RigidTr
 def changes(previous: Sequence[VehicleDrivability], current: Sequence[VehicleDrivability]
             ) -> tuple[VehicleDrivability, ...]:
     """
-    Pick the verdicts that say something new: all at first, then those that differ in more than n.
+    Return the changed verdicts: all at first, then those that differ in more than n.
 
     :param previous: verdicts reported last, empty at the start.
     :param current: verdicts of this step.

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which driven vehicles touch a permanent obstacle: a curb, a fence (CRG III-D a, FS II-A2).
+Finds driven vehicles that touch a permanent obstacle: a curb, a fence (CRG III-D a, FS II-A2).
 
-The obstacles are the occupied cells, as squares: nothing is rounded here, so that a verdict is as
+The obstacles are the occupied cells, as squares. Nothing is rounded here, so that a verdict is as
 exact as the map.
 """
 
@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# What a vehicle has hit, where other objects have an id.
+# Stands for the id of the object hit.
 PERMANENT_OBSTACLE = 'permanent obstacle'
-# Depth up to which a footprint and a cell only touch [m]; the rounding of map coordinates.
+# An overlap up to this depth is not a contact [m]: the rounding of map coordinates.
 CONTACT = 1e-6
 
 
 class PermanentObstacles:
     """
-    Tests driven vehicles against an occupancy map.
+    A test of driven vehicles against an occupancy map.
 
-    A check looks only at the cells under the box around the footprint: some 10 microseconds, and
-    some 10 more where one of them is occupied.
+    A check reads only the cells under the box around the footprint. It takes some 10 microseconds,
+    and some 10 more if one of them is occupied.
 
     :param occupancy: the map.
     :param shapes: (V) shapes of the driven vehicles.
@@ -43,7 +43,7 @@ class PermanentObstacles:
         """
         Return whether the footprint of a vehicle overlaps an occupied cell.
 
-        :param index: of the vehicle.
+        :param index: index of the vehicle.
         :param center: x [m], y [m], yaw [rad] of its centre; NaN: it is absent and hits nothing.
         :raises InputError: if the map cannot be read any more.
         """
@@ -65,7 +65,7 @@ class PermanentObstacles:
         cells = _occupied_cells(grid, (x - half_x, y - half_y, x + half_x, y + half_y))
         if not len(cells):
             return False
-        # Relative to the vehicle the numbers are small.
+        # Relative to the vehicle, numbers are small and rounding errors negligible.
         cells -= x, y
         if shape.kind == 'rectangle':
             return _rectangle_overlaps(cells, grid.resolution, shape, yaw, (half_x, half_y))
@@ -74,7 +74,7 @@ class PermanentObstacles:
 
 def _occupied_cells(grid: OccupancyGrid, box: tuple[float, float, float, float]
                     ) -> NDArray[np.float64]:
-    """Find the centres (n, 2) of the occupied cells that a box touches [m]."""
+    """Return the centres (n, 2) of the occupied cells that a box touches [m]."""
     rows, columns = grid.occupied.shape
     x, y = grid.origin
     left = max(0, math.floor((box[0] - x) / grid.resolution))
@@ -93,7 +93,7 @@ def _occupied_cells(grid: OccupancyGrid, box: tuple[float, float, float, float]
 
 def _rectangle_overlaps(cells: NDArray[np.float64], resolution: float, shape: Shape, yaw: float,
                         half: tuple[float, float]) -> bool:
-    """Look for an axis that separates the rectangle from each cell: its own two, or x and y."""
+    """Return whether a rectangle overlaps any cell: no axis (its own two, x, y) separates them."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     along = np.abs(cells @ (cos, sin))
     across = np.abs(cells @ (-sin, cos))

@@ -174,7 +174,7 @@ def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore
     if name == OWN:
         return GridPlanner(label, None, '')
     if name == EXTERNAL:
-        raise InputError('an external planner answers live runs only', 'planners',
+        raise InputError('an external planner works in live runs only', 'planners',
                          'name another planner')
     create_planner(name, options)
     return GridPlanner(label, with_contents({'planner': name, 'options': options}, store),

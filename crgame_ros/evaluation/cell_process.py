@@ -32,7 +32,7 @@ _ONE_THREAD = dict.fromkeys((
 # Length of the output of a cell that is reported when its process died [bytes].
 _TOLD_BYTES = 2000
 _STARTS_S, _ENDS_S = 120.0, 5.0
-# Each thread of a worker has its own process: a worker with several computes several cells at once.
+# Each thread of a worker has its own process, so that several cells are computed at once.
 _OF_THREAD = threading.local()
 
 
@@ -106,7 +106,7 @@ class CellProcess:
                 env=os.environ | _ONE_THREAD)
             assert self._process.stdout is not None
             with suppress(OSError, EOFError, TimeoutError):
-                # The process reports when it has loaded all modules, which no cell's time includes.
+                # The process reports when its modules are loaded: no cell's time includes that.
                 _read(self._process.stdout, _STARTS_S)
         return self._process
 

@@ -124,7 +124,7 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
 
 
 def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
-    """Return the failures of planners' code; the cell fails if such a planner never sent a plan."""
+    """Return failures of planners' code; the cell fails if such a planner never sent a plan."""
     told: dict[str, Any] = {}
     for vehicle, record in planners.items():
         failures = _failures(record)

@@ -38,7 +38,7 @@ class EvaluationFolder:
         """
         Write the plan and the grid.
 
-        :raises InputError: if the folder cannot be written, or is in use by another process.
+        :raises InputError: if the folder cannot be written, or contains other files.
         """
         prepare_folder(self.path)
         if any(self.path.iterdir()) and not (self.path / GRID_FILE).exists() \

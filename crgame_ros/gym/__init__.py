@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Environments for learners: Gymnasium's and PettingZoo's interfaces to any game."""
+"""Environments for reinforcement learning: Gymnasium's and PettingZoo's interfaces to any game."""
 
 from crgame_ros.paths import extra_install
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A game as its agents live it: what they see, what they are rewarded for, when it is over."""
+"""A game from the view of its agents: observations, rewards and the end of episodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,15 +29,15 @@ ENDS = ('collision', 'off_road', 'goal')
 @dataclass(frozen=True)
 class Experiment:
     """
-    What all episodes of an environment have in common; see `docs/gym.md`.
+    The settings that all episodes of an environment share; see `docs/gym.md`.
 
-    :param setups: of the episodes.
-    :param seats: that agents take.
-    :param action: what their actions mean.
-    :param observation: what they are told.
-    :param reward: for what they are rewarded.
-    :param ends: which events terminate an episode.
-    :param ticks: scenario steps for which an action holds.
+    :param setups: setups of the episodes.
+    :param seats: seats of the agents.
+    :param action: kind of the actions.
+    :param observation: content of the observations.
+    :param reward: terms of the reward.
+    :param ends: events that terminate an episode.
+    :param ticks: number of scenario steps for which an action holds.
     :param duration_s: simulated time after which an episode is truncated [s]
     """
 
@@ -60,12 +60,12 @@ def make_experiment(
     vary: Mapping[str, float] | None = None, worlds: int | None = None,
 ) -> Experiment:
     """
-    Check the keywords of an environment.
+    Build an experiment from the keywords of an environment, and check these.
 
     :param seats: ids of the vehicles that agents drive.
     :param vary: keys of `StartVariation`.
     :param worlds: as for `EpisodeSetups`.
-    :raises InputError: if one is wrong, or the game cannot be used.
+    :raises InputError: if a keyword is wrong, or the game cannot be used.
     """
     if action not in ACTION_KINDS:
         raise InputError(f'"action" is {action!r}', 'environment',
@@ -84,10 +84,10 @@ def make_experiment(
 
 class AgentOutcome(NamedTuple):
     """
-    What an agent is told of a decision besides what it sees.
+    The outcome of a decision for an agent, besides the observation.
 
-    :param terminated: whether the episode is over by what has happened.
-    :param truncated: whether it is over because its time is.
+    :param terminated: whether an event ended the episode.
+    :param truncated: whether the time limit ended the episode.
     """
 
     reward: float
@@ -100,8 +100,8 @@ class AgentGame:
     """
     One game and its agents.
 
-    :param experiment: what its episodes have in common.
-    :ivar game: moves everybody.
+    :param experiment: settings that its episodes share.
+    :ivar game: the game, which moves all vehicles and objects.
     """
 
     def __init__(self, experiment: Experiment) -> None:
@@ -128,21 +128,21 @@ class AgentGame:
         self.game.begin(seed, [] if self._criticality is None else [self._criticality])
 
     def act(self, actions: Mapping[str, Any]) -> None:
-        """Move on to the next decision (`DrivingGame.act`)."""
+        """Advance to the next decision (`DrivingGame.act`)."""
         self.game.act(actions)
 
     def observed(self, number: int) -> Observed:
-        """Return what an agent sees, by part."""
+        """Return an agent's observation, by part."""
         seen = observe_together(self._observations[number], [self.seats[number]])
         return {part: values[0] for part, values in seen.items()}
 
     def outcomes(self) -> list[AgentOutcome]:
-        """Judge the last decision of each agent."""
+        """Return the outcome of the last decision for each agent."""
         return [self._outcome(seat, off) for seat, off in zip(
             self.seats, self.game.off_road(), strict=True)]
 
     def info(self) -> dict[str, Any]:
-        """Tell of the episode's beginning."""
+        """Return information on the start of the episode."""
         return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed}
 
     def _outcome(self, seat: AgentSeat, off_road: bool) -> AgentOutcome:
@@ -166,7 +166,7 @@ class AgentGame:
 
 
 def observe_together(observation: Observation, seats: Sequence[AgentSeat]) -> Observed:
-    """Return what the agents of several games see, (B, …) by part."""
+    """Return the observations of the agents of several games, (B, …) by part."""
     poses: NDArray[np.float64] = np.stack([seat.around.poses for seat in seats])
     velocities = np.stack([seat.around.velocities for seat in seats])
     return observation.observe([seat.state for seat in seats], [seat.place for seat in seats],

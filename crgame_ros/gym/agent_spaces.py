@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The spaces of an agent, as Gymnasium has them."""
+"""The spaces of an agent, as Gymnasium's types."""
 
 from crgame_ros.policy.actions import action_bounds, ActionKind
 from crgame_ros.policy.observation_spec import ObservationSpec

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""An AV that an agent plans for, in the place of its planner."""
+"""An AV for which an agent plans, in place of its planner."""
 
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 class AvPilot:
     """
-    Tells an agent of the world, and hands its plans to the engine without a latency.
+    The link between an agent and an AV: observes the world, and passes plans without latency.
 
-    An AV that perceives the world truly is asked for nothing: a request with predictions, which
-    no observation has, would cost more than the rest of the step. One with perception is told
-    what its planner would be.
+    An AV with perfect perception gets no planning request: its predictions, which no observation
+    uses, would cost more than the rest of the step. An AV with a perception model gets the same
+    data as its planner would.
 
-    :param setup: of the run.
-    :param index: of the AV.
-    :param simulation: of the run.
-    :param view: of the true world.
+    :param setup: setup of the run.
+    :param index: index of the AV.
+    :param simulation: simulation of the run.
+    :param view: view of the true world.
     """
 
     def __init__(self, setup: Setup, index: int, simulation: Simulation, view: SeatView) -> None:
@@ -50,7 +50,7 @@ class AvPilot:
 
     def observe(self, result: StepResult, states: NDArray[np.float64]) -> Surrounded:
         """
-        Return what the agent is told of at a tick.
+        Return the surroundings for the agent at a tick.
 
         :param states: (V, 8) of all driven vehicles, rear axle, simulation coordinates
         """
@@ -69,8 +69,8 @@ class AvPilot:
         """
         Let the AV follow a plan.
 
-        :param states: (S, 8) that `observe` returned, and later.
-        :return: why the engine refuses it, or None.
+        :param states: (S, 8) states of the plan, from the one that `observe` returned on.
+        :return: why the engine refuses the plan, or None.
         """
         simulation = self._simulation
         if self.perception is None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A game for one agent: Gymnasium's environment."""
+"""A game for one agent, as Gymnasium's environment."""
 
 from typing import Any, ClassVar, TYPE_CHECKING
 
@@ -22,13 +22,13 @@ Seen = dict[str, NDArray[np.float32]]
 
 class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
     """
-    One vehicle of a game, driven by an agent; everybody else drives as in an offline run.
+    An environment in which an agent drives one vehicle; all others drive as in an offline run.
 
     :param seat: id of the agent's vehicle: a human's (hv0, …) or an AV (av0, …).
-    :param render_mode: `rgb_array` paints a picture, `human` shows the cockpit's page.
+    :param render_mode: `rgb_array` draws a picture, `human` shows the cockpit's page.
     :param keywords: of `make_experiment`: game or scenario, action, observation, reward, ends,
         duration, ticks, drivers, planners, vary, worlds.
-    :raises InputError: if one of them is wrong.
+    :raises InputError: if a keyword is wrong.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -51,9 +51,9 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
     def reset(self, *, seed: int | None = None,
               options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """
-        Begin an episode; with equal seeds, and then equal actions, it is the same.
+        Begin an episode; equal seeds and equal actions give equal episodes.
 
-        :param options: none are known.
+        :param options: must be empty.
         """
         super().reset(seed=seed)
         self.agent.begin(int(self.np_random.integers(SEEDS)))
@@ -67,7 +67,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         """
         Drive until the next decision.
 
-        :raises PlanningError: if the action is none.
+        :raises PlanningError: if the action is invalid.
         """
         self._need_begun()
         self.agent.act({self.agent.seats[0].id: action})
@@ -78,7 +78,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
                 outcome.info)
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture (H, W, 3) in the mode `rgb_array`; the page shows itself."""
+        """Return a picture (H, W, 3) in the mode `rgb_array`; None in the mode `human`."""
         self._need_begun()
         if self.render_mode != 'rgb_array':
             return None
@@ -87,7 +87,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         return self._painter.paint(self.agent.game)
 
     def close(self) -> None:
-        """End the page, if there is one."""
+        """Stop the page's server, if there is one."""
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
@@ -99,7 +99,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
 
     def _show(self, begin: bool = False) -> None:
         if self._viewer is None:
-            # Its server needs aiohttp and a thread: for those only who look.
+            # The server needs aiohttp and a thread: it starts only for this mode.
             from crgame_ros.gym.page_viewer import PageViewer
             self._viewer = PageViewer()
         if begin:
@@ -113,9 +113,9 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
 
 def check_render_mode(mode: str | None, modes: list[str]) -> None:
     """
-    Refuse an unknown way to render.
+    Check the render mode.
 
-    :raises InputError: naming those that there are.
+    :raises InputError: naming the known modes, if it is unknown.
     """
     if mode is not None and mode not in modes:
         raise InputError(f'"render_mode" is {mode!r}', 'environment', 'use ' + ', '.join(modes))

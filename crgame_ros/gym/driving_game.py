@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One game whose seats agents take, moved from decision to decision without a clock."""
+"""A game with agents in some seats, advanced from decision to decision without a clock."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,9 +42,9 @@ Array = NDArray[np.float64]
 
 class ContactSearch:
     """
-    Looks for contacts at every simulation step of a tick, once for all of them.
+    A search for contacts at all simulation steps of a tick, done once at its end.
 
-    Who cannot be reached in the tick is sorted out at its end.
+    Bodies that cannot be reached within the tick are excluded first.
 
     :param setup: the run.
     """
@@ -62,13 +62,14 @@ class ContactSearch:
     def hits(self, row: int, centers: Array, since_s: Sequence[float], before: ObjectStates,
              after: ObjectStates) -> tuple[str, ...]:
         """
-        Return the ids of whom a vehicle has touched.
+        Return the ids of those that a vehicle has touched.
 
-        :param row: of the vehicle among the driven ones.
-        :param centers: (T, V, 3) of them at the steps after a tick, the last at the next tick
-        :param since_s: (T) time of each step since its tick [s]
-        :param before: the objects at the first tick.
-        :param after: at the next one.
+        :param row: index of the vehicle among the driven ones.
+        :param centers: (T, V, 3) centres of the driven vehicles at the steps after a tick; the
+            last is at the next tick
+        :param since_s: (T) time of each step since the tick [s]
+        :param before: the objects at the tick.
+        :param after: the objects at the next tick.
         """
         own = centers[:, row]
         placed: list[list[Primitive]] = []
@@ -81,7 +82,7 @@ class ContactSearch:
             reach = (self._footprints[row].radius + footprint.radius + CIRCLE_SLACK) ** 2
             for parts, (dx, dy, turned), yaw in zip(placed, relative.tolist(),
                                                     own[:, 2].tolist(), strict=True):
-                # Written so that NaN is far away.
+                # In this form, NaN counts as far away.
                 if dx * dx + dy * dy <= reach and any(
                         a.collide(b) for a in parts for b in footprint.at(dx, dy, turned + yaw)):
                     touched.append(self._ids[number])
@@ -93,7 +94,7 @@ class ContactSearch:
 
     def _near(self, row: int, own: Array, centers: Array, since_s: Sequence[float],
               before: ObjectStates, after: ObjectStates) -> list[int]:
-        """Return the numbers of those whose circles could meet the vehicle's in the tick."""
+        """Return the numbers of those whose circles can meet the vehicle's within the tick."""
         reach = self._radii + (self._radii[row] + CIRCLE_SLACK)
         apart = centers[:, :, :2] - own[:, None, :2]
         near = (np.einsum('tvi,tvi->tv', apart, apart).min(axis=0) <= reach * reach)
@@ -114,12 +115,12 @@ class ContactSearch:
 
     def _way(self, number: int, centers: Array, since_s: Sequence[float], before: ObjectStates,
              after: ObjectStates) -> Array:
-        """Return the poses (T, 3) of somebody at the steps."""
+        """Return the poses (T, 3) of a vehicle or object at the steps."""
         if number < self._driven:
             return centers[:, number]
         index = number - self._driven
         way: Array = before.poses[index] + np.outer(since_s, before.velocities[index])
-        # At the next tick it is where that says.
+        # The pose at the next tick is known exactly.
         way[-1] = after.poses[index]
         return way
 
@@ -127,23 +128,25 @@ class ContactSearch:
 @dataclass
 class AgentSeat:
     """
-    A seat that an agent has.
+    The seat of an agent.
 
-    :param id: of the vehicle.
-    :param row: of it among the driven ones.
-    :param vehicle: as it is set up.
-    :param view: of the world from it.
-    :param guide: of its route.
-    :param inverse: of its pedals.
-    :param pilot: of an AV; None in a human's seat.
-    :param around: what the agent is told of, at the last decision.
-    :param place: on the route, then.
-    :param before: its state at the decision before, and where it then was.
-    :param action: in force.
-    :param centers: (T, 3) of its footprint on the road at the steps since the last decision
-    :param hit: ids of whom it has touched since then.
-    :param refusal: why the engine has refused its plan; None if it has not.
-    :param overhang: how far it began off the road, while it has not been on it [m]
+    :param id: id of the vehicle.
+    :param row: index of the vehicle among the driven ones.
+    :param vehicle: setup of the vehicle.
+    :param view: view of the world from it.
+    :param guide: guide along its route.
+    :param inverse: inverse of its powertrain, from acceleration to pedals.
+    :param pilot: pilot of an AV; None in a human's seat.
+    :param around: surroundings at the last decision.
+    :param place: place on the route at the last decision.
+    :param before: state at the decision before, and the place on the route then.
+    :param action: current action.
+    :param centers: (T, 3) its centres in the road's coordinates, at the steps since the last
+        decision
+    :param hit: ids of those that it has touched since then.
+    :param refusal: why the engine refused its plan; None if it did not.
+    :param overhang: distance off the road at the start; it applies until the vehicle has been on
+        the road [m]
     """
 
     id: str  # noqa: A003
@@ -164,19 +167,19 @@ class AgentSeat:
 
     @property
     def state(self) -> VehicleState:
-        """Return its present state, rear axle, coordinates of the road."""
+        """Return its current state, of the rear axle in the road's coordinates."""
         return self.around.state
 
 
 class DrivingGame:
     """
-    A game in which agents have some seats; everybody else drives as in an offline run.
+    A game in which agents have some seats; all other vehicles drive as in an offline run.
 
-    :param setups: of its episodes.
+    :param setups: setups of its episodes.
     :param seats: ids of the agents' vehicles.
-    :param action: what their actions mean.
-    :param ticks: scenario steps for which an action holds.
-    :raises InputError: if there is no such seat, or it cannot take such actions.
+    :param action: kind of the actions.
+    :param ticks: number of scenario steps for which an action holds.
+    :raises InputError: if there is no such seat, or it does not support these actions.
     """
 
     def __init__(self, setups: EpisodeSetups, seats: Sequence[str], action: ActionKind,
@@ -218,19 +221,19 @@ class DrivingGame:
 
     @property
     def objects(self) -> ObjectStates:
-        """States of everything that is no driven vehicle, now."""
+        """The current states of everything that is not a driven vehicle."""
         return self.simulation.objects
 
     @property
     def time_s(self) -> float:
-        """Time of the simulation since the start [s]."""
+        """The simulated time since the start [s]."""
         return self.simulation.n * self.simulation.scheduler.dt_s
 
     def begin(self, seed: int, observers: Sequence[RunObserver] = ()) -> None:
         """
         Begin an episode.
 
-        :param observers: look on at its ticks.
+        :param observers: observers of its ticks.
         """
         self.setup = setup = self._setups.make(seed, {item.id: item.guide for item in self.seats})
         self.simulation = Simulation(setup)
@@ -267,10 +270,10 @@ class DrivingGame:
 
     def act(self, actions: Mapping[str, Array]) -> None:
         """
-        Move on to the next decision.
+        Advance to the next decision.
 
-        :param actions: of every agent, by seat.
-        :raises PlanningError: if an action is none.
+        :param actions: actions of all agents, in the order of seats.
+        :raises PlanningError: if an action is invalid.
         """
         for seat in self.seats:
             seat.action = checked_action(self._action, actions[seat.id])
@@ -285,9 +288,10 @@ class DrivingGame:
 
     def off_road(self) -> list[bool]:
         """
-        Tell of each seat whether its vehicle was off the road since the last decision.
+        Return for each seat whether its vehicle was off the road since the last decision.
 
-        One that began off the road leaves it when it comes further off, until it was on it.
+        A vehicle that started off the road counts as off only if it moves farther off, until it
+        has been on the road once.
         """
         return [self.road is not None and self._is_off(self.road, seat) for seat in self.seats]
 
@@ -302,7 +306,7 @@ class DrivingGame:
         return any(off)
 
     def _tick(self) -> Array:
-        """Drive one scenario step; give the vehicles' centres (T, V, 3) at its steps."""
+        """Drive one scenario step; return the vehicles' centres (T, V, 3) at its steps."""
         simulation, scheduler = self.simulation, self.simulation.scheduler
         self._plan()
         before, dt_s = simulation.objects, scheduler.dt_s
@@ -325,7 +329,7 @@ class DrivingGame:
         return centers
 
     def _proceed(self, result: StepResult, states: Array) -> None:
-        """Let everybody look at a tick, planners plan, and observers observe."""
+        """Update the agents' surroundings at a tick, plan for AVs, and notify observers."""
         for planner in self._planners:
             planner.proceed(result)
         show(self.simulation, result, list(self._hands.values()))
@@ -336,7 +340,7 @@ class DrivingGame:
             observer.observe(result.n, 0.0, states, result.objects)
 
     def _plan(self) -> None:
-        """Plan for the AVs; of one that is driven by pedals, only where requests wait for it."""
+        """Plan for the AVs; for one driven by pedals, only if requests wait for it."""
         scheduler = self.simulation.scheduler
         for seat in self.seats:
             if seat.pilot is not None and (

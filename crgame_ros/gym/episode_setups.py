@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The setups of a game's episodes: what a seed changes, and what agents let vary."""
+"""The setups of a game's episodes: the effects of a seed, and variations of the start."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -23,17 +23,17 @@ from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
 Vehicle = TypeVar('Vehicle', HumanSetup, AvSetup)
-# Seeds of games drawn by an environment are below this.
+# Upper bound of the seeds that an environment draws for games.
 SEEDS = 2**31
 
 
 @dataclass(frozen=True)
 class StartVariation:
     """
-    How far the start of the agents' vehicles varies, evenly to both sides.
+    The variation of the start of agents' vehicles, uniform to both sides.
 
-    :param speed: [m/s]; nobody starts backwards
-    :param along: the route [m]
+    :param speed: largest change of the speed [m/s]; no vehicle starts backwards
+    :param along: largest change of the position along the route [m]
     """
 
     FORM: ClassVar[Form] = Form('see docs/gym.md for the keys')
@@ -44,12 +44,12 @@ class StartVariation:
 
 class EpisodeSetups:
     """
-    Makes the setup of each episode from its seed.
+    A factory of episodes' setups from their seeds.
 
-    :param game: of all episodes.
-    :param vary: the start of the vehicles.
-    :param worlds: placements of traffic that the seeds share; None makes one for each seed, which
-        costs 0.1 s and more.
+    :param game: game of all episodes.
+    :param vary: variation of the start.
+    :param worlds: number of traffic placements that the seeds share; None makes one for each
+        seed, which takes 0.1 s and more.
     """
 
     def __init__(self, game: Game, vary: StartVariation, worlds: int | None = None) -> None:
@@ -61,7 +61,7 @@ class EpisodeSetups:
 
     def make(self, seed: int, guides: Mapping[str, RouteGuide]) -> Setup:
         """
-        Return the setup of an episode: the same for the same seed.
+        Return the setup of an episode; equal seeds give equal setups.
 
         :param guides: routes of the vehicles whose start varies, by id.
         """
@@ -87,7 +87,7 @@ class EpisodeSetups:
 
     def _moved(self, state: VehicleState, guide: RouteGuide, transform: RigidTransform,
                speed_share: float, along_share: float) -> VehicleState:
-        """Return a start that is varied by shares in [-1, 1] of what it may."""
+        """Return a start that is varied by shares in [-1, 1] of the largest changes."""
         speed = max(0.0, state.speed + speed_share * self._vary.speed)
         if not self._vary.along:
             return state._replace(speed=speed)
@@ -100,7 +100,7 @@ class EpisodeSetups:
         return state._replace(x=x, y=y, yaw=yaw, speed=speed)
 
     def _with_traffic(self, seed: int) -> Setup:
-        """Place traffic by the seed, or take a placement that was made before."""
+        """Return the setup with traffic placed by the seed, or with an earlier placement."""
         world = seed if self._worlds is None else seed % self._worlds
         if world in self._placed:
             return self._placed[world]
@@ -121,16 +121,16 @@ def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
                 seats: Sequence[str], drivers: Mapping[str, str], planners: Mapping[str, str],
                 duration: float | None) -> Game:
     """
-    Find the game.
+    Return the game of an environment.
 
     :param game: a game, its file, or the name of a shipped one, such as `cut_in`.
     :param scenario: a CommonRoad file instead: each planning problem is an AV, and the only humans
         are agents.
-    :param seats: that agents take.
-    :param drivers: other driver sources than the game's, by human.
-    :param planners: other planners, by AV.
-    :param duration: until an episode is truncated, instead of the game's [s]
-    :raises InputError: if there is none, or both are named.
+    :param seats: seats of the agents.
+    :param drivers: driver sources that replace the game's, by human.
+    :param planners: planners that replace the game's, by AV.
+    :param duration: time until an episode is truncated, instead of the game's [s]
+    :raises InputError: if neither game nor scenario is given, or both are.
     """
     if (game is None) == (scenario is None):
         raise InputError('name a game or a scenario, one of them', 'environment',
@@ -166,7 +166,7 @@ def chosen_game(game: Game | Path | str | None, scenario: Path | str | None,
 
 
 def _file(game: Path | str) -> Path:
-    """Return the file of a game: a shipped one by its name alone."""
+    """Return the file of a game; a shipped one is found by its name."""
     shipped = scenarios_directory() / f'{game}.yaml'
     if isinstance(game, str) and '/' not in game and shipped.is_file():
         return shipped

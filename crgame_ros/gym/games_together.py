@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Many games of one agent each, stepped in one process: Gymnasium's vector environment."""
+"""Several games of one agent each in one process, as Gymnasium's vector environment."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -23,16 +23,16 @@ Array = NDArray[np.float64]
 
 class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     """
-    The same as so many `DrivingEnv` one after the other, to the last bit.
+    A vector environment with the same results as several `DrivingEnv`, to the last bit.
 
-    The engines move one by one; what all agents see is computed for all games at once, and the
+    The engines step one by one. The observations of all games are computed at once, and the
     scenario is loaded once.
 
-    :param num_envs: games.
-    :param seat: id of the agent's vehicle in each.
+    :param num_envs: number of games.
+    :param seat: id of the agent's vehicle in each game.
     :param render_mode: `rgb_array` or None.
     :param keywords: of `make_experiment`.
-    :raises InputError: if one of them is wrong.
+    :raises InputError: if a keyword is wrong.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -63,7 +63,8 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         """
         Begin an episode in every game.
 
-        :param seed: of the first game, the next has the next one; or one for each.
+        :param seed: seed of the first game, which increases by 1 for each next game; or one seed
+            for each.
         """
         seeds: Sequence[int | None]
         if seed is None or isinstance(seed, int):
@@ -80,7 +81,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
 
     def step(self, actions: NDArray[np.float32]) -> tuple[  # type: ignore[override]
             Seen, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Drive every game until its next decision; one that is over begins anew instead."""
+        """Drive every game until its next decision; a game that is over is reset instead."""
         begun = self._over.copy()
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)

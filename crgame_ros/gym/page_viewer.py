@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The cockpit's page on an environment: `render_mode='human'`.
+Shows an environment on the cockpit's page (`render_mode='human'`).
 
-The server listens on loopback, in a thread beside the environment's. Whoever opens the page
-watches the agent in real time; nobody can steer there, for the agent's actions are the only ones.
+The server listens on loopback, in a thread beside the environment's. The page shows the agent in
+real time. Users cannot steer there: only the agent drives.
 """
 
 import asyncio
@@ -34,13 +34,13 @@ from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 
 HOST, PORT = '127.0.0.1', 8080
-# An environment that is slower than this behind does not catch up [s].
+# An environment that is late by more than this does not catch up [s].
 _PATIENCE_S = 0.5
 _WATCH_ONLY = 'This is an environment: its agent drives, and nothing in it can be changed here.'
 
 
 class EnvironmentBackend:
-    """Stands behind the page; the environment's thread tells it what to show."""
+    """The backend of the page, which shows what the environment's thread sends."""
 
     mode: Literal['live', 'replay'] = 'live'
 
@@ -48,22 +48,22 @@ class EnvironmentBackend:
         self.hub: Hub | None = None
 
     async def start(self, hub: Hub) -> None:
-        """Remember whom to tell."""
+        """Store the hub that serves the clients."""
         self.hub = hub
 
     async def stop(self) -> None:
-        """Do nothing: the environment goes on."""
+        """Do nothing: the environment continues."""
 
     async def command(self, client: Client, message: Mapping[str, Any]) -> str:
         """
-        Refuse: the agent drives.
+        Refuse the command, because the agent drives.
 
         :raises CrgameError: always.
         """
         raise CrgameError(_WATCH_ONLY)
 
     def joined(self, client: Client) -> None:
-        """Do nothing: everybody sees the same."""
+        """Do nothing: all clients see the same."""
 
     def left(self, client: Client) -> None:
         """Do nothing."""
@@ -71,7 +71,7 @@ class EnvironmentBackend:
     async def load_game(self, path: Any, client: Any = None, *,
                         takes_seat: bool = False) -> str:
         """
-        Refuse: the environment has its game.
+        Refuse to load a game, because the environment defines it.
 
         :raises CrgameError: always.
         """
@@ -80,10 +80,10 @@ class EnvironmentBackend:
 
 class PageViewer:
     """
-    Serves the page and shows a game on it, in real time.
+    The server of the page, which shows a game in real time.
 
-    :param port: the first to try.
-    :ivar url: of the page.
+    :param port: first port to try.
+    :ivar url: address of the page.
     """
 
     def __init__(self, port: int = PORT) -> None:
@@ -115,14 +115,14 @@ class PageViewer:
         self._status.begin(setup.vehicle_ids)
         self._status.add(Status('sim_node: run', 0, 'running', {}), 0.0)
         for seat in game.seats:
-            # Not who the game says.
+            # The agent replaces the game's driver or planner.
             scene['drivers' if seat.pilot is None else 'planners'][seat.id] = 'agent'
         self._run_on_page(lambda hub: hub.set_document('scene', scene))
         self._run_on_page(lambda hub: hub.set_document('events', {'fired': []}))
         self._run_on_page(lambda hub: hub.set_document('seats', {'seats': {}}))
 
     def show(self, game: DrivingGame) -> None:
-        """Show the present state, when its time has come."""
+        """Show the current state, after waiting for its time."""
         now_s = time.monotonic()
         if now_s - self._due_s > _PATIENCE_S:
             self._due_s = now_s
@@ -156,7 +156,7 @@ class PageViewer:
         self._run_on_page(send)
 
     def close(self) -> None:
-        """End the server and its thread."""
+        """Stop the server and its thread."""
         asyncio.run_coroutine_threadsafe(self._runner.cleanup(), self._loop).result()
         self._end_thread()
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A game for several agents: PettingZoo's parallel environment."""
+"""A game for several agents, as PettingZoo's parallel environment."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar
@@ -25,15 +25,15 @@ except ImportError as _error:
 
 class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
     """
-    Several vehicles of a game, each driven by an agent of its own, all at the same time.
+    An environment in which several vehicles are each driven by an agent, at the same time.
 
-    The episode of all ends when that of one is terminated, for the others would go on against a
-    vehicle that nobody drives; theirs are truncated.
+    When one agent's episode is terminated, those of all others are truncated: they would
+    otherwise continue with a vehicle that has no driver.
 
     :param seats: ids of the agents' vehicles; None takes all.
     :param render_mode: `rgb_array` or None.
     :param keywords: of `make_experiment`.
-    :raises InputError: if one of them is wrong.
+    :raises InputError: if a keyword is wrong.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -69,7 +69,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None
               ) -> tuple[dict[str, Seen], dict[str, dict[str, Any]]]:
-        """Begin an episode; with equal seeds, and then equal actions, it is the same."""
+        """Begin an episode; equal seeds and equal actions give equal episodes."""
         if seed is not None:
             self._random = np.random.Generator(np.random.PCG64(seed))
         self._together.begin(int(self._random.integers(SEEDS)))
@@ -82,8 +82,8 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         """
         Drive until the next decision.
 
-        :raises PlanningError: if an action is none.
-        :raises InputError: if an agent's is missing.
+        :raises PlanningError: if an action is invalid.
+        :raises InputError: if an agent's action is missing.
         """
         agents = self.agents
         if not agents:

@@ -20,7 +20,7 @@ import numpy as np
 
 
 class _Gate(NamedTuple):
-    """When and where one of the goal's states can be met at all."""
+    """The time steps and the area in which one of the goal's states can be met."""
 
     first_k: float
     last_k: float
@@ -32,10 +32,12 @@ class _Gate(NamedTuple):
 
 class GoalWatch:
     """
-    Asks commonroad-io, which takes half a millisecond, only where time and place can be right.
+    A check of the goal that calls commonroad-io only where time and position permit it.
+
+    A call of commonroad-io takes half a millisecond.
 
     :param problem: the planning problem; None is never met.
-    :param rear_to_center: of the vehicle [m]
+    :param rear_to_center: distance from the vehicle's rear axle to its centre [m]
     """
 
     def __init__(self, problem: PlanningProblem | None, rear_to_center: float) -> None:
@@ -47,7 +49,7 @@ class GoalWatch:
         """
         Return whether a state meets the goal.
 
-        :param state: of the rear axle, scenario coordinates.
+        :param state: state of the rear axle in scenario coordinates.
         :param k: its scenario time step.
         """
         if self._problem is None:
@@ -72,16 +74,16 @@ def _gate(goal: object) -> _Gate:
 
 class Decision(NamedTuple):
     """
-    What came of a decision.
+    The result of a decision.
 
-    :param lapse_s: from it to now [s]
+    :param lapse_s: time since the decision [s]
     :param before: state at the decision.
-    :param now: state now.
-    :param place: on the route, now.
-    :param collision: whether the vehicle has touched anybody since.
+    :param now: current state.
+    :param place: current place on the route.
+    :param collision: whether the vehicle has touched anything since.
     :param off_road: whether it has left the road since.
     :param goal: whether it is at its goal.
-    :param measures: what is left to whom; None where no term asks for it.
+    :param measures: criticality measures to all near; None if no term needs them.
     """
 
     lapse_s: float
@@ -94,7 +96,7 @@ class Decision(NamedTuple):
     measures: TickMeasures | None = None
 
     def shortage(self, measure: str, threshold: float) -> float:
-        """Return how far a measure is below a threshold: 0 if it is not, 1 if it is zero."""
+        """Return the relative amount below a threshold: 0 if not below it, 1 for a measure of 0."""
         value = self.worst(measure)
         return max(0.0, 1.0 - value / threshold) if value == value else 0.0
 
@@ -109,10 +111,10 @@ class RewardTerm:
     """
     A term of the reward.
 
-    :param unit: of its value.
-    :param meaning: in a sentence.
-    :param value: of a decision.
-    :param is_measured: whether it needs the measures of criticality.
+    :param unit: unit of its value.
+    :param meaning: one sentence.
+    :param value: returns its value for a decision.
+    :param is_measured: whether it needs criticality measures.
     """
 
     unit: str
@@ -171,10 +173,10 @@ USUAL_REWARD = {'progress': 0.05, 'offset': -0.02, 'jerk': -0.0002, 'collision':
 
 class Reward:
     """
-    Adds the terms up.
+    The weighted sum of terms.
 
-    :param weights: by term; 0 still tells the term's value.
-    :raises InputError: if there is no such term, or a weight is no number.
+    :param weights: by term; with 0 a term's value is still reported.
+    :raises InputError: if there is no such term, or a weight is not a number.
     """
 
     def __init__(self, weights: Mapping[str, float]) -> None:
@@ -191,6 +193,6 @@ class Reward:
         self.is_measured = any(TERMS[name].is_measured for name in weights)
 
     def compute(self, decision: Decision) -> tuple[float, dict[str, float]]:
-        """Return the reward, and the value of each term before its weight."""
+        """Return the reward, and the unweighted value of each term."""
         values = {name: value(decision) for name, value, _ in self._terms}
         return sum(weight * values[name] for name, _, weight in self._terms), values

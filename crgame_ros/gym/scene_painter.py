@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of a game, seen from above, painted fast enough for every step."""
+"""Draws a game from above, fast enough for every step."""
 
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.reference_point import ahead
@@ -14,22 +14,22 @@ import shapely
 
 Points = NDArray[np.float64]
 FRAMES_PER_S = 10
-# Of the picture [px], and what a metre is in it [px].
+# Size of the picture, and of a metre in it [px].
 WIDTH, HEIGHT = 720, 432
 SCALE = 6.0
-# Colours as in the figures: humans warm, AVs cold.
+# Colours as in the figures: warm for humans, cold for AVs.
 GROUND, ROAD, LINE = (208, 214, 205), (235, 235, 235), (160, 160, 160)
 AGENT, HUMAN, AV, OBJECT = (0, 158, 115), (213, 94, 0), (0, 114, 178), (140, 140, 140)
 ROUTE = (140, 205, 180)
-# Of the route that is shown [m].
+# Length of the route shown, and spacing of its points [m].
 _AHEAD, _STEP = 80.0, 2.0
 
 
 class ScenePainter:
     """
-    Paints games on one road, north up, around the first agent's vehicle.
+    A painter of games on one road, north up, centred on the first agent's vehicle.
 
-    :param setup: of any episode.
+    :param setup: setup of any episode.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -44,7 +44,7 @@ class ScenePainter:
         self._humans = len(setup.humans)
 
     def paint(self, game: DrivingGame) -> NDArray[np.uint8]:
-        """Return a picture (HEIGHT, WIDTH, 3) of the present state."""
+        """Return a picture (HEIGHT, WIDTH, 3) of the current state."""
         states = game.simulation.states
         seat = game.seats[0]
         middle = np.array(states[seat.row][:2])
@@ -76,6 +76,6 @@ class ScenePainter:
 
 
 def _pixels(points: Points, middle: Points) -> list[tuple[float, float]]:
-    """Return places in the picture; its rows count downwards."""
+    """Return pixel coordinates of points; rows count downwards."""
     shown = (points - middle) * (SCALE, -SCALE) + (0.5 * WIDTH, 0.5 * HEIGHT)
     return [(x, y) for x, y in shown.tolist()]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The ids of the environments: one for each shipped game, and one for any other."""
+"""The ids of the environments: one for each shipped game, and one for any other game."""
 
 from crgame_ros.paths import scenarios_directory
 import gymnasium
@@ -12,8 +12,8 @@ _VECTOR_ENTRY = 'crgame_ros.gym.games_together:GamesTogether'
 
 
 def shipped_games() -> tuple[str, ...]:
-    """Name the shipped games, such as cut_in."""
-    # A name with a dot in it is that of a driver's timeline.
+    """Return the names of the shipped games, such as cut_in."""
+    # A name with a dot is that of a driver's timeline.
     return tuple(sorted(path.stem for path in scenarios_directory().glob('*.yaml')
                         if '.' not in path.stem))
 
@@ -24,7 +24,7 @@ def environment_id(game: str) -> str:
 
 
 def register_all() -> None:
-    """Register every environment with Gymnasium; what is registered already stays."""
+    """Register every environment with Gymnasium, unless it is registered already."""
     for name, keywords in ((ANY_GAME, {}), *((environment_id(game), {'game': game})
                                              for game in shipped_games())):
         if name not in gymnasium.registry:

@@ -16,13 +16,13 @@ from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TI
 DESCRIPTION = """\
 Drive in a CommonRoad scenario against autonomous vehicles, and record it.
 
-Without arguments: the cut-in game, driven by its script. A game file (YAML) says who takes part;
---scenario alone works on any CommonRoad file: you are placed near the first AV, each planning
-problem becomes an AV, recorded obstacles play back. In an exported run its own human plays back as
-well, and you are placed only with --driver."""
+Without arguments: the cut-in game, driven by its script. A game file (YAML) declares the
+participants; --scenario alone works on any CommonRoad file: you are placed near the first AV, each
+planning problem becomes an AV, recorded obstacles are replayed. In an exported run its human is
+replayed as well, and you are placed only with --driver."""
 _NAMED_DRIVER = re.compile(r'(hv[0-9]{1,3})=(.+)')
-PROBLEM_HELP = ('only this planning problem becomes an AV, where the game names no AVs; give it '
-                'again for the next (default: all; of those that start on one spot the first)')
+PROBLEM_HELP = ('planning problem that becomes an AV, if the game names no AVs; may be repeated '
+                '(default: all; of several with the same start the first)')
 EPILOG = """\
 examples:
   ./run.sh                                        the cut-in game
@@ -133,8 +133,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         help='ask for the token in the printed address on this machine too, where others work on '
         'it')
     add('--open-cockpit', action='store_true',
-        help='let other people in on purpose: over TLS, by printed links to direct, to drive each '
-        'seat and to watch, which let one browser in each; on all addresses, or that of --listen')
+        help='open the page to other people over TLS: prints a link for the director, for each '
+        'seat and for watching, each for one browser; on all addresses, or on that of --listen')
     add('--certificate', type=Path, metavar='FILE',
         help='PEM file for TLS, with --key (default: --open-cockpit makes one by openssl)')
     add('--key', type=Path, metavar='FILE', help='PEM file with the key of the certificate')
@@ -147,8 +147,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--countdown', type=_countdown, default=3.0, metavar='S', dest='countdown_s',
         help='seconds from when all drivers at pages are ready to the start (default: 3)')
     add('--start-paused', action='store_true',
-        help='begin nothing until it is started in the page or by /sim/start, neither this '
-        'game nor those chosen later (default: only drivers in the page are waited for)')
+        help='start every game paused, until it is started in the page or by /sim/start (default: '
+        'wait only for drivers in the page)')
     add('--realtime-priority', action='store_true',
         help='run the simulation under SCHED_FIFO, if the system allows it')
     add('--namespace', type=_namespace, default='/', metavar='/NAME',
@@ -175,8 +175,8 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
     if request.replay is not None and request != RunRequest(
             port=request.port, listen=request.listen, token=request.token,
             replay=request.replay):
-        raise InputError('shows a recording and runs no game', '--replay',
-                         'give nothing but --port, --listen and --token with it')
+        raise InputError('shows a recording, so other options of a run do not apply', '--replay',
+                         'use only --port, --listen and --token with it')
     _check_opening(request)
     return request
 

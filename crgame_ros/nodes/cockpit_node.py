@@ -33,7 +33,7 @@ class CockpitNode(Node):
         self._opening = self._declare_exposure()
         self._framed_by: str = declare('framed_by', '', ParameterDescriptor(
             description='origin of the one page that may show this one within it, such as '
-                        'http://127.0.0.1:8070; none may if empty', read_only=True)).value
+                        'http://127.0.0.1:8070; empty: no page may', read_only=True)).value
         self._seats: list[str] = declare('seats', ['hv0'], ParameterDescriptor(
             description='seats for which open_cockpit makes links', read_only=True)).value
         self._folders: list[str] = declare('folders', [''], ParameterDescriptor(

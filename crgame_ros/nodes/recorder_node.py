@@ -181,7 +181,7 @@ class RecorderNode(Node):
             return
         held, self._held = self._held or [], None
         if course is TimeCourse.BACK and self._game_text:
-            self.get_logger().info('time has run back: what comes now is another run')
+            self.get_logger().info('simulation time has jumped back: recording another run')
             self._ended_s = time.monotonic()
             self._begin_bag(self._game_text)
         for item in held:

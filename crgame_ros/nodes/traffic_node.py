@@ -143,7 +143,7 @@ class TrafficNode(Node):
         traffic.advance(view)
         if traffic.taken_off > taken_off:
             self.get_logger().warning(
-                f'k = {k}: an agent stood in a circle of waiting and was taken off the road')
+                f'k = {k}: removed an agent from the road: agents waited for each other')
         self._traffic, self._k = traffic, k + 1
         states, message = traffic.states, self._message
         message.positions[:] = states.poses.ravel()
@@ -182,8 +182,8 @@ class TrafficNode(Node):
                 game.seed)
             if tuple(item.id for item in traffic.descriptions) != tuple(
                     item.id for item in self._scenario.objects if item.role is Role.TRAFFIC):
-                raise InputError('has other agents than this version makes',
-                                 '/scenario/objects', 'run all nodes in one version')
+                raise InputError('lists other agents than traffic_node creates',
+                                 '/scenario/objects', 'run all nodes from one version')
             gc.collect()
             gc.freeze()
             gc.disable()

@@ -8,7 +8,7 @@ The filter's states are x, y, yaw and v of the rear axle. It predicts by the kin
     x' = v cos(yaw),  y' = v sin(yaw),  yaw' = w,  v' = a
 
 An inertial unit measures its inputs, the changes of heading and speed since the last step, with
-white noise. Measurements of all four states correct it (Thrun, Burgard, Fox: Probabilistic
+white noise. Measurements of all four states correct the filter (Thrun, Burgard, Fox: Probabilistic
 Robotics, 2005, table 3.3). Its noise covariances are those of the noise that is injected.
 """
 
@@ -77,9 +77,7 @@ class Localisation:
 
     @property
     def covariance(self) -> Array:
-        """
-        Return the covariance (4, 4) of the estimated x [m], y [m], yaw [rad] and speed [m/s].
-        """
+        """Return the covariance (4, 4) of the estimated x, y [m], yaw [rad], speed [m/s]."""
         return self._covariance.copy()
 
     @property
@@ -105,9 +103,7 @@ class Localisation:
             self._correct(n, truth)
 
     def _predict(self, steps: int, truth: VehicleState, rows: Array) -> None:
-        """
-        Predict the estimate from the inertial unit's measurements, with their noise summed up.
-        """
+        """Predict the estimate by the inertial unit's measurements; sum up their noise."""
         spec, before, time_s = self._spec, self._truth, steps * self._dt_s
         unit = math.sqrt(self._dt_s)
         turn = wrap_pi(truth.yaw - before.yaw) + spec.yaw_rate_noise * unit * rows[_HEADING]

@@ -56,7 +56,7 @@ class Tracks:
         """
         Update with the things seen at step n; an older view does not replace a newer one.
 
-        :param things: (D) which things
+        :param things: (D) indices of the things
         :param until_n: the step at which they are forgotten, unless they are seen again
         :param poses: (D, 3) poses of their reference points
         :param velocities: (D, 3)
@@ -77,7 +77,7 @@ class Tracks:
         """
         Return the predicted motion of known things from step n on.
 
-        :param things: (D) which things
+        :param things: (D) indices of the things
         :param times_s: (P) from n on [s]
         :return: poses and velocities, both (P, D, 3)
         """

@@ -134,7 +134,7 @@ class CollisionSlices:
 
     def _described(self, name: str) -> Shape:
         if name not in self._objects:
-            raise PlanningError(f'the request names "{name}", which was never described')
+            raise PlanningError(f'the request contains "{name}", which has no description')
         return self._objects[name].shape
 
     def _body(self, name: str, pose: Array,

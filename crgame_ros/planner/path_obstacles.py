@@ -151,7 +151,7 @@ class ObstacleProjector:
             return
         unknown = [name for name in ids if name not in self._objects]
         if unknown:
-            raise PlanningError(f'the request names "{unknown[0]}", which was never described')
+            raise PlanningError(f'the request contains "{unknown[0]}", which has no description')
         outlines = [outline(self._objects[name].shape, CIRCLE_CORNERS, False) for name in ids]
         corners = max((len(points) for points in outlines), default=4)
         self._outlines = np.array([np.resize(points, (corners, 2)) for points in outlines]

@@ -64,13 +64,13 @@ def check_start(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
     :return: the reason for a refusal, or None.
     """
     if plan.stamp_ns != request_stamp_ns:
-        return (f'the stamp {plan.stamp_ns} ns is not that of the request, '
+        return (f'the plan has the stamp {plan.stamp_ns} ns, the request has '
                 f'{request_stamp_ns} ns')
     states = plan.states
     if len(states) > LONGEST:
-        return f'{len(states)} states are too many, at most {LONGEST} are read'
+        return f'the plan has {len(states)} states; at most {LONGEST} are allowed'
     if len(states) < SHORTEST:
-        return f'{len(states)} state is no plan, at least {SHORTEST} are needed'
+        return f'the plan has {len(states)} state; at least {SHORTEST} are needed'
     if not np.isfinite(states).all():
         row, column = np.argwhere(~np.isfinite(states))[0]
         return f'{StateColumn(column).name.lower()} of state {row} is {states[row, column]}'
@@ -82,9 +82,11 @@ def check_start(plan: Plan, request_ego: VehicleState, request_stamp_ns: int,
     if distance > tolerances.start_position:
         return f'the first state is {distance:.2f} m from the vehicle'
     if abs(wrap_pi(yaw - request_ego.yaw)) > tolerances.start_yaw:
-        return f'the first state is turned by {wrap_pi(yaw - request_ego.yaw):.2f} rad'
+        return ('the first state has another heading than the vehicle, by '
+                f'{wrap_pi(yaw - request_ego.yaw):.2f} rad')
     if abs(speed - request_ego.speed) > tolerances.start_speed:
-        return f'the first state is {speed - request_ego.speed:+.2f} m/s off the speed'
+        return ('the first state has another speed than the vehicle, by '
+                f'{speed - request_ego.speed:+.2f} m/s')
     return None
 
 

@@ -70,8 +70,8 @@ class PlannerRegistry(ModelRegistry):
             return super().create(name, options, where, **given)
         self.find(name, where)
         if options:
-            raise InputError('is an object and takes no options', self.label(name, where),
-                             'give its class')
+            raise InputError('is an object, which cannot have options', self.label(name, where),
+                             'pass its class instead, or remove the options')
         return own
 
     def find(self, name: str, where: str = '') -> type[Planner]:
@@ -82,7 +82,7 @@ class PlannerRegistry(ModelRegistry):
         :raises InputError: if there is none of that name, or it is no `Planner`.
         """
         if name == EXTERNAL and name not in self.names():
-            raise InputError('an external planner answers live runs only', where or 'planner',
+            raise InputError('an external planner works in live runs only', where or 'planner',
                              'start the run with ./run.sh, or name a planner')
         found = super().find(POLICY if name.startswith(POLICY) else name, where)
         if not isinstance(getattr(found, 'name', None), str):

@@ -72,7 +72,7 @@ def checked_action(kind: ActionKind, action: Any) -> Array:
     low, high = action_bounds(kind)
     values = np.asarray(action, dtype=np.float64)
     if values.shape != low.shape or not np.isfinite(values).all():
-        raise PlanningError(f'an action "{kind}" is {low.shape} finite numbers, this is '
+        raise PlanningError(f'an action "{kind}" needs {low.shape} finite numbers, this is '
                             f'{np.array2string(values.ravel()[:6], precision=3)}'
                             f' of shape {values.shape}')
     return np.minimum(np.maximum(values, low), high)

@@ -43,18 +43,19 @@ STATE_COLUMNS = (
     ObservedColumn('heading_error', 'rad', -math.pi, math.pi, 'heading less that of the route'),
     ObservedColumn('curvature', '1/m', -2.0, 2.0, 'of the route beside the rear axle'),
     ObservedColumn('speed_limit', 'm/s', 0.0, _FASTEST,
-                   'of signs there; without any the speed at which one would drive'),
+                   'of signs there; without signs the usual speed on such a road'),
     ObservedColumn('goal_distance', 'm', 0.0, FAR, 'along the route; 1000 without a goal'))
 ROUTE_COLUMNS = (
     ObservedColumn('x', 'm', -2.0 * FAR, 2.0 * FAR, 'ahead of the rear axle'),
     ObservedColumn('y', 'm', -2.0 * FAR, 2.0 * FAR, 'to the left of it'),
-    ObservedColumn('heading', 'rad', -math.pi, math.pi, 'from the own one'),
+    ObservedColumn('heading', 'rad', -math.pi, math.pi, "relative to the vehicle's"),
     ObservedColumn('curvature', '1/m', -2.0, 2.0, 'left positive'))
 OBJECT_COLUMNS = (
-    ObservedColumn('present', '-', 0.0, 1.0, '1 where there is one, else the row is 0'),
+    ObservedColumn('present', '-', 0.0, 1.0,
+                   '1 if the row holds an object, else the whole row is 0'),
     ObservedColumn('x', 'm', -FAR, FAR, 'of its centre, ahead of the rear axle'),
     ObservedColumn('y', 'm', -FAR, FAR, 'of its centre, to the left'),
-    ObservedColumn('heading', 'rad', -math.pi, math.pi, 'from the own one'),
+    ObservedColumn('heading', 'rad', -math.pi, math.pi, "relative to the vehicle's"),
     ObservedColumn('speed_x', 'm/s', -_FASTEST, _FASTEST,
                    'of its centre over the ground, along the own heading'),
     ObservedColumn('speed_y', 'm/s', -_FASTEST, _FASTEST, 'the same, to the left'),
@@ -90,7 +91,7 @@ class ObservationSpec:
     def check(self) -> None:
         """Raise `InputError` if a part is named twice."""
         if len(set(self.parts)) < len(self.parts):
-            raise InputError('"parts" names one twice')
+            raise InputError('"parts" contains a part twice')
 
     def bounds(self) -> dict[str, tuple[NDArray[np.float32], NDArray[np.float32]]]:
         """Return the least and greatest values of each part, in the order of `parts`."""

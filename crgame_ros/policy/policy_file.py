@@ -44,7 +44,7 @@ class Policy:
         :raises InputError: naming the seat, if its actions are plans.
         """
         if self.action == 'plan':
-            raise InputError('its actions are plans, which no pedals can drive',
+            raise InputError("its actions are plans, but a human's seat needs pedals",
                              f'{seat}: driver {POLICY}…',
                              "name it as an AV's planner, or train it with other actions")
 
@@ -67,12 +67,12 @@ def load_policy(name: str, where: str = '') -> Policy:
     file, _, function = name.rpartition(':')
     path = Path(file).expanduser()
     if not file.endswith('.py'):
-        raise InputError('is no policy', label, f'write {POLICY}FILE.py:load')
+        raise InputError('does not name a policy', label, f'write {POLICY}FILE.py:load')
     if not path.is_file():
         raise InputError(f'there is no file {path}', label, 'check the path')
     policy = _called(path.resolve(), function, label)
     if not isinstance(policy, Policy):
-        raise InputError(f'gives a {type(policy).__name__}', label,
+        raise InputError(f'returns a {type(policy).__name__}', label,
                          f'return a crgame_ros.policy.policy_file.Policy; {_SEE}')
     if policy.action not in ACTION_KINDS:
         raise InputError(f'"action" is {policy.action!r}', label,
@@ -99,4 +99,4 @@ def _called(path: Path, function: str, label: str) -> Any:
         raise
     except Exception as error:
         raise InputError(f'cannot be loaded ({type(error).__name__}: {error})', label,
-                         'mend the file') from error
+                         'correct the file') from error

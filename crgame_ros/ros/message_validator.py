@@ -117,7 +117,7 @@ def _check_numbers(values: Any, finite: bool) -> None:
     good = (size <= LARGEST).all() if finite else not (size > LARGEST).any()
     if not good:
         worst = values[int(np.argmax(~(size <= LARGEST)))]
-        raise ValueError(f'{worst:g} is no number that can be')
+        raise ValueError(f'{worst:g} is out of range or not a number')
 
 
 def _check_stamp(stamp: Any) -> None:

@@ -89,4 +89,4 @@ class GameAwaited:
         self._told = True
         self._node.get_logger().warning(
             f'a run is heard, but its /scenario/game is not published: {self._what}; a '
-            'recording tells it at its beginning (play it without --start-offset)')
+            'recording has it at its beginning only (play it without --start-offset)')

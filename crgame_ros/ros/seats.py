@@ -221,7 +221,7 @@ class Seats:
             seat.obey(source, now_ns)
 
     def _assign_to_cockpit(self, seat: Seat, demand: SeatDemand, now_ns: int) -> None:
-        """Put a person at a page into a seat unless it is already occupied."""
+        """Assign a seat to a person at a page unless it is already occupied."""
         sits = None if seat.tenant is None else seat.tenant.person
         taker = demand.person
         if sits is not None and (taker is None or sits.id not in (taker.id, demand.displaced)):

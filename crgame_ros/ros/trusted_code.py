@@ -22,8 +22,8 @@ class TrustedCode:
 
     def __init__(self, node: Node, *named: str) -> None:
         roster: str = node.declare_parameter('roster', '', ParameterDescriptor(
-            description='file in which sim_node lists the code that the game files which it has '
-            'read name; what only a message names is not run', read_only=True)).value
+            description='file in which sim_node lists the code that game files name; code that '
+            'only a message names is not run', read_only=True)).value
         self._roster = Path(roster) if roster else None
         self._named = named
 
@@ -39,7 +39,7 @@ class TrustedCode:
         if ':' in name and name not in self._named and name not in self._listed():
             raise InputError('is code that only a message names: it is not run',
                              f'{where} {name}',
-                             'name it in the game file, or to the node that runs it')
+                             'name it in the game file or in a parameter of the node')
 
     def _listed(self) -> tuple[str, ...]:
         # Read each time, because sim_node rewrites it for each game.

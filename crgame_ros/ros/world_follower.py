@@ -46,7 +46,7 @@ class WorldStep:
 
     @property
     def states(self) -> FloatArray:
-        """States (V, 8) of the driven vehicles."""
+        """Return the states (V, 8) of the driven vehicles."""
         return vehicles_from_joints(self.positions, self.velocities, self.accelerations)
 
 

@@ -97,7 +97,7 @@ class KinematicSingleTrack(VehicleModel):
     def _within_speed_limits(
         self, speed: float, acceleration: float, direction: float, dt_s: float,
     ) -> tuple[float, float]:
-        """Return how long the car accelerates within the step [s], and its acceleration."""
+        """Return how long the car moves within the step [s], and its acceleration."""
         along = direction * speed
         along_acceleration = direction * acceleration
         end = along + along_acceleration * dt_s

@@ -99,7 +99,7 @@ def test_a_game_is_the_same_from_another_place(plan: dict[str, Any], tmp_path: P
     ({'games': [str(GAME)], 'seeds': 0}, '"seeds" is neither'),
     ({'games': [str(GAME)], 'seeds': [1, 1]}, '"seeds" is neither'),
     ({'games': [str(GAME)], 'planners': ['nobody']}, 'there is no planner "nobody"'),
-    ({'games': [str(GAME)], 'planners': ['external']}, 'answers live runs only'),
+    ({'games': [str(GAME)], 'planners': ['external']}, 'works in live runs only'),
     ({'games': [str(GAME)], 'perception': {'x': {'sensors': 3}}}, 'perception: x'),
     ({'games': [str(GAME)], 'planets': 3}, 'planets')])
 def test_what_is_no_plan_is_told(values: dict[str, Any], message: str, tmp_path: Path) -> None:

@@ -70,9 +70,9 @@ def test_a_policy_that_fails_brakes_as_every_planner_that_fails() -> None:
 
 
 @pytest.mark.parametrize(('name', 'said'), [
-    (f'{HERE}:nobody', 'has no function'), (f'{HERE}:nothing', 'gives a int'),
-    ('nowhere.py:load', 'there is no file'), ('load', 'is no policy'),
-    (f'{HERE.with_name("conftest.txt")}:x', 'is no policy')])
+    (f'{HERE}:nobody', 'has no function'), (f'{HERE}:nothing', 'returns a int'),
+    ('nowhere.py:load', 'there is no file'), ('load', 'does not name a policy'),
+    (f'{HERE.with_name("conftest.txt")}:x', 'does not name a policy')])
 def test_what_is_no_policy_is_refused_in_a_line(name: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         load_policy(name)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Some of the cells of an evaluation at a time, so that memory does not grow with their number."""
+"""Reads an evaluation's cells in blocks, so that memory does not grow with their number."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ import pyarrow.compute as pc
 
 class FactorLabels:
     """
-    The different labels of a factor.
+    The distinct labels of a factor.
 
-    :param texts: all of them.
-    :ivar texts: in the order of the alphabet, which is that of their numbers.
+    :param texts: all labels.
+    :ivar texts: labels in alphabetical order, which is the order of their numbers.
     """
 
     def __init__(self, texts: Iterable[str]) -> None:
@@ -31,7 +31,7 @@ class FactorLabels:
         """
         Return the numbers of a column's labels (N); an empty value is an empty label.
 
-        :raises KeyError: if there is another label in it.
+        :raises KeyError: if it contains an unknown label.
         """
         found = pc.index_in(pc.fill_null(column, ''), value_set=self._array)
         if found.null_count:
@@ -39,21 +39,21 @@ class FactorLabels:
         return np.asarray(found.to_numpy(), np.int32)
 
     def digests(self, numbers: NDArray[np.int32]) -> NDArray[np.uint64]:
-        """Return what stands for the labels whichever others there are (N)."""
+        """Return digests (N) of the labels, which do not depend on the other labels."""
         return np.asarray(self._digests[numbers])
 
 
 def digest_of(text: str) -> int:
-    """Return 64 bits that stand for a text."""
+    """Return a 64-bit digest of a text."""
     content = text.encode('utf-8', 'surrogatepass')
     return int.from_bytes(hashlib.blake2b(content, digest_size=8).digest(), 'little')
 
 
 def mixed(found: NDArray[np.uint64], more: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """
-    Mix digests with more ones (N): the finaliser of splitmix64, which spreads every bit.
+    Return digests (N) mixed with others, by the finaliser of splitmix64, which spreads every bit.
 
-    Of 100,000 different cells two have the same 64 bits with a probability of 3e-10.
+    Among 100,000 different cells, two have the same 64 bits with a probability of 3e-10.
     """
     with np.errstate(over='ignore'):
         value = (found ^ more) + np.uint64(0x9e3779b97f4a7c15)
@@ -65,7 +65,7 @@ def mixed(found: NDArray[np.uint64], more: NDArray[np.uint64]) -> NDArray[np.uin
 IntArray = NDArray[np.int64]
 
 BLOCK_CELLS = 65_536
-# Of the reason why a cell failed [characters].
+# Greatest length of the reason of a cell's failure [characters].
 _LONGEST_REASON = 200
 _OK = 'ok'
 _COLUMNS = {'cell': pa.string(), 'status': pa.string(), 'reason': pa.string(),
@@ -75,16 +75,16 @@ _COLUMNS = {'cell': pa.string(), 'status': pa.string(), 'reason': pa.string(),
 @dataclass(frozen=True)
 class CellBlock:
     """
-    Some cells (N), each once, in the order of their keys.
+    A block of cells (N), each once, in the order of their keys.
 
-    :param number: of the block.
-    :param keys: of the cells.
-    :param labels: (N, 6) numbers of their labels, as `TEXT_FACTORS` has them.
+    :param number: number of the block.
+    :param keys: keys of the cells.
+    :param labels: (N, 6) numbers of their labels, in the order of `TEXT_FACTORS`.
     :param seeds: (N)
-    :param pairs: (N) the same for cells that share all factors but the planner.
-    :param status: `ok`, or how it failed.
-    :param reasons: why it failed, cut where nobody reads on.
-    :param ok: (N) whether it ended well.
+    :param pairs: (N) digests, equal for cells that share all factors but the planner.
+    :param status: `ok`, or the kind of failure.
+    :param reasons: reason of the failure, shortened.
+    :param ok: (N) whether the cell succeeded.
     """
 
     number: int
@@ -99,15 +99,15 @@ class CellBlock:
 
 class CellBlocks:
     """
-    The cells in blocks: pairs are never parted, and it does not matter which part a cell is in.
+    The cells in blocks, which do not depend on the parts: pairs are never split between blocks.
 
-    Each block reads all parts and keeps its own rows. A cell that was run again counts once, as ok
-    if it ever ended well.
+    Each block reads all parts and keeps its own rows. A cell that was run again counts once, as
+    ok if any of its runs succeeded.
 
-    :param parts: of the evaluation.
-    :param block_cells: about so many cells are in a block.
-    :ivar labels: of each text factor.
-    :ivar count: of blocks.
+    :param parts: parts of the evaluation.
+    :param block_cells: approximate number of cells in a block.
+    :ivar labels: labels of each text factor.
+    :ivar count: number of blocks.
     """
 
     def __init__(self, parts: EvaluatedParts, block_cells: int = BLOCK_CELLS) -> None:
@@ -120,14 +120,14 @@ class CellBlocks:
 
     @property
     def planners(self) -> list[str]:
-        """Name the planners, in the order of the alphabet."""
+        """Return the planners' labels in alphabetical order."""
         return [text for text in self.labels['planner'].texts if text]
 
     def clusters(self, block: CellBlock) -> IntArray:
-        """Return the number of each cell's scenario (N), or its game's where it names none."""
+        """Return the number of each cell's scenario (N), or that of its game without one."""
         scenarios, games = (block.labels[:, TEXT_FACTORS.index(name)].astype(np.int64)
                             for name in ('scenario', 'game'))
-        # The empty label is the first. Games below zero: the two are counted each for itself.
+        # The empty label has number 0. Games get negative numbers, apart from those of scenarios.
         return np.where(scenarios == 0, -1 - games, scenarios)
 
     def factors(self, block: CellBlock, row: int) -> tuple[str, ...]:
@@ -181,7 +181,7 @@ def _failure_columns(rows: pa.RecordBatch) -> pa.RecordBatch:
 
 
 def _each_once(table: pa.Table) -> IntArray:
-    """Return the rows of a table of cells in the order of their keys, one of each."""
+    """Return the rows of a table of cells in the order of their keys, one for each cell."""
     order = pc.sort_indices(table, [(name, 'ascending') for name in table.column_names])
     keys = table['cell'].take(order)
     first = np.ones(len(keys), bool)
@@ -202,7 +202,7 @@ class CellGroups:
 
     :param blocks: the cells.
     :param by: the factors.
-    :ivar labels: of each group by its number, in the order in which they came.
+    :ivar labels: labels of each group by its number, in the order of their first cells.
     """
 
     def __init__(self, blocks: CellBlocks, by: Sequence[str]) -> None:

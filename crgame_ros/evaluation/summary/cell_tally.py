@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is counted of cells before any measure is read."""
+"""Counts of cells, made before any measure is read."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -15,17 +15,17 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-# So many different reasons are counted one by one, and so many are told.
+# Greatest numbers of different reasons that are counted separately, and that are shown.
 _MOST_COUNTED, MOST_TOLD = 1000, 20
 _OTHER = 'other reasons'
-# Of a traceback the end says most [characters].
+# Length of a traceback's end that is kept [characters].
 _LONGEST_TRACEBACK = 6000
-# Tracebacks are long: few rows at a time.
+# Rows are read in small batches, because tracebacks are long.
 _BATCH_ROWS = 1024
 
 
 class FailureReasons:
-    """Counts the cells that failed, by how and why."""
+    """Counts of failed cells, by status and reason."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str], Counter[int]] = {}
@@ -50,9 +50,9 @@ class FailureReasons:
     def reasons(self, parts: EvaluatedParts,
                 labels: Sequence[tuple[str, ...]]) -> tuple[FailureReason, ...]:
         """
-        Return the most frequent ones, and what is left in one of each status.
+        Return the most frequent reasons, and the rest as one reason for each status.
 
-        :param labels: of the groups, by number.
+        :param labels: labels of the groups, by number.
         :raises InputError: if a part cannot be read.
         """
         kinds = sorted(self._counts, key=lambda kind: (-self._counts[kind].total(), kind))
@@ -71,7 +71,7 @@ class FailureReasons:
 
 
 def _tracebacks(parts: EvaluatedParts, keys: set[str]) -> dict[str, str]:
-    """Read the tracebacks of some cells, as far as they have left any."""
+    """Return the tracebacks of cells, for those that have one."""
     found: dict[str, str] = {}
     if not keys:
         return found
@@ -88,17 +88,17 @@ def _tracebacks(parts: EvaluatedParts, keys: set[str]) -> dict[str, str]:
 @dataclass
 class CellTally:
     """
-    The cells, counted.
+    The counts of all cells.
 
-    :param groups: of the cells.
+    :param groups: groups of the cells.
     :param baseline: planner that others are compared with; empty for none.
-    :param baseline_number: of its label.
-    :ivar units: cells of each group, by its number.
-    :ivar pairs: its pairs with cells of the baseline.
-    :ivar failed: its cells that failed.
-    :ivar outcomes: its pairs by whether its own cell ended well, and the baseline's.
-    :ivar unpaired: its cells of which the baseline has none.
-    :ivar failures: why cells failed.
+    :param baseline_number: number of its label.
+    :ivar units: cells of each group, by the group's number.
+    :ivar pairs: pairs of each group with cells of the baseline.
+    :ivar failed: number of each group's failed cells.
+    :ivar outcomes: number of pairs, by the success of the group's cell and of the baseline's.
+    :ivar unpaired: number of the group's cells without a counterpart of the baseline.
+    :ivar failures: reasons of failures.
     """
 
     groups: CellGroups
@@ -117,7 +117,7 @@ class CellTally:
         return set().union(*(units.clusters for units in self.units.values()))
 
     def in_order(self, units: Mapping[int, DrawnUnits]) -> list[tuple[int, DrawnUnits]]:
-        """Sort what is known of groups by their labels."""
+        """Return groups with their units, sorted by labels."""
         return sorted(units.items(), key=lambda each: self.groups.labels[each[0]])
 
 
@@ -125,7 +125,7 @@ def tally_cells(blocks: CellBlocks, by: Sequence[str], baseline: str) -> CellTal
     """
     Count the cells.
 
-    :param by: factors that make groups.
+    :param by: factors that define groups.
     :param baseline: planner that others are compared with; empty for none.
     :raises InputError: if a part cannot be read.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What `crgame evaluate --summary` does with a folder."""
+"""`crgame evaluate --summary`: print and write the summary of an evaluation."""
 
 import argparse
 from collections.abc import Iterator, Sequence
@@ -21,12 +21,12 @@ from crgame_ros.evaluation.summary.tables import (
 
 WIDTH = 120
 _GAP, _INDENT = '  ', '  '
-# Of what stands in a table [characters].
+# Greatest length of a text in a table [characters].
 _LONGEST = 40
 
 
 def summary_text(summary: Summary) -> str:
-    """Write a summary for a terminal."""
+    """Return a summary as text for a terminal."""
     lines = _wrapped(f'{summary_title(summary)}: {summary_lead(summary)}', '')
     for table in summary_tables(summary):
         lines += ['', _cut(table.title)]
@@ -43,7 +43,7 @@ def _wrapped(text: str, indent: str) -> list[str]:
 
 
 def _reports(summary: Summary, table: SummaryTable) -> Iterator[str]:
-    """Yield where the reports of single cells are, or how they are made."""
+    """Yield the paths of single cells' reports, or the commands that make them."""
     keys = list(dict.fromkeys(row[table.keys].text for row in table.rows))
     there = [(key, path) for key in keys if (path := summary.report(key)) is not None]
     for _, path in there:
@@ -53,7 +53,7 @@ def _reports(summary: Summary, table: SummaryTable) -> Iterator[str]:
 
 
 def _rows(table: SummaryTable) -> Iterator[str]:
-    """Yield the lines of a table; columns that do not fit stand below."""
+    """Yield the lines of a table; columns that do not fit follow below."""
     rows = [[_cut(text) for text in table.head],
             *([_cell(cell) for cell in row] for row in table.rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(table.head))]
@@ -65,7 +65,7 @@ def _rows(table: SummaryTable) -> Iterator[str]:
 
 
 def _parts(widths: Sequence[int]) -> Iterator[list[int]]:
-    """Divide columns into as few parts as fit, each with the first column in front."""
+    """Yield the columns of each part: as few parts as fit, each starting with the first column."""
     part, used = [0], widths[0]
     for column in range(1, len(widths)):
         used += len(_GAP) + widths[column]
@@ -113,8 +113,8 @@ def summarise_command(folder: Path, values: argparse.Namespace) -> int:
     Print the summary of an evaluation, and write its page into the folder.
 
     :param folder: of the evaluation.
-    :param values: as `add_summary_arguments` declares them.
-    :raises InputError: if something cannot be used.
+    :param values: values of the arguments that `add_summary_arguments` declares.
+    :raises InputError: if the evaluation or an argument cannot be used.
     """
     from crgame_ros.evaluation.summary.html_page import write_summary_page
     from crgame_ros.evaluation.summary.markdown import summary_markdown

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of an evaluation's folder, read batch by batch."""
+"""Reads the parts of an evaluation's folder batch by batch."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,7 +11,7 @@ from crgame_ros.evaluation.results.parts import newest_parts
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-# What a cell is made of; cells that share all but the planner are a pair.
+# The text factors of a cell; cells that share all factors but the planner are a pair.
 TEXT_FACTORS = ('scenario', 'game', 'planner', 'human', 'perception', 'traffic')
 FACTORS = (*TEXT_FACTORS, 'seed')
 _REQUIRED = {'cells': ('cell', 'status'), 'vehicles': ('cell', 'vehicle', 'role')}
@@ -19,10 +19,10 @@ _REQUIRED = {'cells': ('cell', 'status'), 'vehicles': ('cell', 'vehicle', 'role'
 
 class PartBatch(NamedTuple):
     """
-    Some rows of parts with the same columns.
+    Rows of parts that have the same columns.
 
-    :param rows: with all columns that were asked for; those that the parts lack are empty.
-    :param columns: that the parts have.
+    :param rows: rows with all requested columns; columns that the parts lack are empty.
+    :param columns: columns that the parts have.
     """
 
     rows: pa.RecordBatch
@@ -31,12 +31,12 @@ class PartBatch(NamedTuple):
 
 class EvaluatedParts:
     """
-    The cells that were finished when it was made: whatever is added later is not read.
+    The cells that were finished at construction; cells added later are not read.
 
-    :param folder: of the evaluation.
-    :ivar rows: how many the parts of `cells` have.
-    :ivar columns: all that any part of `vehicles` has.
-    :raises InputError: if there is none, or one cannot be read.
+    :param folder: folder of the evaluation.
+    :ivar rows: number of rows in the parts of `cells`.
+    :ivar columns: columns that any part of `vehicles` has.
+    :raises InputError: if there is no part, or one cannot be read.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -56,12 +56,12 @@ class EvaluatedParts:
     def batches(self, table: str, columns: Mapping[str, pa.DataType],
                 batch_rows: int = 32_768) -> Iterator[PartBatch]:
         """
-        Read some columns of all parts.
+        Yield some columns of all parts in batches.
 
         :param table: `cells` or `vehicles`.
-        :param columns: with the types that they are wanted in.
-        :param batch_rows: at most so many rows at a time.
-        :raises InputError: if a part is broken, or a column is of another kind.
+        :param columns: columns with the types to convert them to.
+        :param batch_rows: greatest number of rows in a batch.
+        :raises InputError: if a part is broken, or a column cannot be converted.
         """
         kept: list[PartBatch] = []
         for part in self._parts[table]:
@@ -71,7 +71,7 @@ class EvaluatedParts:
                     for batch in file.iter_batches(
                             batch_rows, columns=list(there & columns.keys()), use_threads=False):
                         found = PartBatch(_wanted(batch, columns), there)
-                        # Small parts together: each batch costs its reader the same.
+                        # Merge small parts: each batch has a fixed cost for its reader.
                         if kept and (kept[0].columns != there or batch_rows < sum(
                                 each.rows.num_rows for each in (*kept, found))):
                             yield _together(kept)
@@ -89,7 +89,7 @@ def _together(batches: list[PartBatch]) -> PartBatch:
 
 
 def _wanted(batch: pa.RecordBatch, columns: Mapping[str, pa.DataType]) -> pa.RecordBatch:
-    """Return columns in the types in which they are wanted, empty where there are none."""
+    """Return the requested columns in the requested types; missing ones are empty."""
     there = batch.schema.names
     return pa.RecordBatch.from_arrays(
         [batch[name].cast(kind) if name in there else pa.nulls(batch.num_rows, kind)

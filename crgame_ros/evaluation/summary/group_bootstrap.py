@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Means with percentile-bootstrap intervals, of sums that come block by block.
+Computes means with percentile-bootstrap intervals, from sums that are added block by block.
 
-Cells of one scenario are alike, so scenarios are drawn, whole, where there are enough of them
+Cells of one scenario are correlated. If there are enough scenarios, whole scenarios are drawn
 (Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 3.8: drawing within
 them as well adds variance that is not there). Otherwise cells are drawn.
 """
@@ -19,20 +19,20 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Of fewer scenarios a resample says little about others.
+# A resample of fewer scenarios is not representative.
 FEWEST_SCENARIOS = 5
 CONFIDENCE = 0.95
-# Draws at a time, each some 40 bytes.
+# Number of draws at a time, each some 40 bytes.
 _DRAWS = 1_000_000
 
 
 @dataclass
 class DrawnUnits:
     """
-    What a group has to draw from, counted before anything is summed up.
+    The units to draw from in a group, counted before any sums.
 
-    :param cells: in each block; pairs of cells where differences are drawn.
-    :param clusters: scenarios, by number.
+    :param cells: number of cells in each block; of pairs of cells for differences.
+    :param clusters: numbers of the scenarios.
     """
 
     cells: list[int]
@@ -40,19 +40,19 @@ class DrawnUnits:
 
     @property
     def resampled(self) -> Literal['scenarios', 'cells']:
-        """Return what is drawn."""
+        """Return the kind of units that are drawn."""
         return 'scenarios' if len(self.clusters) >= FEWEST_SCENARIOS else 'cells'
 
 
 class GroupBootstrap:
     """
-    The mean of each measure in one group: sum of all values over their number.
+    The mean of each measure in one group: the sum of all values over their number.
 
-    :param name: seeds the draws, so that other groups do not change them.
-    :param units: of the group.
-    :param measures: how many.
-    :param resamples: how many.
-    :param seed: of the evaluation's summary.
+    :param name: part of the draws' seed, so that other groups do not change them.
+    :param units: units of the group.
+    :param measures: number of measures.
+    :param resamples: number of resamples.
+    :param seed: seed of the evaluation's summary.
     """
 
     def __init__(self, name: str, units: DrawnUnits, measures: int, resamples: int,
@@ -77,7 +77,7 @@ class GroupBootstrap:
 
         :param block: its number.
         :param sums: (N, measures)
-        :param counts: (N, measures) of how many values each sum is.
+        :param counts: (N, measures) number of values in each sum.
         :param clusters: (N) scenario of each cell.
         """
         values = np.concatenate((sums, counts), axis=1)
@@ -104,7 +104,7 @@ class GroupBootstrap:
             self._draw(values, np.full(self._resamples, len(values)), self._random(0))
         means, = _ratios(self._total[None], self._measures)
         bounds = _percentiles(_ratios(self._drawn, self._measures))
-        # Of a single one all resamples are alike, which says nothing.
+        # With a single unit all resamples are equal, so that there is no interval.
         bounds[:, known < 2] = np.nan
         low, high = bounds.tolist()
         return tuple(Estimate(value, least, greatest, int(n), units)
@@ -116,7 +116,7 @@ class GroupBootstrap:
         return np.random.default_rng([*self._entropy, stream])
 
     def _draw(self, values: FloatArray, sizes: IntArray, random: np.random.Generator) -> None:
-        """Add to each resample so many of some rows, drawn with replacement."""
+        """Add rows drawn with replacement to each resample."""
         rows = len(values)
         at_once = max(1, _DRAWS // max(rows, 1))
         for start in range(0, self._resamples, at_once):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A summary as one HTML file that any browser opens, in the style of reports."""
+"""Writes a summary as a single HTML file, in the style of reports."""
 
 from collections.abc import Iterator, Sequence
 import math
@@ -32,12 +32,12 @@ from crgame_ros.evaluation.summary.tables import (
 from crgame_ros.recording.export import write_text
 import numpy as np
 
-# Of the picture, which is scaled as a whole [px].
+# Sizes in the picture, which is scaled as a whole [px].
 WIDTH, _ROW, _TOP, _AXIS = 420, 22, 6, 24
 _NAMES, _NUMBERS, _EDGE = 116, 58, 8
 _LONGEST_NAME = 17
 
-# Of the numbers' size; a narrower range has no marks that differ.
+# Least relative range of an axis; a narrower one has no distinct marks.
 _NARROWEST = 1e-9
 
 
@@ -45,12 +45,12 @@ class PlottedInterval(NamedTuple):
     """
     A row of the picture.
 
-    :param name: of whom it is.
+    :param name: name of the group.
     :param value: the mean.
-    :param low: of the interval; NaN for none.
-    :param high: of the interval.
-    :param text: the mean as it is written.
-    :param kind: class of its marks.
+    :param low: lower bound of the interval; NaN for none.
+    :param high: upper bound of the interval.
+    :param text: the mean as text.
+    :param kind: CSS class of its marks.
     """
 
     name: str
@@ -63,10 +63,10 @@ class PlottedInterval(NamedTuple):
 
 def interval_svg(rows: Sequence[PlottedInterval], with_zero: bool) -> str:
     """
-    Draw rows one above the other.
+    Return an SVG with rows one above the other.
 
-    :param rows: those whose mean is NaN stay empty.
-    :param with_zero: whether zero is in the picture, as a line.
+    :param rows: rows; one with a mean of NaN stays empty.
+    :param with_zero: whether the picture includes zero, as a line.
     """
     ticks = _ticks([number for row in rows for number in (row.value, row.low, row.high)],
                    with_zero)
@@ -104,8 +104,8 @@ def _tick(x: float, value: float, bottom: float, with_zero: bool) -> str:
 
 
 def _ticks(numbers: Sequence[float], with_zero: bool) -> list[float]:
-    """Choose the values that are named below, the ends of the picture among them."""
-    # Takes a while, and only pages need it.
+    """Return the values labelled on the axis, including the picture's ends."""
+    # Imported here because it takes long, and only pages need it.
     from matplotlib.ticker import MaxNLocator
     known = [number for number in numbers if math.isfinite(number)]
     if with_zero or not known:
@@ -125,9 +125,9 @@ _BETTER = {1: 'greater', -1: 'smaller', 0: 'neither'}
 
 def write_summary_page(summary: Summary, path: Path) -> None:
     """
-    Write the page of a summary: whole or not at all.
+    Write the page of a summary, completely or not at all.
 
-    :param path: of the file; links lead from there to the reports of cells that have one.
+    :param path: path of the file; links to the cells' reports are relative to it.
     :raises InputError: if it cannot be written.
     """
     write_text(summary_html(summary, path.parent), path)
@@ -135,9 +135,9 @@ def write_summary_page(summary: Summary, path: Path) -> None:
 
 def summary_html(summary: Summary, folder: Path) -> str:
     """
-    Write the page.
+    Return the page.
 
-    :param folder: in which it will be.
+    :param folder: folder in which it will be.
     """
     title = summary_title(summary)
     sections = [(each.key, each.title, _section(summary, each, folder))
@@ -195,7 +195,7 @@ def _key(summary: Summary, key: str, folder: Path) -> str:
 
 
 def _commands(summary: Summary, content: SummaryTable) -> str:
-    """Return the commands that make the reports that are not there."""
+    """Return the commands that make the missing reports."""
     keys = dict.fromkeys(row[content.keys].text for row in content.rows)
     lines = [plain(summary.report_command(key)) for key in keys if summary.report(key) is None]
     if not lines:
@@ -221,7 +221,7 @@ def _plots(summary: Summary, differences: bool) -> str:
                 for group in groups]
         if len({row.value for row in rows if not math.isnan(row.value)}) < 2 and all(
                 not row.low < row.high for row in rows):
-            # All the same: nothing to see.
+            # All values are equal, so that a picture shows nothing.
             continue
         figures.append(f'<figure class="chart"><figcaption>{plain(measure_label(measure))}'
                        f'</figcaption>{interval_svg(rows, differences)}</figure>')

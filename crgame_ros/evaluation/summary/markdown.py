@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A summary as Markdown, with tables as GitHub has them."""
+"""A summary as Markdown, with tables in GitHub's syntax."""
 
 from collections.abc import Iterator, Sequence
 import os
@@ -18,15 +18,15 @@ from crgame_ros.evaluation.summary.tables import (
     SummaryTable,
 )
 
-# What Markdown, or HTML in it, takes for more than text.
+# Characters with a meaning in Markdown, or in HTML within it.
 _SPECIAL = re.compile(r'([\\`*_{}\[\]<>()#+!|~&])')
 
 
 def summary_markdown(summary: Summary) -> str:
     """
-    Write a summary as Markdown.
+    Return a summary as Markdown.
 
-    Links to reports lead from a file in the folder of the evaluation.
+    Links to reports are relative to the folder of the evaluation.
     """
     lines = [f'# {_plain(summary_title(summary))}', '', _plain(summary_lead(summary))]
     for table in summary_tables(summary):
@@ -69,5 +69,5 @@ def _plain(text: str) -> str:
 
 
 def relative(path: Path, folder: Path) -> str:
-    """Return the address of a file as pages in a folder link to it."""
+    """Return the address of a file relative to a folder, for links."""
     return quote(Path(os.path.relpath(path, folder)).as_posix())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the AVs of a block's cells."""
+"""Reads the measures of the AVs in a block's cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ FloatArray = NDArray[np.float64]
 @dataclass(frozen=True)
 class MeasuredVehicles:
     """
-    The AVs (V) of a block's cells that ended well, cell by cell.
+    The AVs (V) of a block's successful cells, cell by cell.
 
     :param cells: (V) row of each AV's cell in the block, rising.
-    :param ids: (V) of the AVs.
+    :param ids: (V) ids of the AVs.
     :param values: (V, measures) NaN where there is none.
     """
 
@@ -33,9 +33,9 @@ class MeasuredVehicles:
     def sums(self, block: CellBlock, measures: Sequence[SummaryMeasure]
              ) -> tuple[FloatArray, FloatArray]:
         """
-        Sum up cell by cell.
+        Return the sums of each cell.
 
-        :return: (N, measures) sums of the values, and how many they are.
+        :return: (N, measures) sums of the values, and the numbers of values.
         """
         sums = np.zeros((len(block.ok), len(measures)))
         counts = np.zeros_like(sums)
@@ -54,7 +54,7 @@ class MeasuredVehicles:
 def measured_vehicles(parts: EvaluatedParts, block: CellBlock,
                       measures: Sequence[SummaryMeasure]) -> MeasuredVehicles:
     """
-    Read what is known of the AVs of a block.
+    Read the measures of the AVs of a block.
 
     :raises InputError: if a part cannot be read.
     """
@@ -87,7 +87,7 @@ def _texts(column: pa.Array) -> NDArray[np.object_]:
 
 
 def _each_once(found: MeasuredVehicles) -> MeasuredVehicles:
-    """Sort by cell and vehicle, and keep one row of each: a cell may have been run again."""
+    """Return one row for each cell and vehicle, sorted: a cell may have been run again."""
     if not len(found.cells):
         return found
     _, ranks = np.unique(found.ids, return_inverse=True)
@@ -95,7 +95,7 @@ def _each_once(found: MeasuredVehicles) -> MeasuredVehicles:
     first = np.ones(len(order), bool)
     first[1:] = (np.diff(found.cells[order]) != 0) | (np.diff(ranks[order]) != 0)
     if not first.all():
-        # Whichever came first, the same row is kept.
+        # The row kept does not depend on the order of the rows.
         order = np.lexsort((*found.values.T[::-1], ranks, found.cells))
     order = order[first]
     return MeasuredVehicles(found.cells[order], found.ids[order], found.values[order])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is summed up of cells: one row of a table for each measure."""
+"""The measures of a summary: one row of a table for each."""
 
 from collections.abc import Iterable, Sequence
 import math
@@ -21,19 +21,20 @@ _NUMERIC = {column.name: column for column in VEHICLES.columns
 
 class SummaryMeasure(NamedTuple):
     """
-    Something of which there is a mean.
+    A measure that is averaged over vehicles or cells.
 
-    :param name: by which it is asked for.
-    :param label: for people.
-    :param column: of the table `vehicles`; empty of what is told by the cell alone.
-    :param better: the greater (1) or the smaller (-1) values are; 0 for neither.
-    :param test: with `limit` makes a share of it: of the values that pass; empty for a mean.
-    :param limit: of the test.
-    :param empty: what an empty value counts as; NaN leaves its row out.
-    :param where: another column that has to be known, or the row is left out; empty for none.
-    :param what: its definition in a sentence; empty where that of the column says it.
-    :param most: greater values count as this one: they come of speeds that are almost equal, or
-        of gaps that are almost closed, and a mean would be of them alone.
+    :param name: name in options.
+    :param label: name for people.
+    :param column: column of the table `vehicles`; empty if the cell alone gives the value.
+    :param better: whether greater (1) or smaller (-1) values are better; 0 for neither.
+    :param test: comparison with `limit`: the mean becomes the share of values that pass; empty
+        for a mean of the values.
+    :param limit: limit of the test.
+    :param empty: value that replaces an empty one; NaN leaves the row out.
+    :param where: another column that must have a value, or the row is left out; empty for none.
+    :param what: its definition in a sentence; empty where that of the column is sufficient.
+    :param most: greater values count as this one: they result from speeds that are almost equal
+        or gaps that are almost closed, and would dominate the mean.
     """
 
     name: str
@@ -49,7 +50,7 @@ class SummaryMeasure(NamedTuple):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Name the columns that it is made of."""
+        """Return the names of the columns from which it is computed."""
         return tuple(filter(None, (self.column, self.where)))
 
     @property
@@ -59,14 +60,14 @@ class SummaryMeasure(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Return the unit as tables write it; 1 of a share or a count."""
+        """Return the unit as tables write it; 1 for a share or a count."""
         if self.is_share or self.column not in _NUMERIC:
             return '1'
         return _NUMERIC[self.column].unit or '1'
 
     @property
     def definition(self) -> str:
-        """Return in a sentence what it is."""
+        """Return the definition in a sentence."""
         if self.what:
             return self.what
         column = _NUMERIC.get(self.column)
@@ -80,16 +81,16 @@ class SummaryMeasure(NamedTuple):
 
     def values(self, *columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """
-        Make values to average of its columns; NaN where there is none.
+        Return the values to average; NaN where there is none.
 
-        :param columns: (N) as `columns` names them, NaN where one is empty.
+        :param columns: (N) values of the columns of `columns`, NaN where one is empty.
         """
         numbers = columns[0]
         if self.where:
             return np.where(np.isnan(columns[1]), np.nan, self._replace(where='').values(numbers))
         missing = np.isnan(numbers)
         if not self.test:
-            # The mean of something infinite says nothing.
+            # A mean with infinite values is not meaningful.
             return np.where(np.isfinite(numbers), np.minimum(numbers, self.most), self.empty)
         with np.errstate(invalid='ignore'):
             passed = {'<': numbers < self.limit, '>': numbers > self.limit, 'known': ~missing,
@@ -97,7 +98,7 @@ class SummaryMeasure(NamedTuple):
         return np.where(missing & (self.test != 'known'), self.empty, passed.astype(float))
 
 
-# Nobody was near where nothing is known of a gap: nothing critical.
+# An empty gap means that no other was near, so nothing was critical.
 MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('failed', 'cells that failed', '', -1,
                    what='share of all finished cells that did not end well'),
@@ -109,7 +110,7 @@ MEASURES = {measure.name: measure for measure in (
                    '<', USUAL.ttc_s, 0.0),
     SummaryMeasure('critical_drac', f'AVs with a DRAC above {USUAL.drac:g} m/s²', 'worst_drac',
                    -1, '>', USUAL.drac, 0.0),
-    # Never reached, and not scored at all, leave it empty alike.
+    # The column is empty both if the goal was never reached and if the vehicle was not scored.
     SummaryMeasure('goal_reached', 'AVs that reached their goal', 'score_reached_s', 1, 'known',
                    where='score_valid'),
     SummaryMeasure('valid', 'AVs with a valid solution', 'score_valid', 1, 'true'),
@@ -141,16 +142,16 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('latency_p50_s', 'median latency', 'latency_p50_s', -1),
     SummaryMeasure('latency_max_s', 'greatest latency', 'latency_max_s', -1),
 )}
-# The worst cells: contacts first, then by what was left.
+# Order of the worst cells: collisions first, then by the smallest TTC.
 WORST_FIRST = ('collision', 'worst_ttc')
 
 
 def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
                     ) -> tuple[SummaryMeasure, ...]:
     """
-    Choose what is summed up.
+    Return the measures of a summary.
 
-    :param names: of measures, or of numeric columns of the table `vehicles`; None for all
+    :param names: names of measures, or of numeric columns of the table `vehicles`; None for all
         measures.
     :param known: columns that the evaluation has.
     :raises InputError: if a name is neither, or its column is in no part.
@@ -176,6 +177,6 @@ def chosen_measures(names: Sequence[str] | None, known: Iterable[str]
 
 
 def _better(column: str) -> int:
-    """Return which values of a column are better: those less critical, of criticality."""
+    """Return which values of a column are better; for criticality, the less critical ones."""
     measure = CRITICALITY.get(column.removeprefix('worst_'))
     return -measure.worst if measure is not None and column.startswith('worst_') else 0

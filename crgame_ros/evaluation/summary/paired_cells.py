@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cells of two planners that are alike in everything else."""
+"""Pairs of cells of two planners that are equal in all other factors."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Values that differ by no more of the greater one are the same.
+# Values with a smaller relative difference are equal.
 SAME = 1e-12
 
 
@@ -20,9 +20,9 @@ class PairedCells:
     """
     The pairs (P) of a block.
 
-    :param rows: (P) of the cells of other planners.
-    :param baseline: (P) of those of the baseline planner.
-    :param unpaired: rows of cells of other planners that have no such cell.
+    :param rows: (P) rows of the cells of other planners.
+    :param baseline: (P) rows of the cells of the baseline planner.
+    :param unpaired: rows of cells of other planners without a counterpart of the baseline.
     """
 
     rows: IntArray
@@ -31,17 +31,17 @@ class PairedCells:
 
     def differences(self, sums: FloatArray, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
-        Subtract the mean of the baseline's cell from that of the other.
+        Return the mean of each cell minus that of the baseline's cell.
 
-        :param sums: (N, measures) of all cells of the block.
-        :param counts: (N, measures) of how many values each is.
-        :return: (P, measures) differences, 0 where there is none, and 1 where there is one.
+        :param sums: (N, measures) sums of all cells of the block.
+        :param counts: (N, measures) number of values in each sum.
+        :return: (P, measures) differences, 0 where there is none; and 1 where there is one, else 0.
         """
         with np.errstate(invalid='ignore', divide='ignore'):
             means = sums / counts
         own, other = means[self.rows], means[self.baseline]
         found = own - other
-        # The last bits of equal values are no difference.
+        # Rounding errors of equal values are no difference.
         found[np.abs(found) <= SAME * np.maximum(np.abs(own), np.abs(other))] = 0.0
         there = ~np.isnan(found)
         return np.where(there, found, 0.0), there.astype(float)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Sum up an evaluation: means, paired differences, the worst cells, failures.
+Summarises an evaluation: means, paired differences, worst cells, failures.
 
-The cells are looked at in blocks, twice: first they are counted, then their measures are read.
-What is kept in between grows with planners, scenarios and measures, not with cells.
+The cells are read in blocks, twice: first they are counted, then their measures are read. Memory
+in between grows with planners, scenarios and measures, not with cells.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,11 +34,11 @@ MOST_CELLS = 10
 
 class WorstCells:
     """
-    Keeps the worst cells of those that it has seen, by the worst AV of each.
+    The worst cells so far, by the worst AV of each.
 
-    :param by: measures, the first one first.
-    :param columns: of these among the values.
-    :raises InputError: if nobody knows which values of a measure are the worse ones.
+    :param by: measures to sort by, in order of priority.
+    :param columns: columns of these among the values.
+    :raises InputError: if a measure does not define which values are worse.
     """
 
     def __init__(self, by: Sequence[SummaryMeasure], columns: Sequence[int]) -> None:
@@ -47,12 +47,12 @@ class WorstCells:
                 raise InputError(f'nothing tells a worse {measure.name}', '--worst',
                                  'name a measure of AVs of which less or more is better')
         self._columns = list(columns)
-        # What is worse is smaller.
+        # With these signs, smaller values are worse.
         self._signs = np.array([float(measure.better) for measure in by])
         self._found: list[tuple[tuple[float, ...], str, WorstCell]] = []
 
     def add(self, blocks: CellBlocks, block: CellBlock, vehicles: MeasuredVehicles) -> None:
-        """Look at the cells of a block."""
+        """Add the cells of a block."""
         values = vehicles.values[:, self._columns]
         known = np.flatnonzero(~np.isnan(values).all(axis=1))
         ranks = np.nan_to_num(values * self._signs, nan=np.inf)
@@ -74,13 +74,13 @@ class WorstCells:
 
 RESAMPLES = 2000
 _FEWEST_RESAMPLES, _MOST_RESAMPLES = 100, 100_000
-# Numbers that resamples may take, 8 bytes each.
+# Greatest number of values in resamples, 8 bytes each.
 _MOST_NUMBERS = 20_000_000
 
 
 @contextmanager
 def _frugal_memory() -> Iterator[None]:
-    """Let Arrow give memory back at once: its own pool keeps several times what is in use."""
+    """Use the system's memory pool for Arrow: Arrow's own keeps several times the used memory."""
     before = pa.default_memory_pool()
     pa.set_memory_pool(pa.system_memory_pool())
     try:
@@ -95,19 +95,19 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
               worst: Sequence[str] | None = None, resamples: int = RESAMPLES, seed: int = 0,
               block_cells: int = BLOCK_CELLS) -> Summary:
     """
-    Sum up the cells that are finished.
+    Summarise the finished cells.
 
-    :param folder: of the evaluation.
-    :param measures: names of measures, or of numeric columns of the table `vehicles`; None for all
-        measures that there are.
-    :param by: factors; cells that have them alike are a group.
-    :param baseline: planner from which differences are told; None for the default planner of
-        games, or the first one where that is not among them.
+    :param folder: folder of the evaluation.
+    :param measures: names of measures, or of numeric columns of the table `vehicles`; None for
+        all measures available.
+    :param by: factors that define groups: cells with equal values of these are a group.
+    :param baseline: planner with which others are compared; None for the default planner of
+        games, or the first one if the evaluation lacks that.
     :param worst: measures by which the worst cells are chosen; None for collisions, then TTC.
-    :param resamples: for the intervals.
-    :param seed: of these.
-    :param block_cells: about so many cells are in memory at a time.
-    :raises InputError: if something cannot be used, or a part cannot be read.
+    :param resamples: number of resamples for the intervals.
+    :param seed: seed of the resamples.
+    :param block_cells: approximate number of cells in memory at a time.
+    :raises InputError: if an argument cannot be used, or a part cannot be read.
     """
     if not by or not set(by) <= set(TEXT_FACTORS):
         raise InputError(f'{short(list(by))} cannot be told apart', '--by',
@@ -153,7 +153,7 @@ _Bootstraps = dict[int, GroupBootstrap]
 def _sum_up(parts: EvaluatedParts, blocks: CellBlocks, tally: CellTally,
             chosen: Sequence[SummaryMeasure], worst_by: Sequence[SummaryMeasure],
             draws: tuple[int, int]) -> tuple[_Bootstraps, _Bootstraps, WorstCells]:
-    """Read all measures, block by block; `draws` are how many, and their seed."""
+    """Read all measures block by block; `draws` is the number of resamples and their seed."""
     columns = tuple(dict.fromkeys((*chosen, *worst_by)))
     found = WorstCells(worst_by, [columns.index(measure) for measure in worst_by])
     means, differences = ({group: GroupBootstrap(
@@ -190,7 +190,7 @@ def _groups(tally: CellTally, means: _Bootstraps) -> tuple[GroupMeans, ...]:
 def _differences(tally: CellTally, differences: _Bootstraps) -> tuple[PairedDifferences, ...]:
     found = []
     for group, units in tally.in_order(tally.pairs):
-        # By whether its own cell ended well, and that of the baseline.
+        # By the success of the group's cell, and of the baseline's.
         outcomes = tally.outcomes[group]
         found.append(PairedDifferences(
             tally.groups.labels[group], outcomes[True, True], outcomes[False, True],

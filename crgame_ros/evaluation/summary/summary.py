@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the cells of an evaluation say together."""
+"""The summary of an evaluation's cells, as data."""
 
 from dataclasses import asdict, dataclass
 import math
@@ -19,11 +19,11 @@ class Estimate:
     """
     A mean, or a mean difference, with its interval.
 
-    :param value: NaN where nothing is known.
+    :param value: NaN where there is no value.
     :param low: lower bound of the interval; NaN where there is none.
     :param high: upper bound.
-    :param n: values that it is the mean of: AVs, cells or pairs.
-    :param units: scenarios or cells with such values, of those that are drawn.
+    :param n: number of values in the mean: AVs, cells or pairs.
+    :param units: number of drawn scenarios or cells with such values.
     """
 
     value: float
@@ -34,7 +34,7 @@ class Estimate:
 
     @property
     def side(self) -> int:
-        """Return the side of zero on which the whole interval is; 0 where it is on both."""
+        """Return the side of zero on which the whole interval is; 0 if it is on both."""
         return 1 if self.low > 0.0 else -1 if self.high < 0.0 else 0
 
 
@@ -43,11 +43,11 @@ class GroupMeans:
     """
     The means of a group of cells.
 
-    :param labels: of the group, in the order of `Summary.by`.
-    :param cells: that are finished, well or not.
-    :param failed: of these.
-    :param scenarios: how many different ones.
-    :param resampled: what was drawn for the intervals.
+    :param labels: labels of the group, in the order of `Summary.by`.
+    :param cells: number of finished cells, failed ones included.
+    :param failed: number of failed cells.
+    :param scenarios: number of different scenarios.
+    :param resampled: kind of units drawn for the intervals.
     :param estimates: in the order of `Summary.measures`.
     """
 
@@ -62,16 +62,16 @@ class GroupMeans:
 @dataclass(frozen=True)
 class PairedDifferences:
     """
-    How a group differs from the baseline planner in cells that are alike in all else.
+    The differences of a group from the baseline planner, in cells equal in all other factors.
 
-    :param labels: of the group.
-    :param pairs: of cells that both ended well.
-    :param failed: pairs of which the group's cell alone failed.
-    :param baseline_failed: pairs of which the baseline's cell alone failed.
-    :param both_failed: pairs of which both did.
-    :param unpaired: cells of the group of which the baseline has none yet.
-    :param scenarios: how many different ones the pairs are of.
-    :param resampled: what was drawn for the intervals.
+    :param labels: labels of the group.
+    :param pairs: number of pairs in which both cells succeeded.
+    :param failed: number of pairs in which only the group's cell failed.
+    :param baseline_failed: number of pairs in which only the baseline's cell failed.
+    :param both_failed: number of pairs in which both failed.
+    :param unpaired: number of the group's cells without a counterpart of the baseline so far.
+    :param scenarios: number of different scenarios of the pairs.
+    :param resampled: kind of units drawn for the intervals.
     :param estimates: group minus baseline, in the order of `Summary.measures`.
     """
 
@@ -89,12 +89,12 @@ class PairedDifferences:
 @dataclass(frozen=True)
 class WorstCell:
     """
-    A cell, by its worst AV.
+    One of the worst cells, judged by its worst AV.
 
-    :param key: of the cell.
+    :param key: key of the cell.
     :param factors: its labels and its seed, in the order of `FACTORS`.
     :param vehicle: id of that AV.
-    :param values: by which it was chosen, in the order of `Summary.worst_by`.
+    :param values: values by which it was chosen, in the order of `Summary.worst_by`.
     """
 
     key: str
@@ -108,11 +108,11 @@ class FailureReason:
     """
     Cells that failed in the same way.
 
-    :param status: how.
-    :param reason: why.
-    :param cells: how many, by labels of their groups.
-    :param example: key of one of them.
-    :param traceback: of that one, if it left one.
+    :param status: kind of failure.
+    :param reason: reason of the failure.
+    :param cells: number of cells, by labels of their groups.
+    :param example: key of one of the cells.
+    :param traceback: traceback of that cell, if there is one.
     """
 
     status: str
@@ -123,27 +123,27 @@ class FailureReason:
 
     @property
     def count(self) -> int:
-        """Count its cells."""
+        """Return the number of its cells."""
         return sum(cells for _, cells in self.cells)
 
 
 @dataclass(frozen=True)
 class Summary:
     """
-    An evaluation, summed up.
+    The summary of an evaluation.
 
-    :param folder: of the evaluation.
-    :param by: factors that make the groups.
-    :param baseline: planner from which differences are told; empty for none.
-    :param measures: of which there are means.
-    :param scenarios: how many different ones.
+    :param folder: folder of the evaluation.
+    :param by: factors that define the groups.
+    :param baseline: planner with which others are compared; empty for none.
+    :param measures: measures with means.
+    :param scenarios: number of different scenarios.
     :param groups: in the order of their labels.
     :param differences: in the same order.
-    :param worst_by: measures by which the worst cells are chosen, the first one first.
+    :param worst_by: measures by which the worst cells are chosen, in order of priority.
     :param worst: the worst cells, the worst one first.
     :param failures: most frequent first.
-    :param resamples: how many were drawn.
-    :param seed: of the draws.
+    :param resamples: number of resamples.
+    :param seed: seed of the resamples.
     """
 
     folder: Path
@@ -161,17 +161,17 @@ class Summary:
 
     @property
     def cells(self) -> int:
-        """Count the cells that are finished."""
+        """Return the number of finished cells."""
         return sum(group.cells for group in self.groups)
 
     @property
     def failed(self) -> int:
-        """Count those that failed."""
+        """Return the number of failed cells."""
         return sum(group.failed for group in self.groups)
 
     def report(self, key: str) -> Path | None:
-        """Find the report of a cell; None if it has none yet."""
-        # Whatever else stands for a key in a part leads nowhere.
+        """Return the path of a cell's report; None if it has none yet."""
+        # Refuse texts of a part that are not a key: the path must stay in the folder.
         path = self.folder / 'reports' / f'{key}.html'
         return path if _KEY.fullmatch(key) and path.is_file() else None
 
@@ -180,7 +180,7 @@ class Summary:
         return shlex.join(('crgame', 'evaluate', str(self.folder), '--cell', key))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON has it: SI units, null for what is not known."""
+        """Return the summary as a JSON-compatible dictionary: SI units, None if unknown."""
         found = asdict(self)
         found['folder'] = str(self.folder)
         found['measures'] = {each.name: {'unit': each.unit, 'definition': each.definition}
@@ -197,7 +197,7 @@ class Summary:
 
 
 def _known(value: Any) -> Any:
-    """Replace what JSON cannot say."""
+    """Return a value in which those that JSON cannot represent are replaced."""
     if isinstance(value, dict):
         return {key: _known(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of a summary, whatever they are written as."""
+"""The tables of a summary, independent of the output format."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from crgame_ros.evaluation.summary.summary import (
 
 NOTHING = '-'
 _ALWAYS_TOLD = ('scenario', 'planner', 'seed')
-# As tried with made-up evaluations (docs/evaluation.md).
+# Found in trials with synthetic evaluations (docs/evaluation.md).
 _MANY_UNITS = 20
 _SHARE_OF_NONE = ('an interval from 0 to 0 is that of the resamples: what never happened in n may '
                   'still happen as often as 3/n')
@@ -29,11 +29,11 @@ _BY_CHANCE = ('better and worse: the whole interval is on that side of zero; whe
 
 class SummaryCell(NamedTuple):
     """
-    What stands in a cell of a table.
+    The content of a table's cell.
 
-    :param text: what counts.
-    :param detail: of less weight; empty for none.
-    :param mark: `better` or `worse` of a difference that is one; empty otherwise.
+    :param text: main text.
+    :param detail: secondary text; empty for none.
+    :param mark: `better` or `worse` for a clear difference; empty otherwise.
     """
 
     text: str
@@ -46,13 +46,13 @@ class SummaryTable:
     """
     A table of a summary.
 
-    :param key: tells it from the others.
-    :param title: of it.
-    :param caption: what its rows are.
+    :param key: unique key.
+    :param title: title.
+    :param caption: meaning of its rows.
     :param head: names of the columns.
-    :param rows: each as long as the head.
-    :param notes: what has to be known to read it.
-    :param keys: column in which there are keys of cells; -1 for none.
+    :param rows: rows, each as long as the head.
+    :param notes: explanations for readers.
+    :param keys: index of the column with keys of cells; -1 for none.
     """
 
     key: str
@@ -65,12 +65,12 @@ class SummaryTable:
 
 
 def summary_title(summary: Summary) -> str:
-    """Name an evaluation by its folder."""
+    """Return the name of an evaluation, from its folder."""
     return summary.folder.resolve().name
 
 
 def summary_lead(summary: Summary) -> str:
-    """Return how much there is."""
+    """Return a sentence on the numbers of cells and scenarios."""
     baseline = f', compared with {summary.baseline}' if summary.baseline else ''
     return (f'{summary.cells} cells finished, {summary.failed} of them failed; by '
             f'{" × ".join(summary.by)}: {len(summary.groups)}{baseline}; '
@@ -89,25 +89,25 @@ def summary_tables(summary: Summary) -> Iterator[SummaryTable]:
 
 
 def group_name(labels: Sequence[str]) -> str:
-    """Name a group by its labels."""
+    """Return the name of a group, from its labels."""
     return ' × '.join(label or NOTHING for label in labels)
 
 
 def known_measures(summary: Summary) -> Iterator[tuple[int, SummaryMeasure]]:
-    """Yield the measures of which something is known, with their places."""
+    """Yield the measures with any known value, with their indices."""
     for place, measure in enumerate(summary.measures):
         if any(group.estimates[place].n for group in summary.groups):
             yield place, measure
 
 
 def measure_label(measure: SummaryMeasure) -> str:
-    """Name a measure with its unit."""
+    """Return the label of a measure with its unit."""
     unit = '%' if measure.is_share else measure.unit.replace('^2', '²').replace('^3', '³')
     return measure.label if unit == '1' else f'{measure.label} [{unit}]'
 
 
 def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str:
-    """Write a value in the unit of `measure_label` to three digits."""
+    """Return a value as text in the unit of `measure_label`, to three digits."""
     if math.isnan(value):
         return NOTHING
     if measure.is_share:
@@ -152,7 +152,7 @@ def _group(group: GroupMeans | PairedDifferences) -> str:
 
 
 def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterator[str]:
-    """Yield what was drawn for intervals, and what they speak of."""
+    """Yield notes on the units drawn for intervals, and on what the intervals describe."""
     kinds: dict[str, list[str]] = {}
     for group in groups:
         kinds.setdefault(group.resampled, []).append(_group(group))
@@ -173,7 +173,7 @@ def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterat
 
 
 def _units(group: GroupMeans | PairedDifferences) -> int:
-    """Count what is drawn from."""
+    """Return the number of units to draw from."""
     if group.resampled == 'scenarios':
         return group.scenarios
     return group.cells if isinstance(group, GroupMeans) else group.pairs
@@ -211,7 +211,7 @@ def _differences(summary: Summary) -> SummaryTable:
 
 
 def _worst(summary: Summary) -> SummaryTable:
-    # What all cells have alike is told once.
+    # Factors with one value in all cells are stated once.
     told = [column for column, name in enumerate(FACTORS) if name in _ALWAYS_TOLD
             or len({cell.factors[column] for cell in summary.worst}) > 1]
     alike = [f'{name} {label}' for column, (name, label) in enumerate(zip(

@@ -183,7 +183,7 @@ class LiveBackend:
                 self._feed.scenario.game.scheduler.stamp_ns(self._feed.n))
 
     def _seat_who_chose(self) -> None:
-        """Put the client that uploaded the game that has begun into a seat of it."""
+        """Seat the client that uploaded the game, now that it has begun."""
         scenario = self._feed.scenario
         if self._expected is None or scenario is None:
             return
@@ -196,7 +196,7 @@ class LiveBackend:
             self._expected = None
 
     def joined(self, client: Client) -> None:
-        """Set the rate of a new page, and return its seat to a client that has come back."""
+        """Set the rate of a new page, and reassign its seat to a client that has come back."""
         self._feed.pace(client)
         self._desk.joined(client)
 

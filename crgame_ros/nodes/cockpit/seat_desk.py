@@ -178,7 +178,7 @@ class SeatDesk:
             self._feed.pace(client)
 
     def joined(self, client: Client) -> None:
-        """Return its seat to a client that is back; free that of one that only watches."""
+        """Reassign its seat to a client that is back; free that of one that only watches."""
         held = self.table.seat_of(client.id)
         if held is not None and not client.rights.drives:
             self._release(client, held.id)
@@ -224,7 +224,7 @@ class SeatDesk:
         return text
 
     def claim_for(self, client: Client) -> None:
-        """Put a client into the first free seat that the game leaves to a cockpit."""
+        """Claim the first free seat that the game leaves to a cockpit for a client."""
         if self.table.seat_of(client.id) is not None or not client.rights.drives:
             return
         for name, entry in self.table.seats.items():
@@ -249,7 +249,7 @@ class SeatDesk:
         return {item.id: item.name for item in self._hub.clients.values() if item.rights.drives}
 
     def _return(self, client: Client) -> None:
-        """Return the seat to a client whose connection was broken."""
+        """Reassign the seat to a client whose connection was broken."""
         seat = self.table.seat_kept_for(client.person)
         if seat is None or not client.key or client.dropped or not client.rights.drives:
             return

@@ -154,8 +154,8 @@ class LiveRun:
             self._state.publish('ended', self._reason)
             return outcome
         if not self._watch.tells_waiting:
-            self._node.get_logger().info('this kernel does not tell how long the loop waits for '
-                                         'a processor: late steps have parts unexplained')
+            self._node.get_logger().info('this kernel does not report how long the loop waits for '
+                                         'a processor: late steps stay partly unexplained')
         gc.collect()
         gc.freeze()
         gc.disable()

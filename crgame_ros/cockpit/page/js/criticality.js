@@ -47,7 +47,7 @@ export class CriticalityLog {
     fetch?.();
   }
 
-  /** Forget everything. */
+  /** Remove all frames. */
   clear() {
     this.#frames = [];
   }

@@ -70,7 +70,7 @@ class Lobby {
     this.#list.replaceChildren(...this.#seats.map(([id, seat]) => this.#row(id, seat)));
     const missing = this.#seats.filter(([, { holder, ready }]) => holder === null || !ready);
     setText(this.#note, seconds > 0 ? 'Hands on the controls: it begins.'
-      : missing.length > 0 ? 'The run begins when all are ready, after a countdown of 3 s.'
+      : missing.length > 0 ? 'The run begins after a countdown when all are ready.'
         : 'All are ready; hands on the controls.');
     const mine = this.#mine;
     const ready = mine !== undefined && Boolean(seats[mine].ready);

@@ -166,14 +166,14 @@ export {};
 
 /**
  * @typedef {object} Seat
- * @property {string} source source of the commands that the vehicle obeys
+ * @property {string} source of the commands that the vehicle obeys
  * @property {string} driver the source that the game names
  * @property {string|null} holder id of a client
  * @property {string|null} holder_name
  * @property {Person[]} [requests] persons that ask for it
  * @property {Person[]} [others] persons that could get it
  * @property {Person|null} [offer] person to which its holder offers it
- * @property {{name: string, for_s: number}|null} [kept] for its absent driver
+ * @property {{name: string, for_s: number}|null} [kept] for its absent driver, and how long
  * @property {boolean} [ready] whether its driver is ready to begin
  * @property {string} [device] of its driver, as its page reports it
  * @property {boolean} [lost] whether its driver is silent

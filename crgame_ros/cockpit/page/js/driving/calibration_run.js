@@ -57,7 +57,7 @@ export class CalibrationRun {
   #backSince_ms = NaN;
 
   /**
-   * @param {Profile} profile profile that skipped steps keep
+   * @param {Profile} profile kept by skipped steps
    */
   constructor(profile) {
     this.profile = structuredClone(profile);

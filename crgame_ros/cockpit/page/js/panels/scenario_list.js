@@ -48,7 +48,7 @@ export class ScenarioList {
   }
 
   /**
-   * @param {Offer['folders']} folders folders of /api/scenarios
+   * @param {Offer['folders']} folders of /api/scenarios
    * @param {string} chosen id of the entry that is marked, empty for none
    */
   show(folders, chosen) {

@@ -104,7 +104,7 @@ export class HealthLog {
     this.#keeps_s = keeps_s;
   }
 
-  /** Forget everything. */
+  /** Remove all rows. */
   clear() {
     this.#rows = [];
   }

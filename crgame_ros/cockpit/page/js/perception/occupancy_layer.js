@@ -20,7 +20,7 @@ const COARSEST = 6;
 
 /** The layer that draws the store's map as a picture in the theme's colour. */
 export class OccupancyLayer {
-  /** How many cells are occupied in the map that was drawn last. */
+  /** Number of occupied cells in the map that was drawn last. */
   drawn = 0;
   /** @type {OccupancyFrame|null} */
   #map = null;

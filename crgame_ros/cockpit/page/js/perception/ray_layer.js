@@ -21,7 +21,7 @@ const DOT_M = 0.15;
 
 /** The layer that draws the scans of one AV, with paths built once per scan. */
 export class RayLayer {
-  /** How many fans were drawn in the last frame. */
+  /** Number of fans drawn in the last frame. */
   drawn = 0;
   /** @type {WeakMap<ScanFrame, Paths>} */
   #paths = new WeakMap();

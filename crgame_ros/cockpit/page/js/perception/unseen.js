@@ -75,7 +75,7 @@ export class Unseen {
 }
 
 /**
- * Put a count into words.
+ * Return a count in words.
  *
  * @param {{seen: number, near: number, range: number|null}} count of `Unseen.count`
  * @returns {string} sees 3 of 4 within 80 m

@@ -13,7 +13,7 @@
  * @property {number} wheel_radius_m
  * @property {number} idle_rpm 0 for a motor that stands with its wheels
  * @property {number} limit_rpm
- * @property {number} order order of the strongest tone:
+ * @property {number} order of the strongest tone:
  *   tone = turns per second * order
  */
 

@@ -32,7 +32,7 @@ export const VIEWPOINTS = /** @type {const} */ (['driver', 'chase', 'bird']);
  */
 
 /**
- * Put a camera at a point of a vehicle.
+ * Return a camera at a point of a vehicle.
  *
  * @param {Stand} stand
  * @param {Point} point ahead of the rear axle, to the left, above the road [m]

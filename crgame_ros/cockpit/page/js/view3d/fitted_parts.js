@@ -90,7 +90,7 @@ export class FittedParts {
     }
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     for (const parts of [this.#wheels, this.#lamps, this.#shadows]) {
       parts?.dispose();

@@ -110,7 +110,7 @@ export class Headlights {
     this.#parts.forEach((part) => part.see(sight));
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     this.#parts.forEach((part) => part.dispose());
     this.#materials.forEach((material) => {

@@ -52,7 +52,7 @@ export class Instances {
     this.#seen.see(sight);
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     this.#seen.dispose();
     this.#material.dispose();

@@ -121,7 +121,7 @@ export class MergedMesh {
   add(m, tints, which) {
     const { count, positions, normals, colors, tinted } = this.#corners;
     const [o, c] = [16 * which, 3 * which];
-    // As three.js turns normals of what is stretched: by the inverse of the squared scales.
+    // As three.js transforms normals of scaled instances: by the inverse of the squared scales.
     const sx = 1 / (m[o] ** 2 + m[o + 1] ** 2 + m[o + 2] ** 2);
     const sy = 1 / (m[o + 4] ** 2 + m[o + 5] ** 2 + m[o + 6] ** 2);
     const sz = 1 / (m[o + 8] ** 2 + m[o + 9] ** 2 + m[o + 10] ** 2);

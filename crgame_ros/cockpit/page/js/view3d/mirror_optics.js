@@ -39,7 +39,7 @@ export const MIRRORS = Object.freeze([
  * @property {number} pitch above the horizon [rad]
  * @property {number} height angle of the picture in height [rad]
  * @property {number} aspect width of the picture through its height
- * @property {number} near near plane, at the glass [m]
+ * @property {number} near plane, at the glass [m]
  */
 
 /**

@@ -12,8 +12,8 @@
  * @property {number} plain_m beyond it vehicles and trees have few triangles
  * @property {number} farthest_m beyond it no vehicle is drawn
  * @property {number} wheels_m beyond it wheels are discs on the flanks
- * @property {boolean} fine whether the sky has a sun and a glow, and surfaces are as sharp in
- *   the distance as can be
+ * @property {boolean} fine whether the sky has a sun and a glow, and surfaces are as sharp as
+ *   possible in the distance
  * @property {number} mirrorEvery a mirror is drawn with each picture, or with each second one
  */
 

@@ -75,7 +75,7 @@ export function isWithin(planes, x, y, z, radius) {
  */
 
 /**
- * Return a shape as a mergeable plain one, for things whose number costs more than their triangles.
+ * Return a shape as a plain one, for things whose number costs more than their triangles.
  *
  * @param {Part} part of a material without vertex colours
  * @returns {Part} whose material has to be freed, too

@@ -29,7 +29,7 @@ import { steeringOf } from './steering.js';
  * @property {Instances} instances
  * @property {[x: number, y: number, z: number]} scale of the body
  * @property {number} role its colour on the map
- * @property {number} rolled rolled distance of its wheels [m]
+ * @property {number} rolled distance of its wheels [m]
  * @property {number} wheelbase of the body as it is scaled; 0 without wheels [m]
  * @property {boolean} parked whether it is parked, without a driver
  */

@@ -120,7 +120,7 @@ export class Camera {
   }
 
   /**
-   * Look at a point of the map from a driver's distance.
+   * Show a point of the map at a driver's scale.
    *
    * @param {number} x
    * @param {number} y
@@ -131,7 +131,7 @@ export class Camera {
   }
 
   /**
-   * Begin to follow a vehicle; call `track` in each frame from then on.
+   * Start following a vehicle; call `track` in each frame from then on.
    *
    * @param {Pose} pose where it is
    * @param {boolean} headingUp whether the map turns with it

@@ -88,7 +88,7 @@ export class Navigation {
   }
 
   /**
-   * Look at a pose from near, without following.
+   * Show a pose at close range, without following.
    *
    * @param {{x: number, y: number}} pose
    */

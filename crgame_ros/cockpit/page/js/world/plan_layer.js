@@ -28,8 +28,8 @@ export class PlanLayer {
   /**
    * Update which AVs' plans are hidden, from the fired events.
    *
-   * @param {Scene|null} scene scene with the definitions of the events
-   * @param {FiredEvent[]} fired fired events, in order
+   * @param {Scene|null} scene with the definitions of the events
+   * @param {FiredEvent[]} fired in order
    */
   takeEvents(scene, fired) {
     this.#hidden.clear();

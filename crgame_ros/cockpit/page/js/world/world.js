@@ -33,8 +33,8 @@ const REDRAWN_ON = /** @type {const} */ (['state', 'objects', 'plan', 'predictio
  * @property {boolean} [toolbar] whether there is a toolbar
  * @property {boolean} [follow] begin with the first vehicle instead of the whole map
  * @property {HTMLElement|null} [covered] an element that lies over the lower edge
- * @property {() => Sight|null} [sight] asked in each frame from which seat one looks; none sees
- *   all
+ * @property {() => Sight|null} [sight] returns the seat of the user; without one, all is
+ *   visible
  */
 
 /** One canvas that shows what a store holds. */
@@ -92,7 +92,7 @@ export class World {
     this.#frame = requestAnimationFrame((now_ms) => this.#animate(now_ms));
   }
 
-  /** Id of the followed vehicle or object, null while the camera is free. */
+  /** Return the id of the followed vehicle or object, null while the camera is free. */
   get followed() {
     return this.#navigation.followed;
   }
@@ -180,8 +180,8 @@ export class World {
   /**
    * Set a function that chooses which things are drawn as outlines.
    *
-   * @param {ChooseHollow} choose called in each frame with what layers get; gives 1 for each
-   *   vehicle, then object, that is to be hollow, null for none
+   * @param {ChooseHollow} choose called in each frame with the input of layers; returns 1 for each
+   *   vehicle, then object, that is hollow, null for none
    */
   drawHollow(choose) {
     this.#painter.vehicles.hollow = choose;

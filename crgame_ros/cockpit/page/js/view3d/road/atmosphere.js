@@ -161,7 +161,7 @@ export class Atmosphere {
     this.#ambient.intensity = look.sky_light + 0.4 * look.sun_light * (1 - clear);
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     for (const { geometry, material } of [this.#sky, this.#plainSky]) {
       geometry.dispose();

@@ -119,7 +119,7 @@ export class NearInstances {
       .map(({ instance }) => instance);
   }
 
-  /** Free what the graphics card holds, but for the material. */
+  /** Free the memory of the graphics card, except the material. */
   dispose() {
     this.#seen.dispose();
   }

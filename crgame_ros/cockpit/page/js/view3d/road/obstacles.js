@@ -72,7 +72,7 @@ export class Obstacles {
     return geometryOf(this.#three, parts);
   }
 
-  /** Free what the graphics card holds, but for the material. */
+  /** Free the memory of the graphics card, except the material. */
   dispose() {
     this.mesh.geometry.dispose();
   }

@@ -28,15 +28,15 @@ const LAND_ORDER = 900;
 
 /**
  * @typedef {object} RoadWorld
- * @property {Group} group what the scene of three.js gets: z up, metres from `localOrigin(scene)`;
- *   the lights are in it
+ * @property {Group} group for the scene of three.js: z up, metres from `localOrigin(scene)`;
+ *   includes the lights
  * @property {FogExp2} fog of the scene of three.js
  * @property {(environment: Environment) => void} setEnvironment shows another time of day or
  *   visibility than the scene document's
  * @property {(store: Store, now_ms: number, eye: Point) => void} update called before each
  *   picture, after `store.displayed(now_ms)`; eye is that of the main camera
- * @property {(sight: Sight) => void} see called before each camera draws, after `update`; without
- *   it all that is near is drawn
+ * @property {(sight: Sight) => void} see called before each camera draws, after `update`; else
+ *   everything near is drawn
  * @property {(x: number, y: number) => number} heightAt of the road at a point of the map [m]
  * @property {(fine: boolean) => void} setFine see Detail
  * @property {number} triangles in the whole group, at most

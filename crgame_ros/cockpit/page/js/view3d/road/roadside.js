@@ -184,7 +184,7 @@ class Edge {
 
   /**
    * @param {number} spacing [m]
-   * @returns {number[]} distances along the line at which the road's station is a multiple of the spacing
+   * @returns {number[]} distances along the line whose station is a multiple of the spacing
    */
   multiples(spacing) {
     const found = [];

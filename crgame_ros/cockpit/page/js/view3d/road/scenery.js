@@ -67,7 +67,7 @@ export class Scenery {
     this.#kinds.forEach((kind) => kind.see(sight));
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     this.#kinds.forEach((kind) => kind.dispose());
   }

@@ -85,7 +85,7 @@ export class Signs {
     this.#poles.see(sight);
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     this.#texture.dispose();
     this.#plates.geometry.dispose();

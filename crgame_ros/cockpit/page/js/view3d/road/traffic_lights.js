@@ -128,7 +128,7 @@ export class TrafficLights {
     this.#housings.see(sight);
   }
 
-  /** Free what the graphics card holds. */
+  /** Free the memory of the graphics card. */
   dispose() {
     this.#texture.dispose();
     this.#lamps.geometry.dispose();
