@@ -45,7 +45,7 @@ def _add_invite_routes(app: web.Application, access: Access, hub: Hub) -> None:
 
 def _link(access: Access, request: web.Request, body: bytes) -> str:
     if access.invitations is None:
-        raise CrgameError('links are made where the cockpit was started with --open-cockpit')
+        raise CrgameError('this cockpit cannot make links: start it with --open-cockpit')
     try:
         content = json.loads(body)
         role, seat = content['role'], content.get('seat', '')

@@ -67,7 +67,7 @@ class AvPilot:
 
     def offer(self, states: NDArray[np.float64]) -> str | None:
         """
-        Let the AV follow a plan.
+        Offer a plan to the AV.
 
         :param states: (S, 8) states of the plan, from the one that `observe` returned on.
         :return: why the engine refuses the plan, or None.

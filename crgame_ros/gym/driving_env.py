@@ -53,7 +53,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         """
         Begin an episode; equal seeds and equal actions give equal episodes.
 
-        :param options: must be empty.
+        :param options: ignored.
         """
         super().reset(seed=seed)
         self.agent.begin(int(self.np_random.integers(SEEDS)))

@@ -272,7 +272,7 @@ class DrivingGame:
         """
         Advance to the next decision.
 
-        :param actions: actions of all agents, in the order of seats.
+        :param actions: actions of all agents, by seat id.
         :raises PlanningError: if an action is invalid.
         """
         for seat in self.seats:
@@ -329,7 +329,7 @@ class DrivingGame:
         return centers
 
     def _proceed(self, result: StepResult, states: Array) -> None:
-        """Update the agents' surroundings at a tick, plan for AVs, and notify observers."""
+        """Pass a tick to planners and drivers, update agents' surroundings, notify observers."""
         for planner in self._planners:
             planner.proceed(result)
         show(self.simulation, result, list(self._hands.values()))

@@ -96,7 +96,7 @@ class Decision(NamedTuple):
     measures: TickMeasures | None = None
 
     def shortage(self, measure: str, threshold: float) -> float:
-        """Return the relative amount below a threshold: 0 if not below it, 1 for a measure of 0."""
+        """Return the relative amount below a threshold: 0 if not below, 1 for a measure of 0."""
         value = self.worst(measure)
         return max(0.0, 1.0 - value / threshold) if value == value else 0.0
 

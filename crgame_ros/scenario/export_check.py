@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a run in a scenario can be written, looked at before its first step."""
+"""Checks, before the first step, whether a run in a scenario can be exported."""
 
 from collections.abc import Sequence
 import pickle
@@ -14,7 +14,7 @@ from crgame_ros.scenario.export_network import framed, schema_errors, used_ids, 
 from crgame_ros.scenario.loading import LoadedScenario
 from lxml import etree
 
-# Runs that were found to be writable, by what decides on it, the oldest first; and how many.
+# Cache of runs that can be exported, by what determines that, the oldest first; and its size.
 _writable: dict[tuple[object, ...], None] = {}
 _KEPT = 64
 _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -23,9 +23,9 @@ _ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 def refuse_unwritable(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
                       problems: Sequence[int]) -> None:
     """
-    Write everything that does not depend on how the run goes, and see whether the schema has it.
+    Write everything that does not depend on the run's course, and check it by the schema.
 
-    :param objects: what can appear in the run; its shapes are checked.
+    :param objects: objects that can appear in the run; their shapes are checked.
     :param problems: ids of the planning problems that are driven.
     :raises InputError: if the run could not be exported.
     """

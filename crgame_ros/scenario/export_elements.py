@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Obstacles and planning problems as CommonRoad 2020a XML text.
+Writes obstacles and planning problems as CommonRoad 2020a XML text.
 
-Text is put together directly: a run has tens of thousands of states, and building an element for
-each of their values would take seconds. Numbers never carry an exponent, which the schema forbids.
+Text is composed directly: a run has tens of thousands of states, and building an element for each
+of their values would take seconds. Numbers never have an exponent, which the schema forbids.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -22,7 +22,7 @@ STATIC_TYPES = frozenset({'unknown', 'parkedVehicle', 'constructionZone', 'roadB
 DYNAMIC_TYPES = frozenset({'unknown', 'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'pedestrian',
                            'priorityVehicle', 'train', 'taxi'})
 ENVIRONMENT_TYPES = frozenset({'building', 'pillar', 'median_strip'})
-# What a vehicle shows and sounds.
+# Lights and horn of a vehicle.
 SIGNALS = ('horn', 'indicatorLeft', 'indicatorRight', 'brakingLights', 'hazardWarningLights')
 
 _POSE = ('<position><point><x>{:.4f}</x><y>{:.4f}</y></point></position>'
@@ -39,17 +39,17 @@ FloatArray = NDArray[np.float64]
 
 
 def exact_number(value: float) -> str:
-    """Write a number to a picometre, without exponent."""
+    """Return a number as text, to 1e-12 (a picometre), without exponent."""
     text = f'{value:.12f}'.rstrip('0')
     return text + '0' if text.endswith('.') else text
 
 
 def static_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float]) -> str:
     """
-    Write an obstacle that never moves.
+    Return the XML of an obstacle that never moves.
 
     :param kind: one of `STATIC_TYPES`
-    :param pose: of its centre x [m], y [m], yaw [rad]
+    :param pose: its centre's x [m], y [m], yaw [rad]
     """
     return (f'<staticObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>'
             f'<initialState>{_POSE.format(*pose)}{_TIME.format(0)}</initialState>'
@@ -57,7 +57,7 @@ def static_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float])
 
 
 def environment_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float]) -> str:
-    """Write a building or the like, one of `ENVIRONMENT_TYPES`, in map coordinates."""
+    """Return the XML of a building or another of `ENVIRONMENT_TYPES`, in map coordinates."""
     return (f'<environmentObstacle id="{number}"><type>{kind}</type>'
             f'<shape>{_placed_shape(shape, pose)}</shape></environmentObstacle>\n')
 
@@ -65,13 +65,13 @@ def environment_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[fl
 def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequence[float]],
                      driven: bool, signals: Sequence[Sequence[bool]] = ()) -> str:
     """
-    Write an obstacle with its trajectory.
+    Return the XML of an obstacle with its trajectory.
 
     :param kind: one of `DYNAMIC_TYPES`
-    :param states: two or more rows from time step 0 on: x, y, yaw of the centre, speed; of a
+    :param states: two or more rows from time step 0 on: x, y, yaw of the centre, speed; for a
         driven vehicle also acceleration, yaw rate, steering angle
     :param driven: whether the rows have the values of a driven vehicle
-    :param signals: at each of these steps, in the order of `SIGNALS`; empty where nothing is known
+    :param signals: at each of these steps, in the order of `SIGNALS`; empty if unknown
     """
     template = _VEHICLE_STATE if driven else _OBJECT_STATE
     lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states)]
@@ -84,7 +84,7 @@ def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequ
 
 
 def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:
-    """Write the first signal state and those that follow."""
+    """Return the XML of the first signal state, and of those that follow."""
     if not signals:
         return '', ''
     first, *rest = [_TIME.format(step) + ''.join(
@@ -98,10 +98,10 @@ def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:
 def phantom_obstacle(number: int, shape: Shape, first: int,
                      poses: Iterable[Sequence[float]]) -> str:
     """
-    Write where something is at consecutive time steps, which need not begin with 0.
+    Return the XML of occupancies at consecutive time steps, which need not begin with 0.
 
     :param first: time step of the first pose, at least 1
-    :param poses: of its centre x [m], y [m], yaw [rad]
+    :param poses: its centre's x [m], y [m], yaw [rad]
     """
     occupancies = '\n'.join(
         f'<occupancy><shape>{_placed_shape(shape, pose)}</shape>{_TIME.format(step)}</occupancy>'
@@ -112,12 +112,12 @@ def phantom_obstacle(number: int, shape: Shape, first: int,
 
 def planning_problem(number: int, row: Sequence[float], goals: Sequence[str]) -> str:
     """
-    Write a planning problem that begins at time step 0.
+    Return the XML of a planning problem that begins at time step 0.
 
     :param row: x, y, yaw of the centre, speed, acceleration, yaw rate, as of a driven vehicle
     :param goals: its `goalState` elements
     """
-    # The speed is that of the rear axle, whose direction is the heading: no slip.
+    # The slip angle is 0: the speed is that of the rear axle, in the direction of the heading.
     state = _PROBLEM_STATE.format(*row[:3], 0, *row[3:6], 0.0)
     return (f'<planningProblem id="{number}">\n<initialState>{state}</initialState>\n'
             f'{"".join(goals)}</planningProblem>\n')
@@ -126,7 +126,7 @@ def planning_problem(number: int, row: Sequence[float], goals: Sequence[str]) ->
 def goal_state(time: tuple[int, int], position: str,
                intervals: Sequence[tuple[str, float, float]] = ()) -> str:
     """
-    Write a goal.
+    Return the XML of a goal.
 
     :param time: first and last time step, the last at least 1
     :param position: content of its position, empty if there is none
@@ -141,20 +141,21 @@ def goal_state(time: tuple[int, int], position: str,
 
 
 def lanelet_references(lanelets: Iterable[int]) -> str:
-    """Write a position that is any of these lanelets."""
+    """Return the XML of a position in any of these lanelets."""
     return ''.join(f'<lanelet ref="{lanelet}"/>' for lanelet in lanelets)
 
 
 def placed_rectangle(length: float, width: float, pose: Sequence[float]) -> str:
-    """Write a rectangle around a pose in map."""
+    """Return the XML of a rectangle around a pose in map coordinates."""
     return _placed_shape(Shape.rectangle(length, width), pose)
 
 
 def goal_position(shape: CommonRoadShape) -> str:
     """
-    Write a position that is anywhere in a shape of commonroad-io, in the coordinates it has.
+    Return the XML of a position anywhere in a shape of commonroad-io, in its own coordinates.
 
-    The schema wants all parts of a group to be of one kind: those of a mixed one are polygons.
+    The schema requires all parts of a group to be of one kind: those of a mixed group become
+    polygons.
     """
     parts = list(_parts(shape))
     if len({type(part) for part in parts}) > 1:
@@ -183,7 +184,7 @@ def _commonroad_shape(shape: CommonRoadShape) -> str:
 
 
 def interval_bounds(value: Any) -> tuple[float, float]:
-    """Return the bounds of an interval, or of the single value that it is."""
+    """Return the bounds of an interval, or a single value twice."""
     if isinstance(value, Interval):
         return float(value.start), float(value.end)
     return float(value), float(value)
@@ -194,7 +195,7 @@ def _interval(start: str, end: str) -> str:
 
 
 def _shape(shape: Shape) -> str:
-    """Write a footprint in the coordinates of its object."""
+    """Return the XML of a footprint in the coordinates of its object."""
     if shape.kind == 'circle':
         return f'<circle><radius>{exact_number(0.5 * shape.length)}</radius></circle>'
     if shape.kind == 'polygon':
@@ -204,7 +205,7 @@ def _shape(shape: Shape) -> str:
 
 
 def _placed_shape(shape: Shape, pose: Sequence[float]) -> str:
-    """Write a footprint at a pose in map."""
+    """Return the XML of a footprint at a pose in map coordinates."""
     x, y, yaw = pose
     center = f'<center><x>{x:.4f}</x><y>{y:.4f}</y></center>'
     if shape.kind == 'circle':

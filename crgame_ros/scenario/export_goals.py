@@ -16,16 +16,16 @@ from crgame_ros.scenario.export_elements import (
 import numpy as np
 from numpy.typing import NDArray
 
-# The place where a vehicle ended reaches so far beyond it [m], along and across.
+# Margins of the goal area around a vehicle's last footprint [m], along and across.
 _MARGIN = (5.0, 1.0)
 
 
 def goal_where_it_ended(centers: NDArray[np.float64], shape: Shape) -> str:
     """
-    Make a goal of the place where a vehicle ended, and of the time steps that it spent there.
+    Return a goal from the place where a vehicle ended, and the time steps that it spent there.
 
     :param centers: (K, 3) poses of its centre at the time steps from 0 on
-    :param shape: of the vehicle
+    :param shape: shape of the vehicle
     """
     length, width = shape.length + 2.0 * _MARGIN[0], shape.width + 2.0 * _MARGIN[1]
     cos, sin = np.cos(centers[-1, 2]), np.sin(centers[-1, 2])
@@ -40,14 +40,14 @@ def goal_where_it_ended(centers: NDArray[np.float64], shape: Shape) -> str:
 def goals_of(problem: PlanningProblem, vehicle_id: str, shift: int, last: int,
              lanelets: Mapping[int, int], notices: list[str]) -> list[str]:
     """
-    Return the goals of a planning problem on the time steps of the run.
+    Return the goals of a planning problem, with the time steps of the run.
 
     A problem without a goal gets one that every state of the run meets.
 
     :param shift: scenario step that is time step 0
     :param last: last time step
-    :param lanelets: ids in the file of the lanelets that a goal may refer to, by their own
-    :param notices: told what had to be changed
+    :param lanelets: ids of lanelets in the file, by their ids in the scenario
+    :param notices: extended by remarks on changes
     """
     goals = []
     by_lanelet = problem.goal.lanelets_of_goal_position or {}

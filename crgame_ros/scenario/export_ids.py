@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Ids that CommonRoad's schema accepts: positive, and unique over everything in a file."""
+"""Ids that CommonRoad's schema accepts: positive, and unique within a file."""
 
 from collections.abc import Collection, Iterable
 
@@ -12,10 +12,10 @@ _SIGNALS = {'trafficSignRef': 'trafficSign', 'trafficLightRef': 'trafficLight',
 
 class IdPool:
     """
-    Hands out ids that are unique over everything in a file.
+    A source of ids that are unique within a file.
 
     :param taken: ids that are in use.
-    :param notices: told where something cannot keep its id.
+    :param notices: extended by remarks on elements that cannot keep their id.
     """
 
     def __init__(self, taken: set[int], notices: list[str]) -> None:
@@ -23,7 +23,7 @@ class IdPool:
         self._notices = notices
 
     def keep(self, number: int, name: str) -> int:
-        """Return something the id that it had in the original, or a new one if that is taken."""
+        """Return the id that an element had in the original, or a new one if that is taken."""
         if number > 0 and number not in self._taken:
             self._taken.add(number)
             return number
@@ -33,7 +33,7 @@ class IdPool:
         return fresh
 
     def fresh(self) -> int:
-        """Return an id that nothing has."""
+        """Return an unused id."""
         number = max(self._taken, default=0) + 1
         self._taken.add(number)
         return number
@@ -42,16 +42,16 @@ class IdPool:
 def renumber(elements: Iterable[etree._Element], taken: set[int], notices: list[str],
              reserved: Collection[int] = ()) -> dict[int, int]:
     """
-    Return a new id to every part of the roads whose own is not positive or belongs to another.
+    Replace the ids of road elements that are not positive, or are in use by another element.
 
-    References follow. Incomings are known within their intersection only, as references to them
-    are.
+    References are updated. Incomings are referenced only within their intersection, so their ids
+    are replaced within it only.
 
     :param elements: lanelets, traffic signs, traffic lights, intersections; changed in place.
-    :param taken: ids that anything else in the original has; new ones lie above them.
-    :param notices: told what was renumbered.
+    :param taken: ids of all other elements in the original; new ones are greater.
+    :param notices: extended by remarks on renumbered elements.
     :param reserved: ids of other elements, which none of these may have.
-    :return: ids of the lanelets in the file, by those that they had.
+    :return: ids of the lanelets in the file, by their previous ids.
     """
     elements = list(elements)
     used = set(reserved)

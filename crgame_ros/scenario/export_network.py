@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The roads of a scenario for export: as its file has them, or rewritten where that is invalid."""
+"""The roads of a scenario for export: copied from its file, or rewritten if they are invalid."""
 
 from copy import deepcopy
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _SIMULATED = 'simulated'
 _MESSAGE_LENGTH = 200
 _LOCATION = ('<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>'
              '<gpsLongitude>999</gpsLongitude></location>')
-# What the schema asks for beside the roads, so that they can be checked alone.
+# The other elements that the schema requires, so that roads can be checked alone.
 _FRAME = ('<commonRoad commonRoadVersion="2020a" benchmarkID="ZAM_Frame-1" date="2020-01-01" '
           'author="" affiliation="" source="" timeStepSize="0.1"/>')
 _PROBLEM = (
@@ -45,21 +45,21 @@ def _definition(name: str) -> bytes:
 
 @functools.cache
 def _schema() -> tuple[etree.XMLSchema, frozenset[str]]:
-    """Load the CommonRoad 2020a schema that commonroad-io brings, and the signs that it knows."""
+    """Load commonroad-io's CommonRoad 2020a schema, and the signs that it contains."""
     root = etree.fromstring(_definition('XML_commonRoad_XSD.xsd'))
     signs = root.iterfind('{*}simpleType[@name="trafficSignID"]/{*}restriction/{*}enumeration')
     return etree.XMLSchema(root), frozenset(sign.get('value') for sign in signs)
 
 
 def solution_schema_errors(root: etree._Element) -> list[str]:
-    """List what the schema of solutions finds wrong, empty for a valid one."""
+    """Return the errors by the schema of solutions; empty for a valid solution."""
     schema = etree.XMLSchema(etree.fromstring(_definition('CommonRoadSolution_schema.xsd')))
     return [] if schema.validate(root) else [
         entry.message[:_MESSAGE_LENGTH] for entry in schema.error_log]
 
 
 def schema_errors(root: etree._Element) -> list[str]:
-    """List what the schema finds wrong, empty for a valid scenario."""
+    """Return the errors by the schema; empty for a valid scenario."""
     schema, _ = _schema()
     if schema.validate(root):
         return []
@@ -72,7 +72,7 @@ class WrittenRoads:
     The roads of an exported file.
 
     :param elements: location, tags, lanelets, traffic signs, traffic lights and intersections.
-    :param lanelets: ids of the lanelets in the file, by those that they have in the scenario.
+    :param lanelets: ids of the lanelets in the file, by their ids in the scenario.
     """
 
     elements: list[etree._Element]
@@ -83,12 +83,12 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
     """
     Return location, tags, lanelets, traffic signs, traffic lights and intersections.
 
-    They are copied from the file as they are, or, where that breaks the schema (a third of the
-    published files do), written anew from what was read, without what the schema still refuses.
-    What has no positive id of its own gets a new one.
+    They are copied from the file unchanged. If that violates the schema, as in a third of the
+    published files, they are written from the loaded scenario, without elements that the schema
+    still refuses. Elements without a positive unique id get a new one.
 
-    :param shift: scenario step that becomes time step 0; the cycles of the lights move with it
-    :param notices: told where the roads were changed
+    :param shift: scenario step that becomes time step 0; the cycles of traffic lights are shifted
+    :param notices: extended by remarks on changes of the roads
     :raises InputError: if they cannot be written so that the schema accepts them.
     """
     root = guard.parse_hardened(loaded.xml_text, loaded.source)
@@ -114,7 +114,7 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
 
 
 def used_ids(elements: list[etree._Element]) -> set[int]:
-    """Return every id that the elements take."""
+    """Return all ids of the elements."""
     return {int(node.get('id')) for element in elements for node in element.iter()
             if node.get('id') is not None}
 
@@ -128,10 +128,10 @@ def _is_integer(text: str | None) -> bool:
 
 
 def framed(elements: list[etree._Element]) -> etree._Element:
-    """Put copies of the roads into what the schema asks for beside them."""
+    """Return a document with copies of the roads and the other elements that the schema requires."""
     frame = etree.fromstring(_FRAME)
     frame.extend(deepcopy(elements))
-    # Ids that are no numbers are for the schema to refuse; no reference may mean the problem.
+    # The schema refuses ids that are not numbers; the problem's id must differ from references.
     numbers = [int(text) for node in frame.iter('*')
                for text in (node.get('id', ''), node.get('ref', '')) if text.isdecimal()]
     frame.append(etree.fromstring(_PROBLEM.format(max(numbers, default=0) + 1)))
@@ -139,17 +139,17 @@ def framed(elements: list[etree._Element]) -> etree._Element:
 
 
 def _errors_of(elements: list[etree._Element]) -> list[str]:
-    """List what is wrong with the roads by themselves."""
+    """Return the schema errors of the roads alone."""
     return schema_errors(framed(elements))
 
 
 def _without_refused(elements: list[etree._Element],
                      notices: list[str]) -> list[etree._Element]:
     """
-    Leave out what the schema refuses and the roads can do without.
+    Return the roads without elements that the schema refuses and that are not essential.
 
-    What then lacks a part goes as well, up to a whole sign, light or intersection; a lanelet and
-    its bounds stay.
+    An element that then lacks a required part is removed as well, up to a whole sign, light or
+    intersection. Lanelets and their bounds are kept.
     """
     schema, _ = _schema()
     frame, gone = framed(elements), []
@@ -157,7 +157,7 @@ def _without_refused(elements: list[etree._Element],
         tree = frame.getroottree()
         refused = {node: entry.message for entry in schema.error_log
                    for node in tree.xpath(entry.path or 'none') if _is_dispensable(node)}
-        # The schema reports these at the root.
+        # The schema reports broken references at the root.
         known = {node.get('id') for node in frame.iter('*')}
         refused |= {node: f'nothing has the id {node.get("ref")}'
                     for node in frame.iterfind('.//*[@ref]') if node.get('ref') not in known}
@@ -186,7 +186,7 @@ def _is_dispensable(node: etree._Element) -> bool:
 
 def _completed(elements: list[etree._Element],
                shift: int) -> tuple[list[etree._Element], list[str]]:
-    """Add what every scenario must have, drop signs that it can't, and move the lights' cycles."""
+    """Add required elements, drop signs that the schema lacks, and shift the lights' cycles."""
     if not any(element.tag == 'location' for element in elements):
         elements.insert(0, etree.fromstring(_LOCATION))
     if not any(element.tag == 'scenarioTags' for element in elements):
@@ -229,7 +229,7 @@ def _without_unknown_signs(
 
 
 def _shift_cycle(cycle: etree._Element, shift: int) -> None:
-    """Let a light show at time step 0 what it showed at the shift."""
+    """Shift a light's cycle, so that time step 0 has its state at the shift."""
     if cycle.find('cycleElement') is None:
         element = etree.SubElement(cycle, 'cycleElement')
         etree.SubElement(element, 'duration').text = '1'
@@ -240,7 +240,7 @@ def _shift_cycle(cycle: etree._Element, shift: int) -> None:
     if shift and sum(durations) > 0:
         offset %= sum(durations)
     if node is not None and offset == 0:
-        # The schema knows positive offsets only.
+        # The schema permits positive offsets only.
         cycle.remove(node)
     elif offset:
         node = etree.SubElement(cycle, 'timeOffset') if node is None else node
@@ -253,7 +253,7 @@ def _rewritten(loaded: LoadedScenario) -> list[etree._Element]:
     for tag in sorted(loaded.scenario.tags or (), key=lambda item: str(item.value)):
         etree.SubElement(tags, tag.value)
     with warnings.catch_warnings():
-        # A lanelet without a type gets the type unknown, and a warning.
+        # commonroad-io warns when a lanelet without a type gets the type unknown.
         warnings.simplefilter('ignore', UserWarning)
         elements = [LocationXMLNode.create_node(loaded.scenario.location or Location()), tags]
         elements += [LaneletXMLNode.create_node(lanelet) for lanelet in network.lanelets]

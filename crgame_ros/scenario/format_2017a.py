@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Scenario files of CommonRoad 2017a as files of 2018b, which commonroad-io reads.
+Converts scenario files of CommonRoad 2017a to 2018b, which commonroad-io reads.
 
-What the older format is like was learnt from the programs of its time that write and read it (the
-library `fvks` of its authors, their MATLAB tools, early `opendrive2lanelet`): obstacles have no
-`initialState`, which is the first state of the trajectory or the first occupancy; static ones
-have but a shape, placed on the map. Goals are the states of a `goalRegion`, also with points and
-exact values. Times are seconds, in some files time steps.
+The older format is inferred from programs of its time that write and read it (the library `fvks`
+of its authors, their MATLAB tools, early `opendrive2lanelet`). Obstacles have no `initialState`:
+it is the first state of the trajectory or the first occupancy. Static obstacles have only a
+shape, placed on the map. Goals are the states of a `goalRegion`, also with points and exact
+values. Times are in seconds, in some files in time steps.
 """
 
 from collections.abc import Iterable
@@ -17,20 +17,20 @@ from lxml import etree
 VERSION = '2017a'
 _SUCCESSOR = '2018b'
 _TIMES = './/time/exact', './/time/intervalStart', './/time/intervalEnd'
-# A time in seconds is taken for a multiple of the time step if it is one to this share of it.
+# Tolerance for a time to count as a multiple of the time step [time steps].
 _TOLERANCE = 1e-3
-# What a goal of 2018b may ask for.
+# Fields of a goal in 2018b.
 _GOAL_FIELDS = ('position', 'orientation', 'velocity', 'time')
-# A goal at a point is met this near to it [m].
+# Radius in which a goal at a point is met [m].
 _GOAL_RADIUS = 1.0
 
 
 def upgrade(root: etree._Element) -> list[str]:
     """
-    Turn a file of 2017a into one of 2018b; others stay as they are.
+    Convert a file of 2017a to 2018b; leave other versions unchanged.
 
-    :param root: changed in place; what cannot be turned is left for the guard to refuse.
-    :return: what was done, one line.
+    :param root: changed in place; the guard refuses what cannot be converted.
+    :return: remarks on the changes.
     """
     if root.get('commonRoadVersion') != VERSION:
         return []
@@ -56,7 +56,7 @@ def upgrade(root: etree._Element) -> list[str]:
 
 
 def _add_initial_state(obstacle: etree._Element) -> None:
-    """Give an obstacle the initial state that 2018b wants of it."""
+    """Add the initial state that 2018b requires to an obstacle."""
     if obstacle.find('initialState') is not None:
         return
     trajectory, occupancies = obstacle.find('trajectory'), obstacle.find('occupancySet')
@@ -82,13 +82,13 @@ def _add_initial_state(obstacle: etree._Element) -> None:
 
 
 def _place(shape: etree._Element, time: etree._Element) -> None:
-    """Write where a shape is on the map into an initial state, and the shape around its centre."""
+    """Return an initial state at a shape's place on the map, and centre the shape at the origin."""
     centers = shape.findall('*/center') + shape.findall('polygon/point')
     try:
         points = [(float(point.findtext('x', '')), float(point.findtext('y', '')))
                   for point in centers]
     except ValueError:
-        # Left to the guard, which names it.
+        # The guard refuses it, with its name.
         return
     if not points:
         return
@@ -112,7 +112,7 @@ def _place(shape: etree._Element, time: etree._Element) -> None:
 
 
 def _make_goal(state: etree._Element, problem: str) -> list[str]:
-    """Return what a goal asks for as 2018b does, in intervals and areas; tell what it cannot."""
+    """Convert a goal's fields to intervals and areas of 2018b; return the names of others."""
     notices = []
     for field in list(state):
         if field.tag not in _GOAL_FIELDS:
@@ -134,12 +134,12 @@ def _make_goal(state: etree._Element, problem: str) -> list[str]:
 
 
 def _seconds_to_steps(root: etree._Element) -> bool:
-    """Divide times by the time step where one of them is no whole number; False if none is."""
+    """Divide times by the time step if any is not a whole number; return whether one was."""
     nodes = [node for path in _TIMES for node in root.iterfind(path)]
     try:
         step = float(root.get('timeStepSize', ''))
         times = [float(node.text or '') for node in nodes]
-        # A goal may begin and end between two time steps.
+        # A goal's interval may begin and end between two time steps.
         strict = [time for node, time in zip(nodes, times, strict=True)
                   if node.getparent().getparent().tag != 'goalState']
         if step <= 0.0 or not _on_grid(strict, step) or all(

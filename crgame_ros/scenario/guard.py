@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The guard of untrusted scenario files: what it lets through can be read without harm."""
+"""Checks untrusted scenario files, so that files that pass can be read without harm."""
 
 from collections.abc import Iterable
 import math
@@ -14,11 +14,11 @@ from lxml import etree
 MAX_BYTES = 64 * 2 ** 20
 MAX_MAGNITUDE = 1e9
 MAX_TIME_STEP = 100_000
-# A planner looks seconds ahead in these steps: of 1 ms there would be thousands in every plan.
+# A plan covers seconds in steps of this length: with 1 ms it would have thousands of states.
 MIN_STEP_S, MAX_STEP_S = 0.01, 10.0
-# Nothing on wheels begins faster; room and paths are made as long as a vehicle is fast [m/s].
+# No vehicle is faster; lengths of searches and paths grow with the speed [m/s].
 MAX_SPEED = 200.0
-# The largest published map has a tenth of it; a million take a minute to read.
+# The largest published map has a tenth of it; reading a million takes a minute.
 MAX_POINTS = 200_000
 VERSIONS = ('2018b', '2020a')
 OBSTACLE_TAGS = ('obstacle', 'staticObstacle', 'dynamicObstacle', 'environmentObstacle',
@@ -35,9 +35,9 @@ _DOWNLOAD = 'copy the file again'
 
 def read_text(path: Path) -> str:
     """
-    Read a scenario file of at most 64 MiB; nothing but a regular file is opened.
+    Read a scenario file of at most 64 MiB; only regular files are opened.
 
-    :raises InputError: if it is missing, no regular file, unreadable, too large or no text.
+    :raises InputError: if it is missing, not a regular file, unreadable, too large or not text.
     """
     name = str(path)
     try:
@@ -66,7 +66,7 @@ def parse_hardened(text: str, source: str, root_tag: str = 'commonRoad') -> etre
     :param source: file name for messages
     :param root_tag: name of the root element: of a scenario, unless it is a solution
     :return: the root element
-    :raises InputError: if it is no XML, has another root, or declares a document type.
+    :raises InputError: if it is not XML, has another root, or declares a document type.
     """
     if len(text) > MAX_BYTES:
         raise _too_large(len(text), source)
@@ -93,7 +93,7 @@ def parse_hardened(text: str, source: str, root_tag: str = 'commonRoad') -> etre
 
 def refuse_malformed(root: etree._Element, source: str) -> None:
     """
-    Refuse what cannot be mended: header, numbers, ids and lanelet bounds.
+    Refuse faults that cannot be repaired: in header, numbers, ids and lanelet bounds.
 
     :raises InputError: naming file, element and line.
     """
@@ -117,7 +117,7 @@ def refuse_malformed(root: etree._Element, source: str) -> None:
 
 
 def where(element: etree._Element, source: str) -> str:
-    """Name file, line and the nearest enclosing element that has an id."""
+    """Return file, line and the nearest enclosing element with an id, as text."""
     named: etree._Element | None = element
     while named is not None and named.get('id') is None:
         named = named.getparent()
@@ -144,7 +144,7 @@ def _has_doctype(source: str) -> InputError:
 
 
 def encode(text: str) -> bytes:
-    """Return the content of a file that `read_text` reads as this text."""
+    """Return the bytes of a file that `read_text` reads as this text."""
     declared = _ENCODING.match(text[:200].encode('utf-8'))
     return text.encode(declared.group(1).decode('ascii') if declared else 'utf-8')
 
@@ -194,7 +194,7 @@ def _check_ids(root: etree._Element, source: str) -> None:
             raise InputError(f'the id {number} is used by a {kind[number]} too',
                              where(element, source), 'give each element an id of its own')
         kind[number] = element.tag
-        # References are compared as text afterwards: ' 07' and '7' are the same lanelet.
+        # References are compared as text later, so ids are normalised: ' 07' equals '7'.
         element.set('id', str(number))
     for reference in root.iterfind('.//*[@ref]'):
         try:
@@ -222,7 +222,7 @@ def _check_numbers(root: etree._Element, source: str) -> None:
 
 
 def _check_bounds(lanelet: etree._Element, source: str) -> int:
-    """Check the points of a lanelet, and count them."""
+    """Check the points of a lanelet, and return their number."""
     counts = []
     for name in ('leftBound', 'rightBound'):
         points = lanelet.findall(f'{name}/point')

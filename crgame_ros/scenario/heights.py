@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Heights of lanelets, which the simulation does without: it is flat, only the view is not."""
+"""Heights of lanelets, which only the view uses: the simulation is flat."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class LaneletHeights:
 
 def read_heights(root: etree._Element) -> dict[int, LaneletHeights]:
     """
-    Read the heights of the lanelets of which every vertex has one.
+    Read the heights of lanelets whose vertices all have one.
 
-    :param root: a scenario that `guard.refuse_malformed` let through
+    :param root: a scenario that passed `guard.refuse_malformed`
     :return: by lanelet id
     """
     found = {}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Light and air of a run: what its game says, else what its scenario says."""
+"""The light and weather of a run, from its game, or else from its scenario."""
 
 from commonroad.scenario.scenario import Environment, Scenario, TimeOfDay, Weather
 from crgame_ros.game.game import CLEAR_M, EnvironmentSpec
@@ -12,12 +12,12 @@ _DARK = (TimeOfDay.NIGHT, TimeOfDay.SUNSET)
 
 def environment_of(scenario: Scenario, game: EnvironmentSpec | None) -> EnvironmentSpec:
     """
-    Resolve light and air.
+    Resolve light and weather.
 
-    CommonRoad's night is shown as dusk, and of its weathers only fog.
+    CommonRoad's night is shown as dusk; of its weathers only fog is shown.
 
-    :param game: what the game says; None for nothing
-    :return: one in which nothing is None
+    :param game: the game's values; None for none
+    :return: values in which none is None
     """
     location = scenario.location
     said = Environment() if location is None or location.environment is None \

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Loading CommonRoad scenarios (2017a, 2018b and 2020a) from files and from text."""
+"""Loads CommonRoad scenarios (2017a, 2018b and 2020a) from files and from text."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -33,28 +33,28 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# Lanes are tabulated along their length: one of a million kilometres would fill the memory [m].
+# Lanes are sampled along their length: one of a million kilometres would fill the memory [m].
 _MAX_LANELET_LENGTH = 1e5
-# Texts of which what was read is kept: batches of runs, and tables of one, load them many times.
+# Size of the cache of loaded texts: batches of runs, and tables of a run, load them many times.
 _KEPT = 8
-# The surface of a lanelet whose bounds cross is mended in cubic time: 500 points took 4 s.
+# Repairing the surface of a lanelet with crossing bounds takes cubic time: 500 points took 4 s.
 _MOST_TANGLED = 200
 
 
 @dataclass(frozen=True)
 class LoadedScenario:
     """
-    A scenario that was checked, mended where that is safe, and read.
+    A scenario that was checked, repaired where that is safe, and read.
 
     :param scenario: the CommonRoad scenario.
     :param planning_problems: in the order of the file; initial states are exact.
-    :param xml_text: the file's text as given.
-    :param sha256: of `xml_text` in UTF-8.
+    :param xml_text: the file's text, unchanged.
+    :param sha256: digest of `xml_text` in UTF-8.
     :param benchmark_id: a valid benchmark id, safe as a file name.
     :param time_step_s: Delta t_c [s].
     :param notices: remarks for the user, one line each.
     :param source: file name for messages.
-    :param heights: of lanelets by id, where the file has them; the scenario itself is flat.
+    :param heights: heights of lanelets by id, where the file has them; the scenario is flat.
     """
 
     scenario: Scenario
@@ -69,7 +69,7 @@ class LoadedScenario:
 
     @cached_property
     def human_problems(self) -> dict[int, int]:
-        """Planning problems of recorded humans, with the obstacles that hold their drives."""
+        """Return the planning problems of recorded humans, with the obstacles of their drives."""
         recorded = {obstacle.obstacle_id for obstacle in self.scenario.dynamic_obstacles}
         return {problem: obstacle for problem, obstacle
                 in read_human_note(self.scenario.source or '').items() if obstacle in recorded}
@@ -88,8 +88,8 @@ def parse_scenario(xml_text: str, source: str) -> LoadedScenario:
     """
     Load a CommonRoad scenario from its text.
 
-    Who loads a text again gets a copy of his own of what was read then: nobody else sees what is
-    changed in it.
+    Loading a text again returns a separate copy of the cached result: changes of one copy do not
+    affect others.
 
     :param xml_text: the content of a scenario file
     :param source: file name or topic for messages
@@ -130,19 +130,19 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
 
 
 def _is_tangled(lanelet: Lanelet) -> bool:
-    """Return whether bounds of many points cross: those of a few are mended by their users."""
+    """Return whether bounds of many points cross; users repair crossing bounds of few points."""
     if len(lanelet.left_vertices) <= _MOST_TANGLED:
         return False
     return not shapely.Polygon(lanelet_ring(lanelet)).is_valid
 
 
 def scenario_digest(xml_text: str) -> str:
-    """Return the SHA-256 by which a game names its scenario's text."""
+    """Return the SHA-256 by which a game identifies its scenario's text."""
     return hashlib.sha256(xml_text.encode('utf-8')).hexdigest()
 
 
 def exact_position(position: NDArray[np.float64] | Shape) -> NDArray[np.float64]:
-    """Reduce an uncertain position to its centre (x, y) [m]."""
+    """Return a position (x, y), for an uncertain one its centre [m]."""
     if isinstance(position, ShapeGroup):
         centroid = group_outline(position).centroid
         return np.array([centroid.x, centroid.y])
@@ -152,7 +152,7 @@ def exact_position(position: NDArray[np.float64] | Shape) -> NDArray[np.float64]
 
 
 def group_outline(group: ShapeGroup) -> shapely.Geometry:
-    """Unite the shapes of a group; commonroad-io halves a circle's radius in its own outline."""
+    """Return the union of a group's shapes; commonroad-io's own outline halves circles' radii."""
     return shapely.union_all([
         group_outline(shape) if isinstance(shape, ShapeGroup)
         else shapely.Point(shape.center).buffer(shape.radius) if isinstance(shape, Circle)
@@ -160,7 +160,7 @@ def group_outline(group: ShapeGroup) -> shapely.Geometry:
 
 
 def exact_value(value: float | Interval | None) -> float:
-    """Reduce an uncertain value to the middle of its interval; a missing one is 0."""
+    """Return a value, for an interval its middle; a missing one is 0."""
     if value is None:
         return 0.0
     if isinstance(value, AngleInterval):
@@ -184,7 +184,7 @@ def _read(data: bytes, source: str) -> tuple[Scenario, list[PlanningProblem], li
 
 @contextmanager
 def _captured_remarks() -> Iterator[list[str]]:
-    """Collect what commonroad-io would print, so that it reaches the user as notices."""
+    """Collect warnings of commonroad-io, so that the user gets them as notices."""
     remarks: list[str] = []
 
     class Collector(logging.Handler):
@@ -210,7 +210,7 @@ def _captured_remarks() -> Iterator[list[str]]:
 
 
 def _element_of(error: BaseException, source: str) -> str:
-    """Find the element that commonroad-io was reading when it failed."""
+    """Return the element that commonroad-io was reading when it failed, as text."""
     found = source
     trace = error.__traceback__
     while trace is not None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The obstacles of one run: where the scenario has them, and where events have put them."""
+"""The obstacles of one run: their motions in the scenario, and those that events changed."""
 
 from abc import ABC, abstractmethod
 import math
@@ -18,20 +18,20 @@ _ABSENT = np.full(3, np.nan)
 
 
 class ObstacleMotion(ABC):
-    """Where one obstacle is from the time step on at which an event changed its course."""
+    """The motion of an obstacle from the time step at which an event changed its course."""
 
     @abstractmethod
     def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Return pose and velocity (3) at a time step; NaN where absent."""
 
     def path_from(self, k: int) -> FloatArray:
-        """Return the poses (n, 3) from time step k on, as far as they are known."""
+        """Return the known poses (n, 3) from time step k on."""
         return self.state_at(k)[0][None, :]
 
 
 class Released(ObstacleMotion):
     """
-    A recorded course, begun at another time.
+    A recorded course that starts at another time.
 
     :param k: time step of its first pose.
     :param track: its poses and velocities (n, 3).
@@ -42,7 +42,7 @@ class Released(ObstacleMotion):
         self._poses, self._velocities = track
 
     def state_at(self, k: int) -> tuple[FloatArray, FloatArray]:
-        """Return the state of the recording as long as it lasts."""
+        """Return the recorded state; NaN after the end of the recording."""
         row = k - self._k
         if not 0 <= row < len(self._poses):
             return _ABSENT, _ABSENT
@@ -55,10 +55,10 @@ class Released(ObstacleMotion):
 
 class Braking(ObstacleMotion):
     """
-    Slows down along a path and keeps the speed that it reaches.
+    A braking motion along a path down to a final speed, which is then kept.
 
-    With v0 <= v1 there is nothing to slow down. To stop, it goes straight on where the path is
-    too short; otherwise it is gone at the end of the path.
+    With v0 <= v1 the speed is constant. If the path is too short, an obstacle that brakes to a
+    stop continues straight on; any other is absent after the end of the path.
 
     :param k: time step at which it begins to brake.
     :param path: (n, 3) poses from there on.
@@ -79,7 +79,7 @@ class Braking(ObstacleMotion):
         self._stops = self._final_speed == 0.0
 
     def _distance(self, k: int) -> float:
-        """Integrate the speed from the beginning to a time step [m]."""
+        """Return the distance driven from the beginning to a time step [m]."""
         time = (k - self._k) * self._time_step_s
         braking = (self._speed - self._final_speed) / self._deceleration
         first = min(time, braking)
@@ -115,7 +115,7 @@ class Braking(ObstacleMotion):
 
 class Standing(ObstacleMotion):
     """
-    Stands for good.
+    A permanent standstill.
 
     :param pose: x [m], y [m], yaw [rad]
     """
@@ -142,11 +142,11 @@ class ObstacleMotions:
 
     @property
     def changed(self) -> list[int]:
-        """Columns of the obstacles that an event has changed, in order."""
+        """Return the columns of the obstacles that an event has changed, in order."""
         return sorted(self._courses)
 
     def states_at(self, k: int) -> ObjectStates:
-        """Return all states at a time step, given the events so far; do not write to them."""
+        """Return all states at a time step, given the events so far; they are read-only."""
         states = self._obstacles.states_at(k)
         if not self._courses:
             return states
@@ -156,23 +156,23 @@ class ObstacleMotions:
         return ObjectStates(poses, velocities)
 
     def is_present(self, column: int, k: int) -> bool:
-        """Return whether an obstacle is there at a time step."""
+        """Return whether an obstacle is present at a time step."""
         return bool(np.isfinite(self.states_at(k).poses[column, 0]))
 
     def is_held(self, column: int) -> bool:
-        """Return whether an obstacle stands until somebody lets it go."""
+        """Return whether an obstacle is held until an event releases it."""
         return column in self._obstacles.held and column not in self._courses
 
     def release(self, column: int, k: int) -> None:
-        """Let a held obstacle go at a time step."""
+        """Release a held obstacle at a time step."""
         self._courses[column] = Released(k, self._obstacles.track(column))
 
     def brake(self, column: int, k: int, deceleration: float, speed: float) -> None:
         """
-        Let an obstacle that is there slow down along its present course.
+        Brake a present obstacle along its current course.
 
         :param deceleration: [m/s^2]
-        :param speed: that it slows down to [m/s]
+        :param speed: final speed [m/s]
         """
         states = self.states_at(k)
         x, y, _ = states.velocities[column].tolist()
@@ -186,5 +186,5 @@ class ObstacleMotions:
             k, path, math.hypot(x, y), deceleration, speed, self._obstacles.time_step_s)
 
     def put(self, column: int, pose: tuple[float, float, float]) -> None:
-        """Put an obstacle somewhere for good."""
+        """Place an obstacle at a pose permanently."""
         self._courses[column] = Standing(pose)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The obstacles of a scenario: what they look like, and where they are at each time step."""
+"""The obstacles of a scenario: their descriptions, and their states at each time step."""
 
 from collections.abc import Collection, Sequence
 import copy
@@ -28,7 +28,7 @@ _MAX_CELLS = 20_000_000
 
 @dataclass(frozen=True)
 class _Track:
-    """Poses (n, 3) of one obstacle's centre at time steps (n), which are none if it is static."""
+    """Poses (n, 3) of an obstacle's centre, with time steps (n); None if it is static."""
 
     steps: NDArray[np.int64]
     poses: FloatArray
@@ -37,18 +37,18 @@ class _Track:
 
 class ScenarioObstacles:
     """
-    Everything in a scenario that is not a driven vehicle, as arrays over time steps.
+    All obstacles of a scenario that are not driven vehicles, as arrays over time steps.
 
     Poses are those of the shape's centre: a centre offset of a CommonRoad shape is fixed to the
     body and turns with it. Uncertain states count as their centres, a set-based prediction as
     the centres of its occupancies, and gaps inside a trajectory are interpolated. Before its
-    first and after its last state an obstacle is absent (NaN); static ones are always there.
+    first and after its last state an obstacle is absent (NaN); static ones are always present.
 
     :param loaded: the scenario.
     :param without: obstacle ids to leave out.
-    :param held: ids of dynamic obstacles that stand at their first pose all the time, until
-        somebody lets them go.
-    :param put: what may be put into the scenario later; absent.
+    :param held: ids of dynamic obstacles that stand at their first pose until an event releases
+        them.
+    :param put: obstacles that events may add later; absent until then.
     :raises InputError: if a shape cannot be used, or there are too many states.
     """
 
@@ -75,7 +75,7 @@ class ScenarioObstacles:
         self._velocities: FloatArray = np.full((count, len(self.ids), 3), np.nan)
         for column, track in enumerate(tracks):
             self._fill(column, track)
-        # Columns of what the run itself moves.
+        # Columns of those that the run itself moves.
         self.living: NDArray[np.int_] = np.empty(0, dtype=int)
         self._held = {column: self._hold(column) for column, obstacle in enumerate(obstacles)
                       if obstacle.obstacle_id in held}
@@ -90,7 +90,7 @@ class ScenarioObstacles:
 
     @property
     def velocities(self) -> FloatArray:
-        """All velocities, shaped like `poses`."""
+        """Return all velocities, with the shape of `poses`."""
         return self._velocities
 
     def states_at(self, k: int) -> ObjectStates:
@@ -98,7 +98,7 @@ class ScenarioObstacles:
         Return the poses and velocities of all obstacles at a time step.
 
         A velocity leads to the pose at k + 1: pose + velocity * Delta t_c; at an obstacle's last
-        step it is the one before. The arrays are read-only.
+        step it is the previous one. The arrays are read-only.
 
         :param k: scenario time step, any integer
         """
@@ -110,12 +110,12 @@ class ScenarioObstacles:
     def with_living(self, agents: Collection[int],
                     more: Sequence[ObjectDescription]) -> 'ScenarioObstacles':
         """
-        Return these obstacles with some, and more, that live: the run itself moves them.
+        Return these obstacles, with recorded and additional ones that the run itself moves.
 
-        They are absent in all states here.
+        Those that the run moves are absent in all states here.
 
         :param agents: columns of the recorded obstacles that become agents of traffic.
-        :param more: what the run adds, in columns behind all others.
+        :param more: descriptions of those that the run adds, in columns after all others.
         """
         other = copy.copy(self)
         other.descriptions = (*(
@@ -135,12 +135,12 @@ class ScenarioObstacles:
 
     @property
     def held(self) -> Collection[int]:
-        """Columns of the obstacles that stand until somebody lets them go."""
+        """Return the columns of the obstacles that are held until an event releases them."""
         return self._held.keys()
 
     def track(self, column: int) -> tuple[FloatArray, FloatArray]:
         """
-        Return the recorded course of an obstacle, of a held one as well.
+        Return the recorded course of an obstacle, including that of a held one.
 
         :return: poses and velocities (n, 3) from its first time step on
         """
@@ -155,7 +155,7 @@ class ScenarioObstacles:
         return self._poses[present, column], self._velocities[present, column]
 
     def _hold(self, column: int) -> tuple[FloatArray, FloatArray]:
-        """Let an obstacle stand at its first pose, and give its course."""
+        """Fix an obstacle at its first pose, and return its recorded course."""
         poses, velocities = self._recorded(column)
         self._poses[:, column], self._velocities[:, column] = poses[0], 0.0
         return poses, velocities
@@ -200,7 +200,7 @@ def _describe(obstacle: Obstacle, source: str) -> tuple[ObjectDescription, tuple
             raise InputError('a phantom obstacle has no occupancy set', where, 'remove it')
         shape = obstacle.prediction.occupancy_set[0].shape
         if isinstance(shape, Rectangle):
-            # Occupancies stand turned in the map, the pose turns the footprint.
+            # Occupancies are rotated in the map; here the pose rotates the footprint.
             shape = Rectangle(shape.length, shape.width)
     try:
         footprint, offset = convert_shape(shape)
@@ -286,7 +286,7 @@ def _pose(state: State) -> FloatArray:
 
 
 def _with_headings(poses: FloatArray) -> FloatArray:
-    """Fill in headings that the file does not give: keep the last known one."""
+    """Return poses whose missing headings are filled with the last known one."""
     known = np.isfinite(poses[:, 2])
     if not known.all():
         source = np.maximum.accumulate(np.where(known, np.arange(len(poses)), -1))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Predictions of others on the scenario grid.
+Predicts other vehicles and obstacles at the scenario's time steps.
 
 The human-vehicle scenario adapter (CRG III-A1c) predicts driven vehicles at constant speed and
 steering; recorded obstacles are predicted at constant speed along their lane.
@@ -24,15 +24,16 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Beyond this angle to its lane an obstacle crosses the lane, or drives the wrong way.
+# Beyond this angle to its lane an obstacle crosses the lane or drives against it [rad].
 _MAX_LANE_ANGLE = math.radians(45.0)
-# A cyclist need not follow a lane: one who crosses at a shallow angle would be seen to turn along.
+# Cyclists need not follow lanes: one that crosses a lane at a shallow angle must not be predicted
+# to turn along it [rad].
 _MAX_CYCLIST_ANGLE = math.radians(12.0)
 _CYCLISTS = ('bicycle',)
 _FREE_MOVERS = ('pedestrian', 'unknown')
 _SPACING = 0.5
 _BEHIND = 30.0
-# 200 m beyond a lanelet cover 3 s at any legal speed; farther than 5 km lies no planner's horizon.
+# 200 m beyond a lanelet suffice for 3 s at any legal speed; no planner's horizon exceeds 5 km [m].
 _MIN_REACH, _MAX_REACH = 200.0, 5000.0
 _NO_LANE = -1
 
@@ -68,7 +69,7 @@ def predict_constant_steering(states: FloatArray, wheelbases: FloatArray, steps:
 
 
 class KnownMotions(Protocol):
-    """Whatever knows where all objects are at a scenario time step."""
+    """A source of the states of all objects at a scenario time step."""
 
     def states_at(self, k: int) -> ObjectStates:
         """Return the poses and velocities of all objects at a time step."""
@@ -77,7 +78,7 @@ class KnownMotions(Protocol):
 def recorded_future(obstacles: KnownMotions, k: int,
                     steps: int) -> tuple[FloatArray, FloatArray]:
     """
-    Return the true future of all obstacles (`prediction: recorded`, which leaks).
+    Return the true future of all obstacles (`prediction: recorded`, which leaks it to planners).
 
     :return: poses and velocities, both (steps + 1, M, 3); NaN where absent
     """
@@ -87,15 +88,15 @@ def recorded_future(obstacles: KnownMotions, k: int,
 
 class LanePrediction:
     """
-    Predict obstacles at constant speed along their lanes; nothing of their future is used.
+    A prediction of obstacles at constant speed along their lanes, which uses no future states.
 
     An obstacle keeps its offset to the centre line and its speed along the lane, over the
-    straightest successors and straight on where the map ends. Pedestrians, and whatever is on
-    no lane or at more than 45 degrees to it, cyclists at more than 12 degrees, go straight on at
-    constant velocity, static obstacles stay, and absent ones are NaN.
+    straightest successors, and straight on where the map ends. Others go straight on at constant
+    velocity: pedestrians, obstacles on no lane or at more than 45 degrees to it, and cyclists at
+    more than 12 degrees. Static obstacles stay, and absent ones are NaN.
 
-    All lanes are found at construction. Each lane line is tabulated at equal distances, so that
-    a prediction of all obstacles is a few array look-ups.
+    All lanes are found at construction. Each lane line is sampled at equal distances, so that a
+    prediction of all obstacles takes a few array look-ups.
 
     :param obstacles: the obstacles of the scenario.
     :param network: its road network.
@@ -121,7 +122,7 @@ class LanePrediction:
         self._assign_lanes()
         self._lookup: LaneLookup | None = None
         if len(obstacles.living):
-            # Where these will be is not known: any lane may be asked for.
+            # Their future places are unknown, so that any lane may be needed.
             for lane, lanelet_id in enumerate(network.lanelet_ids):
                 if network.is_for_cars(lanelet_id):
                     self._number(lane)
@@ -135,8 +136,8 @@ class LanePrediction:
         """
         Predict all obstacles from their states at scenario time step k.
 
-        :param now: the states at k, where events have changed some; those of the scenario if None
-        :param changed: columns whose state is not the scenario's
+        :param now: the states at k, if events have changed some; None for the scenario's
+        :param changed: columns whose state differs from the scenario's
         :return: poses and velocities, both (steps + 1, M, 3); row 0 is `now`, in later rows a
             velocity leads to the next pose
         """
@@ -166,7 +167,7 @@ class LanePrediction:
 
     def _predict_changed(self, now: ObjectStates, changed: NDArray[np.int64], time: FloatArray,
                          poses: FloatArray) -> None:
-        """Find the lanes of the few objects that are not where they were recorded."""
+        """Predict the few objects that are not at their recorded places, after finding their lanes."""
         columns = changed[self._follows_lanes[changed]]
         yaw, velocities = now.poses[columns, 2], now.velocities[columns]
         speed = velocities[:, 0] * np.cos(yaw) + velocities[:, 1] * np.sin(yaw)
@@ -184,7 +185,7 @@ class LanePrediction:
 
     def _along_lanes(self, lane: NDArray[np.int64], s: FloatArray, d: FloatArray,
                      speed: FloatArray, time: FloatArray) -> FloatArray:
-        """Drive along lanes at constant speed; all arrays (C) but time (T); gives (T, C, 3)."""
+        """Return poses (T, C, 3) along lanes at constant speed; time is (T), other arrays (C)."""
         travelled = time[:, None] * speed
         self._ensure_reach(float(np.abs(travelled[-1]).max()))
         index = (s + _BEHIND + travelled) / _SPACING
@@ -194,7 +195,7 @@ class LanePrediction:
         cell = cell + self._starts[lane]
         before = self._table[cell]
         poses: FloatArray = before + fraction * (self._table[cell + 1] - before)
-        # The direction must not turn on where a line ends and goes straight on.
+        # Beyond the end of a line, where it continues straight on, the direction is constant.
         yaw = before[..., 2] + np.clip(fraction[..., 0], 0.0, 1.0) * (
             self._table[cell + 1, 2] - before[..., 2])
         poses[..., 2] = yaw
@@ -206,14 +207,14 @@ class LanePrediction:
         self._used: list[int] = []
         self._lane[rows, columns], self._s[rows, columns], self._d[rows, columns] = self._place(
             poses[rows, columns], self._max_angles[columns])
-        # The lanes that a held obstacle will use, so that nothing is tabulated in the run.
+        # Include the lanes that a held obstacle will use, so that none is sampled during the run.
         for column in self._obstacles.held:
             if self._follows_lanes[column]:
                 self._place(self._obstacles.track(column)[0])
 
     def _place(self, poses: FloatArray, max_angles: FloatArray | float = _MAX_LANE_ANGLE,
                ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Return the number among the used lanes, or -1, and s and d of poses (N, 3)."""
+        """Return the index among the used lanes, or -1, and s and d of poses (N, 3)."""
         found = self._network.lanelets_at(poses)
         limits = np.broadcast_to(max_angles, len(poses))
         lanes = np.full(len(poses), _NO_LANE, dtype=np.int64)
@@ -235,14 +236,14 @@ class LanePrediction:
         return line.pose_at(s)[:, :3]
 
     def _number(self, lane: int) -> int:
-        """Find the number of a lane; a new one is tabulated before it is used."""
+        """Return the index of a lane; a new one is sampled before its use."""
         if lane not in self._used:
             self._used.append(lane)
             self._reach = 0.0
         return self._used.index(lane)
 
     def _ensure_reach(self, reach: float) -> None:
-        """Tabulate every used lane at least `reach` metres (at most 5 km) beyond its end."""
+        """Sample every used lane at least `reach` metres (at most 5 km) beyond its end."""
         if min(reach, _MAX_REACH) <= self._reach > 0.0 or not self._used:
             return
         self._reach = min(max(_MIN_REACH, 1.5 * reach), _MAX_REACH)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which planning problems of an exported run were those of humans.
+Marks and finds the planning problems of humans in an exported run.
 
-An exported file has a planning problem for every driven vehicle. The attribute `source` says which
-of them a human drove, and as which obstacle the drive is recorded: it is free text for the schema,
-and survives reading and writing by commonroad-io, which comments do not.
+An exported file has a planning problem for every driven vehicle. The attribute `source` states
+which of them a human drove, and which obstacle has the recorded drive. The schema accepts any text
+there, and commonroad-io preserves it on reading and writing, unlike comments.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ import re
 
 from crgame_ros.scenario import guard
 
-# Written into every exported file's source, and the mark by which one is known.
+# Text in the source of every exported file, which identifies such files.
 SOURCE_MARK = 'driven in crgame_ros'
 _NOTE = re.compile(r' \(humans?: ([^()]*)\)')
 _HUMAN = re.compile(r'planning problem (\d{1,18}) is obstacle (\d{1,18})')
@@ -22,7 +22,7 @@ _HUMAN = re.compile(r'planning problem (\d{1,18}) is obstacle (\d{1,18})')
 
 def human_note(humans: Mapping[int, int]) -> str:
     """
-    Write what follows `SOURCE_MARK`; empty without humans.
+    Return the text that follows `SOURCE_MARK`; empty without humans.
 
     :param humans: obstacle ids by planning problem.
     """
@@ -34,13 +34,13 @@ def human_note(humans: Mapping[int, int]) -> str:
 
 
 def without_human_notes(source: str) -> str:
-    """Remove what earlier runs said of their humans: it holds for their own files only."""
+    """Return a source without the notes of earlier runs, which hold for their own files only."""
     return _NOTE.sub('', source)
 
 
 def read_human_note(source: str) -> dict[int, int]:
     """
-    Read what `human_note` wrote.
+    Return the humans in a note of `human_note`.
 
     :param source: attribute of the file.
     :return: obstacle ids by planning problem.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Mending scenario files where that is safe, before commonroad-io reads them."""
+"""Repairs scenario files where that is safe, before commonroad-io reads them."""
 
 from collections import Counter
 import math
@@ -11,9 +11,9 @@ from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_ids import renumber
 from lxml import etree
 
-# A published map has a gap of 160 m that it means; paths are tabulated along it [m].
+# A published map has an intended gap of 160 m; paths are sampled along gaps [m].
 MAX_GAP = 1000.0
-# From a lanelet to others.
+# Elements that link a lanelet to others.
 LINKS = ('successor', 'predecessor', 'adjacentLeft', 'adjacentRight')
 _LENIENT_ID = re.compile(
     r'(C-)?([A-Z]{3})[-_]([A-Za-z0-9]+)[-_](\d+)(?:[-_](\d+)(?:[-_]([STPI])((?:[-_]\d+)+))?)?')
@@ -21,10 +21,10 @@ _LENIENT_ID = re.compile(
 
 def mend(root: etree._Element) -> list[str]:
     """
-    Mend what can be mended without guessing; commonroad-io would stumble over it.
+    Repair faults that need no guessing; commonroad-io would fail on them.
 
-    :param root: a scenario that `guard.refuse_malformed` let through; changed in place.
-    :return: what was mended, one line each.
+    :param root: a scenario that passed `guard.refuse_malformed`; changed in place.
+    :return: remarks on the repairs, one line each.
     """
     notices: list[str] = []
     _mend_header(root, notices)
@@ -90,7 +90,7 @@ def _valid_benchmark_id(given: str) -> str:
 
 
 def _mend_references(root: etree._Element, notices: list[str]) -> None:
-    """Drop references to what does not exist; commonroad-io would stumble over them."""
+    """Remove references to missing elements; commonroad-io would fail on them."""
     ids = {tag: {e.get('id') for e in root.iterchildren(tag)}
            for tag in ('lanelet', 'trafficSign', 'trafficLight')}
     targets = {'trafficSignRef': 'trafficSign', 'trafficLightRef': 'trafficLight'}
@@ -119,7 +119,7 @@ def _mend_references(root: etree._Element, notices: list[str]) -> None:
 
 
 def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
-    """Cut links between lanelets that lie far apart: no way leads from one to the other."""
+    """Remove links between lanelets that are far apart: vehicles cannot drive between them."""
     ends = {lanelet.get('id'): (_middle(lanelet, 0), _middle(lanelet, -1))
             for lanelet in root.iterchildren('lanelet')}
     cut: list[tuple[float, str]] = []
@@ -139,19 +139,19 @@ def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
 
 
 def _links(lanelet: etree._Element) -> list[etree._Element]:
-    """Return what leads from a lanelet to others."""
+    """Return the elements that link a lanelet to others."""
     return [link for tag in LINKS for link in lanelet.findall(tag)]
 
 
 def _middle(lanelet: etree._Element, index: int) -> tuple[float, float]:
-    """Return the middle between the first, or last, points of both bounds."""
+    """Return the midpoint between the first, or last, points of both bounds."""
     points = [lanelet.findall(f'{name}/point')[index] for name in ('leftBound', 'rightBound')]
     x, y = (sum(float(point.find(axis).text) for point in points) / 2 for axis in 'xy')
     return x, y
 
 
 def _mend_adjacency(root: etree._Element, notices: list[str]) -> None:
-    """Cut chains of neighbours that run in a circle; commonroad-io would follow them for ever."""
+    """Remove cyclic links of neighbours; commonroad-io would follow them endlessly."""
     for side in ('adjacentLeft', 'adjacentRight'):
         links = {}
         for lanelet in root.iterchildren('lanelet'):
@@ -176,7 +176,7 @@ def _mend_adjacency(root: etree._Element, notices: list[str]) -> None:
 
 
 def _mend_times(root: etree._Element, notices: list[str]) -> None:
-    """Let states without a time be those of time step 0, and goals without one hold at any."""
+    """Set missing times: time step 0 for states, any time for goals."""
     for element in root.iterchildren(*guard.OBSTACLE_TAGS, 'planningProblem'):
         for state in element.findall('initialState'):
             if state.find('time/*') is None:
@@ -191,7 +191,7 @@ def _mend_times(root: etree._Element, notices: list[str]) -> None:
 
 
 def _mend_incomings(root: etree._Element, notices: list[str]) -> None:
-    """Give incomings ids of their own; the guard has seen to all others."""
+    """Make ids of incomings unique; the guard has checked all other ids."""
     reserved = {int(element.get('id')) for element in root.iterchildren('*')
                 if element.get('id') is not None and element.tag != 'intersection'}
     inside = {int(node.get('id')) for node in root.iterfind('intersection//*[@id]')

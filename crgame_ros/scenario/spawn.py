@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where driven vehicles start."""
+"""Finds the start poses of driven vehicles."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# The least distance behind the AV's rear axle, in lengths of the vehicle.
+# Least distance behind the AV's rear axle, in vehicle lengths.
 _CLOSEST = 1.5
-# Margin around the footprint [m], headway behind the AV [s], and what a driver is taken to
-# brake with and to react in when a gap is judged [m/s^2], [s].
+# Margin around the footprint [m], headway behind the AV [s], and the deceleration [m/s^2] and
+# reaction time [s] with which gaps are judged.
 _MARGIN = 0.5
 _HEADWAY_S = 2.0
 _BRAKING = 4.0
@@ -34,7 +34,7 @@ _REACTION_S = 1.0
 _SIGHT = 120.0
 _NEAR = 250.0
 _MAX_NEAR = 600
-# Below this speed a yaw rate says nothing about the steering angle.
+# Below this speed a yaw rate does not determine the steering angle [m/s].
 _MIN_STEERING_SPEED = 0.5
 
 
@@ -43,9 +43,9 @@ def problem_pose(problem: PlanningProblem, rear_to_center: float,
     """
     Return the initial state of a planning problem as a rear-axle state.
 
-    The position of a CommonRoad state is the centre of the vehicle (so documented by the state
-    classes of the KS model, and read so by the reactive planner, which shifts it to the rear
-    axle); it is moved back along the heading.
+    The position of a CommonRoad state is the centre of the vehicle: the state classes of the KS
+    model document it so, and the reactive planner shifts it to the rear axle. Here it is moved
+    back along the heading in the same way.
 
     :param problem: its initial state is exact (`LoadedScenario.planning_problems`)
     :param rear_to_center: distance l_r from the rear axle to the centre [m]
@@ -86,21 +86,21 @@ def place_human(network: RoadNetwork, spec: HumanSpec, parameters: VehicleParame
     """
     Place a human's vehicle at the start.
 
-    Exactly where `spec.spawn` says; without it on the lane beside the first AV and slightly
-    behind, or behind it in its lane by 2 s, or as far as the road goes, or level with it; where
-    there is no such place, ahead of it, or elsewhere on a lane near it; without an AV at the
-    start of a long road. A place that was searched for lies on the road, in
-    the lane's heading, at least 0.5 m from everything, and its speed is the AV's, at most one
-    from which it can brake behind its leader.
+    If `spec.spawn` is given, the vehicle starts exactly there. Otherwise places are tried in this
+    order: on the lane beside the first AV and slightly behind it; behind it in its lane by 2 s,
+    or less where the road begins; level with it; ahead of it; elsewhere on a lane near it.
+    Without an AV it is the start of a long road. A searched place is on the road, in the lane's
+    heading, and at least 0.5 m from everything. Its speed is the AV's, limited so that the vehicle
+    can brake behind its leader.
 
     :param spec: the human of the game file
-    :param parameters: of the human's vehicle
+    :param parameters: parameters of the human's vehicle
     :param avs: rear-axle states of the AVs
     :param obstacles: (M) descriptions of the obstacles
-    :param obstacle_states: (M) where they are at k0
+    :param obstacle_states: (M) their states at k0
     :param others: rear-axle states of humans already placed
-    :param vehicles: parameters of `avs`, then of `others`; None: as the human's
-    :raises InputError: if the spawn names no place on the map, or no free place exists.
+    :param vehicles: parameters of `avs`, then of `others`; None: equal to the human's
+    :raises InputError: if the spawn is not on the map, or there is no free place.
     """
     if isinstance(spec.spawn, PoseSpawn):
         return VehicleState(spec.spawn.x, spec.spawn.y, spec.spawn.yaw, spec.spawn.speed)
@@ -129,7 +129,7 @@ def place_human(network: RoadNetwork, spec: HumanSpec, parameters: VehicleParame
 
 @dataclass(frozen=True)
 class _Scene:
-    """Everything that stands or drives at k0: outlines, centres (n, 2), velocities, sizes."""
+    """All bodies at k0: outlines, centres (n, 2), velocities, sizes."""
 
     outlines: NDArray[np.object_]
     centers: NDArray[np.float64]
@@ -206,7 +206,7 @@ def _near_av(network: RoadNetwork, parameters: VehicleParameters,
 
 def _road_starts(network: RoadNetwork,
                  parameters: VehicleParameters) -> Iterator[tuple[int, float]]:
-    """Propose places without an AV: starts of roads, the longest first, then everywhere."""
+    """Yield places without an AV: starts of roads, the longest first, then everywhere."""
     reach: list[tuple[float, int]] = []
     for lanelet in network.lanelet_ids:
         if network.is_for_cars(lanelet) and network.straightest_predecessor(lanelet) is None:
@@ -230,7 +230,7 @@ def _grid(network: RoadNetwork, lanelet: int) -> list[tuple[float, NDArray[np.fl
 
 def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,
          s: float) -> VehicleState | None:
-    """Stand on the centre line at s; None off the road or too close to something."""
+    """Return the state on the centre line at s; None off the road or too close to a body."""
     if not network.is_for_cars(lanelet):
         return None
     state = VehicleState(*network.pose_on(lanelet, s), 0.0)
@@ -245,7 +245,7 @@ def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lan
 def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,
                s: float, wanted: float) -> tuple[float, bool]:
     """
-    Limit a speed to what leader, lane and vehicle allow, and judge the followers.
+    Limit a speed by leader, lane and vehicle, and judge the followers.
 
     :return: speed [m/s], and whether each follower is slower or can brake behind it
     """
@@ -267,7 +267,7 @@ def _fit_speed(network: RoadNetwork, parameters: VehicleParameters, scene: _Scen
     for leader in np.flatnonzero(on_lane & (ahead > 0.0)):
         speed = min(speed, _safe_speed(gaps[leader], along[leader]))
     followers = np.flatnonzero(on_lane & (ahead <= 0.0))
-    # A recorded follower does not react: slower ones are harmless however close they are.
+    # A recorded follower does not react: a slower one is harmless at any distance.
     return speed, all(along[f] <= max(speed, _safe_speed(gaps[f], speed)) for f in followers)
 
 

@@ -194,7 +194,7 @@ def test_again_another_and_the_next_game(page: LivePage) -> None:
     start(page, 'alone.yaml')
     page.wait('crgame.store.status.run === "running" && crgame.world.shown.objects.length > 0',
               'agents of traffic')
-    assert 'Traffic is alone' in page.text('#panel-drive')
+    assert 'only traffic' in page.text('#panel-drive')
     assert 'traffic was alone' in wait_for_card(page)
     assert folder_on_card(page).name == 'run_4'
     page.click('#outcome [data-action=next]')
@@ -212,7 +212,7 @@ def test_the_end_of_the_program_is_no_alarm(page: LivePage) -> None:
     """Somebody ends it at the terminal: the page shows what was last, and says so."""
     launcher = page.graph.launcher
     launcher.signal(signal.SIGINT)
-    page.wait_for_text('#outcome', 'no longer there')
+    page.wait_for_text('#outcome', 'program has ended')
     assert page.run('return [crgame.alarms.kinds(), crgame.driving.seat]') == [[], None]
     assert page.text('.clock-state') == 'Ended'
     assert page.run('return document.querySelector("#outcome [data-action=again]").disabled')

@@ -11,7 +11,7 @@ import { baseName, conditionWords, eventKind, eventWords } from
 const event = (kind, more) => ({ name: 'e', label: 'E', when: null, kind, ...more });
 
 for (const [kind, more, words] of [
-  ['release', { object: '7' }, 'Lets obstacle 7 go, which waits until then.'],
+  ['release', { object: '7' }, 'Releases obstacle 7, which waits until then.'],
   ['brake', { object: '7', deceleration: 4, speed: 0 },
     'Obstacle 7 brakes at 4.0 m/s² to a stop.'],
   // 25 m/s are 90 km/h.

@@ -35,7 +35,7 @@ class PairedCells:
 
         :param sums: (N, measures) sums of all cells of the block.
         :param counts: (N, measures) number of values in each sum.
-        :return: (P, measures) differences, 0 where there is none; and 1 where there is one, else 0.
+        :return: (P, measures) differences, 0 where there is none; and 1 where there is one or 0.
         """
         with np.errstate(invalid='ignore', divide='ignore'):
             means = sums / counts

@@ -69,13 +69,13 @@ class Lobby {
     }
     this.#list.replaceChildren(...this.#seats.map(([id, seat]) => this.#row(id, seat)));
     const missing = this.#seats.filter(([, { holder, ready }]) => holder === null || !ready);
-    setText(this.#note, seconds > 0 ? 'Hands on the controls: it begins.'
+    setText(this.#note, seconds > 0 ? 'Get ready: the run is starting.'
       : missing.length > 0 ? 'The run begins after a countdown when all are ready.'
-        : 'All are ready; hands on the controls.');
+        : 'All are ready: the run is starting.');
     const mine = this.#mine;
     const ready = mine !== undefined && Boolean(seats[mine].ready);
     setAttribute(this.#ready, 'hidden', mine === undefined);
-    setText(this.#ready, ready ? 'Not ready after all' : 'Ready');
+    setText(this.#ready, ready ? 'Withdraw ready' : 'Ready');
     setAttribute(this.#ready, 'aria-pressed', String(ready));
     setAttribute(this.#all, 'hidden', !rights.directs || this.#seats.length < 2);
   }

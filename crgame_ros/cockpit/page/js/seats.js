@@ -82,8 +82,8 @@ class Seats {
     setAttribute(this.#replay, 'hidden', mode !== 'replay');
     const rows = this.#order().map((id) => this.#facts(id));
     const none = this.#store.scene?.vehicles.length === 0
-      ? 'Traffic is alone in this game: there is no seat to take.'
-      : 'No seats: the simulation has not told of any yet.';
+      ? 'This game has only traffic: there is no seat to take.'
+      : 'No seats yet: waiting for the simulation.';
     const text = JSON.stringify([rows, none]);
     if (text !== this.#shown) {
       this.#shown = text;

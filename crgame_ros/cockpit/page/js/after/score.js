@@ -29,7 +29,9 @@ export function scoreBlock(scored, mine) {
     root.append(element('p', { class: 'dim', role: 'status', text: 'Scoring the run …' }));
   } else if (scored.state === 'none' || scored.score.vehicles.length === 0) {
     const why = scored.state === 'none' ? scored.why : scored.score.refusal;
-    root.append(element('p', { class: 'dim', text: `No score: ${why || 'no vehicle was driven'}` }));
+    root.append(element('p', {
+      class: 'dim', text: `No score: ${why || 'no vehicle was driven'}`,
+    }));
   } else {
     const { vehicles } = scored.score;
     /** @param {VehicleScore} each */

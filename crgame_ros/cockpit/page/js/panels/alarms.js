@@ -157,7 +157,8 @@ function describe(entry, scene) {
     + `${entry.known ? ' known' : ''}`;
   entry.chip.dataset.kind = entry.kind;
   const since = Number.isFinite(entry.since_t) ? ` (since ${clockTime(entry.since_t)})` : '';
-  entry.chip.title = `${oneLine(entry.text)}${since}${entry.known ? '' : ': click if you know'}`;
+  entry.chip.title = `${oneLine(entry.text)}${since}`
+    + (entry.known ? '' : ': click to acknowledge');
   setText(entry.says, word);
   // The text names the vehicle, but not the recorder.
   const isVehicle = scene?.vehicles.some((vehicle) => vehicle.id === entry.subject);

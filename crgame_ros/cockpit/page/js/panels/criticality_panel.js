@@ -44,11 +44,11 @@ const ROWS = [
   ['time_gap', 'Time gap', 's', 'gap divided by the own speed'],
   ['ttc', 'TTC', 's', 'gap divided by the closing speed'],
   ['ttc_a', 'TTC, accelerating', 's', 'with both accelerations held until either stands'],
-  ['ttc_2d', 'TTC, any direction', 's', 'until footprints touch that keep velocity and yaw'],
+  ['ttc_2d', 'TTC, any direction', 's', 'until footprints touch at constant velocity and heading'],
   ['drac', 'DRAC', 'm/s²', 'deceleration to avoid a crash'],
   ['a_req', 'Required', 'm/s²', 'constant acceleration that just avoids contact'],
   ['min_distance', 'Distance', 'm', 'of the footprints'],
-  ['pet', 'PET', 's', 'between one leaving the place where ways cross and the other entering it'],
+  ['pet', 'PET', 's', 'from one leaving the crossing area to the other entering it'],
 ];
 
 /**

@@ -18,7 +18,7 @@ const KMH = 3.6;
  * @type {{[Kind in EventAction['kind']]: (event: Extract<EventAction, {kind: Kind}>) => string}}
  */
 const ACTIONS = {
-  release: (event) => `Lets obstacle ${event.object} go, which waits until then`,
+  release: (event) => `Releases obstacle ${event.object}, which waits until then`,
   brake: (event) => `Obstacle ${event.object} brakes at ${fixed(event.deceleration, 1)} m/s² to `
     + (event.speed > 0 ? speed(event.speed) : 'a stop'),
   obstacle: (event) => `Puts ${THINGS[event.type] ?? THINGS.unknown} of `

@@ -188,7 +188,7 @@ class Outcome {
         () => window.crgame.driving?.putBack(), 'At rest, where its lane is free (Backspace)',
         'drive-button primary')] : []),
       this.#button('hold', 'How it went', () => this.#hold(),
-        'Hold the run, and tell how it goes', 'drive-button', refused),
+        'Pause the run and show the result so far', 'drive-button', refused),
       this.#button('look', run === 'running' ? 'Pause and look again' : 'Look again',
         () => this.#lookAgain(), 'The last 10 s once more', 'drive-button', refused),
       this.#button('again', 'Begin anew', () => this.#order('reset'),
@@ -250,7 +250,7 @@ class Outcome {
       ...(facts.figures.length > 0 ? figures(facts.figures) : []),
       against.choose === '' ? null : element('p', { class: 'outcome-gone', role: 'status',
         text: facts.connected ? against.choose
-          : 'The program at the other end is no longer there: this is how it was last seen. '
+          : 'The simulation program has ended. This page shows its last state. '
             + 'Start it again to drive again.' }),
       element('div', { class: 'outcome-buttons' },
         ...(phase === 'held' ? [
@@ -267,7 +267,7 @@ class Outcome {
         this.#button('another', 'Another game', () => this.#another(),
           'Choose a game or a scenario', 'drive-button', against.choose),
         this.#button('look', 'Last 10 s', () => this.#lookAgain(),
-          'The last 10 s once more, at will slowed', 'drive-button')),
+          'Replay the last 10 s, in slow motion if you like', 'drive-button')),
     ].filter((item) => item !== null);
   }
 

@@ -27,8 +27,8 @@ const COLUMNS = [
   ['Fallbacks', 'brakings where the planner found no plan', (p) => count(p.fallbacks), ''],
 ];
 
-const TRACKING_TITLE = "Where the vehicle is: beside the middle of its route's lane, and against "
-  + 'where its plan of a second ago wanted it to be now; in parentheses the worst of the run';
+const TRACKING_TITLE = "Deviation from the middle of its route's lane, and from the position that "
+  + 'its plan of a second ago gave for now; in parentheses the worst of the run';
 // Of a tracked AV: name of the error, factor to the unit, unit, digits.
 /** @type {[name: string, factor: number, unit: string, digits: number][]} */
 const ERRORS = [

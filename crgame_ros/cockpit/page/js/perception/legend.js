@@ -9,7 +9,7 @@ import { element, setAttribute, setText, svg } from '../dom.js';
 const ENTRIES = {
   unseen: ['M14 2a6 6 0 1 0 .01 0z', 'not seen by $'],
   rays: ['M2 14L26 2V14z', 'what the sensors of $ reach'],
-  estimate: ['M3 4h22v8H3z', 'where $ takes itself to be, 2σ'],
+  estimate: ['M3 4h22v8H3z', 'estimated pose of $, 2σ'],
   occupancy: ['M3 3h10v10H3zM15 3h10v10H15z', 'permanent obstacles'],
 };
 

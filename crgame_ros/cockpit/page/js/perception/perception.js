@@ -26,10 +26,10 @@ import { countText, Unseen } from './unseen.js';
  */
 const LAYERS = {
   unseen: ['M3 3l18 18M10 6a9 9 0 0 1 11 6a12 12 0 0 1-3 4M6 8a12 12 0 0 0-3 4'
-    + 'a9 9 0 0 0 12 5', 'Whom the followed AV does not see, as outlines', true, true],
+    + 'a9 9 0 0 0 12 5', 'Outlines of objects that the followed AV does not see', true, true],
   rays: ['M4 12L20 4M4 12h16M4 12l16 8M3 12h.01', 'Rays of its sensors', false, true],
   estimate: ['M3 8h3M10 8h4M18 8h3v3M21 14v2h-3M14 16h-4M6 16H3v-2M3 11V8',
-    'Where it takes itself to be', false, true],
+    'Its estimated pose', false, true],
   occupancy: ['M3 3h8v8H3zM13 13h8v8h-8zM13 3h8v8h-8z', 'Permanent obstacles', true, false],
 };
 // Prefix of layer names: another part may have a layer called rays.

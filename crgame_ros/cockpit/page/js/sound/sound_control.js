@@ -44,7 +44,7 @@ export function createSoundControl(root, sound) {
     volume.show();
     rumble.show();
     setText(motors, sound.canRumble ? 'Felt in the gamepad while you drive.'
-      : 'No gamepad with motors is to be seen: press one of its buttons.');
+      : 'No gamepad that can vibrate was found: press one of its buttons.');
   };
   panel.addEventListener('beforetoggle', show);
   root.prepend(button);

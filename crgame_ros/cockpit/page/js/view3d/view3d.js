@@ -17,7 +17,7 @@ import { readViewWindow } from './view_window.js';
 
 const MISSING = 'The 3D view needs three.js, which the server does not have: '
   + '`crgame page-libraries` fetches it.';
-const LOST = 'The graphics card took the 3D view back: it returns when the card is free.';
+const LOST = 'The browser has lost the graphics card: the 3D view returns when it is free.';
 // While nothing moves, the mirrors are still drawn in turn.
 const PICTURES_AFTER_CHANGE = 7;
 // Tolerance of animation frames that arrive early [ms].
