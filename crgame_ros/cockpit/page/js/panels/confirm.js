@@ -12,7 +12,7 @@ let dialog = null;
  *
  * @param {string} question
  * @param {string} consequence
- * @param {string} text of the button that confirms
+ * @param {string} verb on the button that confirms
  * @returns {Promise<boolean>}
  */
 export function confirm(question, consequence, verb) {
