@@ -12,7 +12,7 @@ from aiohttp import web
 from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Choice, Library
-from crgame_ros.cockpit.request_rights import actor
+from crgame_ros.cockpit.request_guard import actor
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.errors import CrgameError, InputError
 

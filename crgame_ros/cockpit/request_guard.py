@@ -7,17 +7,24 @@ from collections.abc import Awaitable, Callable
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 from crgame_ros.cockpit.access import Access, is_own_origin
+from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.doorkeeper import Doorkeeper
+from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_files import PageFile
-from crgame_ros.cockpit.request_rights import RIGHTS
-from crgame_ros.cockpit.rights import ALL_RIGHTS
-from crgame_ros.errors import InputError
+from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
+from crgame_ros.errors import CrgameError, InputError
 
+# Set by the server's guard.
+RIGHTS = web.RequestKey('rights', Rights)
+# The key of the page from which a request comes.
+KEY_HEADER = 'X-Crgame-Key'
+# In the order of the search: most browsers name others, too.
+_BROWSERS = (('Firefox/', 'Firefox'), ('Edg/', 'Edge'), ('OPR/', 'Opera'),
+             ('Chromium/', 'Chromium'), ('Chrome/', 'Chrome'), ('Version/', 'Safari'))
 KEEPER = web.AppKey('keeper', Doorkeeper)
 ACCESS = web.AppKey('access', Access)
 # How long a browser keeps its cookie [s].
 COOKIE_S = 12 * 3600
-
 _POLICY = 'Content-Security-Policy'
 _FRAMED_BY = 'frame-ancestors'
 _HEADERS = {
@@ -29,6 +36,38 @@ _HEADERS = {
     'Cross-Origin-Resource-Policy': 'same-origin',
     'Server': 'crgame_ros',
 }
+
+
+def granted(request: web.Request) -> Rights:
+    """Return the rights that the browser's link or address grants."""
+    return request.get(RIGHTS, ALL_RIGHTS)
+
+
+def actor(request: web.Request, hub: Hub, kind: str) -> Client | None:
+    """
+    Return the client that sent a request, and check its rights.
+
+    :param kind: load or invite.
+    :return: None for a program that is no page.
+    :raises CrgameError: if its rights do not allow the request.
+    """
+    client = hub.client_with_key(request.headers.get(KEY_HEADER, ''))
+    rights = granted(request) if client is None else client.rights
+    refusal = (granted(request).refusal(kind) or rights.refusal(kind))
+    if refusal:
+        raise CrgameError(refusal)
+    return client
+
+
+def browser_of(request: web.Request) -> str:
+    """Return the name and version of the browser; empty if it is unknown."""
+    agent = request.headers.get(hdrs.USER_AGENT, '')
+    for mark, name in _BROWSERS:
+        _, found, rest = agent.partition(mark)
+        version = rest.partition('.')[0]
+        if found and version.isascii() and version.isdecimal():
+            return f'{name} {version[:6]}'
+    return ''
 
 
 def guard(access: Access, keeper: Doorkeeper,

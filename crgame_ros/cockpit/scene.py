@@ -13,7 +13,6 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
 from commonroad.scenario.traffic_light import TrafficLight
 from commonroad.scenario.traffic_sign import TrafficSign
-from crgame_ros.cockpit.flat_points import flat, Points, rounded, simplified, TOLERANCE
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.game.objects import ObjectDescription
@@ -31,12 +30,49 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-Document = dict[str, Any]
+Points = NDArray[np.float64]
 
+# Tolerance of line simplification [m], too small to see; neighbours keep shared vertices.
+TOLERANCE = 0.01
+_DECIMALS = 3
+Document = dict[str, Any]
 # Most characters of a sign's additional value: no plate has room for more.
 _MOST_TEXT = 40
 # A narrower hole in the road is a gap of the map [m].
 _GAP_WIDTH = 0.8
+# Margin shown around the vehicles if a scenario has no roads [m].
+_EMPTY_MARGIN = 50.0
+
+
+def flat(points: Points) -> list[float]:
+    """Return points (N, D) as one flat list [m]."""
+    return [rounded(value) for value in np.asarray(points, dtype=np.float64).ravel()]
+
+
+def rounded(value: float) -> float:
+    """Return a coordinate rounded to millimetres [m]."""
+    return round(float(value), _DECIMALS)
+
+
+def simplified(vertices: Points) -> Points:
+    """
+    Return a polyline without the vertices that change it by less than a centimetre.
+
+    :param vertices: (N, 2), or (N, 3) whose heights stay as exact [m]
+    :return: the vertices that are left, including the first and the last
+    """
+    points = np.asarray(vertices, dtype=np.float64)
+    kept = shapely.get_coordinates(
+        shapely.simplify(shapely.LineString(points[:, :2]), TOLERANCE))
+    if points.shape[1] < 3:
+        return kept
+    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    s = np.concatenate(([0.0], np.cumsum(steps)))
+    profile = shapely.get_coordinates(shapely.simplify(
+        shapely.LineString(np.column_stack((s, points[:, 2]))), TOLERANCE))
+    needed = {tuple(row) for row in kept.tolist()}
+    return points[[tuple(row) in needed for row in points[:, :2].tolist()]
+                  | np.isin(s, profile[:, 0])]
 
 
 def light_entries(network: LaneletNetwork) -> list[Document]:
@@ -172,10 +208,6 @@ def stop_line_entries(network: LaneletNetwork) -> list[Document]:
 def marking_name(marking: LineMarking | None) -> str:
     """Return the name of a line marking in CommonRoad's files."""
     return 'no_marking' if marking is None else str(marking.value)
-
-
-# Margin shown around the vehicles if a scenario has no roads [m].
-_EMPTY_MARGIN = 50.0
 
 
 def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],

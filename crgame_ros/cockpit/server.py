@@ -18,8 +18,14 @@ from crgame_ros.cockpit.doorkeeper import Doorkeeper, server_log, WatchedSite
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
 from crgame_ros.cockpit.page_files import PageFile
-from crgame_ros.cockpit.request_guard import ACCESS, file_answer, guard, header_writer, KEEPER
-from crgame_ros.cockpit.request_rights import actor
+from crgame_ros.cockpit.request_guard import (
+    ACCESS,
+    actor,
+    file_answer,
+    guard,
+    header_writer,
+    KEEPER,
+)
 from crgame_ros.cockpit.rights import ROLES
 from crgame_ros.cockpit.session import Session
 from crgame_ros.errors import CrgameError, InputError

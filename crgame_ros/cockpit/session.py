@@ -14,7 +14,7 @@ from crgame_ros.cockpit import page_messages
 from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.client import Client, Sound, TokenBucket
 from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.request_rights import browser_of, granted
+from crgame_ros.cockpit.request_guard import browser_of, granted
 from crgame_ros.cockpit.rights import refusal_of
 from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.errors import CrgameError, InputError

@@ -2,18 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """A live run from the command line: check it, run it, and convert the recording to a scenario."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import os
+from pathlib import Path
+import selectors
 import shutil
+import signal
 import sys
+import time
+from types import FrameType
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.forked_node import load
-from crgame_ros.launcher.graph import Graph
-from crgame_ros.launcher.interruption import print_now, writing
+from crgame_ros.launcher.interruption import ENDING, print_now, writing
 from crgame_ros.launcher.main import ENDED_EARLY
+from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
 from crgame_ros.launcher.node_specs import node_specs, Roster, shared_modules
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
 from crgame_ros.ros.environment import (
@@ -25,6 +30,182 @@ from crgame_ros.ros.environment import (
 from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.shared_memory import remove_stale
 from crgame_ros.traffic.kernel_cache import compile_now, compiling_when_idle
+
+# Time for a node to end in good order, even on a busy machine [s].
+GRACE_S = 10.0
+# Time that it then gets to print its stacks [s].
+WORD_S = 0.3
+# Time for the recorder to record the last messages of the others [s].
+DRAIN_S = 0.3
+MAX_RESTARTS = 5
+# Period in which restarts are counted [s].
+RESTARTS_S = 60.0
+
+
+class Graph:
+    """
+    The nodes of a graph, which run until the simulation ends or a signal comes.
+
+    :param specs: the nodes; the end of the first one ends the run.
+    :param say: prints one line.
+    :param roster: lists further vehicles, which get their nodes.
+    :param finisher: finishes the recordings of runs that are over.
+    :param namespace: of all nodes.
+    """
+
+    def __init__(self, specs: Sequence[NodeSpec], say: Callable[[str], None],
+                 roster: Roster | None = None, finisher: Finisher | None = None,
+                 namespace: str = '/') -> None:
+        self._say = say
+        self._roster = roster
+        self._finisher = finisher
+        self._namespace = namespace
+        self._selector = selectors.DefaultSelector()
+        self._signal: int | None = None
+        self._restarts: dict[str, int] = {}
+        self._died_s: dict[str, list[float]] = {}
+        self._specs = list(specs)
+        self._nodes: dict[str, NodeProcess] = {}
+        self._width = max(len(spec.name) for spec in specs)
+
+    def run(self) -> int:
+        """
+        Run to the end.
+
+        :return: the simulation's exit code; 0 after Ctrl-C in good order.
+        """
+        before = {number: signal.signal(number, self._on_signal)
+                  for number in ENDING}
+        first = self._specs[0].name
+        try:
+            for spec in self._specs:
+                self._start(spec)
+            while self._signal is None and self._nodes[first].exit_code() is None:
+                self._relay(0.1)
+                self._restart_dead(first)
+                self._welcome()
+                if self._finisher is not None:
+                    self._finisher.poll()
+            return self._end(first)
+        finally:
+            for node in self._nodes.values():
+                node.kill()
+                node.close()
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    @property
+    def was_asked_to_end(self) -> bool:
+        """Return whether a signal, such as that of Ctrl-C, ended the graph."""
+        return self._signal is not None
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self._signal = number
+
+    def _start(self, spec: NodeSpec) -> None:
+        node = NodeProcess(spec, self._namespace)
+        self._nodes[spec.name] = node
+        self._say(f'{spec.name}: process {node.pid}')
+        self._selector.register(node.output, selectors.EVENT_READ, node)
+
+    def _relay(self, timeout_s: float) -> None:
+        """Pass the nodes' output on, each line with the node's name."""
+        for key, _ in self._selector.select(timeout_s):
+            node: NodeProcess = key.data
+            # Checked first, so that a node's last output is read before its pipe is closed.
+            ended = node.exit_code() is not None
+            self._pass_on(node)
+            if ended:
+                self._selector.unregister(node.output)
+
+    def _pass_on(self, node: NodeProcess) -> None:
+        for line in node.read_lines():
+            self._say(f'[{node.spec.name:{self._width}}] {line}')
+
+    def _restart_dead(self, first: str) -> None:
+        """Report a node that died, and start it again where that is safe."""
+        for name, node in list(self._nodes.items()):
+            code = node.exit_code()
+            if name == first or code is None or self._restarts.get(name, 0) < 0:
+                continue
+            cause = cause_of_death(code)
+            count = self._restarts.get(name, 0) + 1
+            # Bad input stays bad, so a node that exits with code 2 is not started again.
+            now_s = time.monotonic()
+            died_s = [at for at in self._died_s.get(name, []) if now_s - at < RESTARTS_S] + [now_s]
+            self._died_s[name] = died_s
+            if not node.spec.restart or code == 2 or len(died_s) > MAX_RESTARTS:
+                self._say(f'{name} died ({cause}); the others go on')
+                self._restarts[name] = -1
+                continue
+            self._say(f'{name} died ({cause}); starting it again')
+            self._restarts[name] = count
+            self._forget(node)
+            self._start(restarted(node.spec, count))
+
+    def _welcome(self) -> None:
+        """Start the nodes of vehicles that have joined with another game."""
+        for spec in self._roster.changed_specs() if self._roster is not None else ():
+            if spec.name not in self._nodes:
+                self._start(spec)
+
+    def _forget(self, node: NodeProcess) -> None:
+        if node.output in {key.fileobj for key in self._selector.get_map().values()}:
+            self._selector.unregister(node.output)
+        self._pass_on(node)
+        node.close()
+
+    def _end(self, first: str) -> int:
+        """End the simulation, wait for the recorder to write the last messages, end the others."""
+        simulation = self._nodes[first]
+        died = simulation.exit_code()
+        if died:
+            self._say(f'{first} died ({cause_of_death(died)}); ending the others')
+        simulation.interrupt()
+        self._wait_for([simulation])
+        until_s = time.monotonic() + DRAIN_S
+        while time.monotonic() < until_s:
+            self._relay(0.05)
+        recorders = [node for node in self._nodes.values()
+                     if node.spec.executable == 'recorder_node']
+        others = [node for node in self._nodes.values()
+                  if node is not simulation and node not in recorders]
+        for group in (others, recorders):
+            for node in group:
+                node.interrupt()
+            self._wait_for(group)
+        code = simulation.exit_code()
+        # A node that was still loading has no handler yet.
+        if self._signal is not None and died is None and code == -signal.SIGTERM:
+            return 0
+        return 0 if code == 0 else (code if code is not None and code > 0 else 1)
+
+    def _wait_for(self, nodes: Sequence[NodeProcess]) -> None:
+        until_s = time.monotonic() + GRACE_S
+        while any(node.exit_code() is None for node in nodes) and time.monotonic() < until_s:
+            self._relay(0.02)
+        for node in nodes:
+            if node.exit_code() is None:
+                node.print_stacks()
+                self._relay(WORD_S)
+                self._say(f'{node.spec.name} does not end: killed')
+                node.kill()
+        self._relay(0.0)
+
+
+def cause_of_death(code: int) -> str:
+    """Return a description of a process's end from its exit code."""
+    return f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
+
+
+def restarted(spec: NodeSpec, count: int) -> NodeSpec:
+    """Return the spec of a node that is started again: a recorder continues in a new folder."""
+    if spec.executable != 'recorder_node':
+        return spec
+    folder = Path(spec.parameters['directory'].strip('"'))
+    name = f'{folder.name.partition("_part")[0]}_part{count + 1}'
+    parameters = spec.parameters | {'directory': f'"{folder.with_name(name)}"'}
+    return NodeSpec(spec.executable, spec.name, parameters, spec.nice, spec.restart)
 
 
 def launch(arguments: Sequence[str] | None = None) -> int:

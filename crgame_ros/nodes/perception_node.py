@@ -11,10 +11,9 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.perception.perception import Perception
-from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import SeriesMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.ros.perception_messages import LocalizationMessage, ScanMessages
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll

@@ -13,10 +13,9 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.messages.joints import object_joint_names
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import TrafficLights
-from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.ros.scenario_documents import ScenarioDocuments, ScenarioSet
 from crgame_ros.ros.spinning import poll
 from crgame_ros.ros.trusted_code import TrustedCode

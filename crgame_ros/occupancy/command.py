@@ -35,7 +35,7 @@ Progress = Callable[[int, int], None]
 @dataclass(frozen=True)
 class WrittenMap:
     """
-    What was written.
+    The map that was written.
 
     :param path: the map's YAML file.
     :param tiles: number of tiles that are not empty.
@@ -51,11 +51,11 @@ class WrittenMap:
 
 def check_target(folder: Path, force: bool) -> None:
     """
-    Refuse to write where something is that must not be lost.
+    Refuse to overwrite existing data.
 
-    :param folder: where the map shall be.
-    :param force: a map that is there may be replaced; anything else may not.
-    :raises InputError: with the remedy.
+    :param folder: folder of the map.
+    :param force: whether an existing map may be replaced; other data may not.
+    :raises InputError: if it exists, with the remedy.
     """
     if not (folder.exists() or folder.is_symlink()):
         return
@@ -77,13 +77,13 @@ def check_target(folder: Path, force: bool) -> None:
 def write_map(raster: Raster, folder: Path, name: str, force: bool = False,
               progress: Progress | None = None) -> WrittenMap:
     """
-    Draw a map into a folder, which appears when all of it is written.
+    Write a map into a folder, which appears once it is complete.
 
     :param raster: what to draw.
-    :param folder: where to; made with the folders above it.
-    :param name: of the scenario, for the comment in the file.
-    :param force: replace a map that is there.
-    :param progress: told after each tile how many of how many are drawn.
+    :param folder: folder to write; it is created with its parents.
+    :param name: name of the scenario, for the comment in the file.
+    :param force: whether to replace an existing map.
+    :param progress: called after each tile with the number drawn and the total.
     :raises InputError: if the folder exists, see `check_target`.
     :raises CrgameError: if the files cannot be written.
     """
@@ -134,12 +134,12 @@ def _fill(part: Path, raster: Raster, name: str, progress: Progress | None
 
 
 def _pixels(occupied: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return the image of cells: the top row is the largest y."""
+    """Return the image of cells; its top row has the largest y."""
     return np.where(occupied[::-1], OCCUPIED, FREE).astype(np.uint8)
 
 
 def _move(part: Path, folder: Path) -> None:
-    """Put the finished folder in its place; an old one is there until then."""
+    """Move the finished folder to its place; an old one stays until then."""
     if not folder.exists():
         os.rename(part, folder)
         return
@@ -153,7 +153,7 @@ def _move(part: Path, folder: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-# Work that is done sooner needs no report [s].
+# Shorter work shows no progress [s].
 SILENT_S = 2.0
 REPORT_S = 1.0
 
@@ -186,16 +186,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(values: argparse.Namespace) -> int:
     """
-    Draw the map and say what was drawn.
+    Write the map, and print a summary.
 
     :return: exit code.
     """
-    # Here, so that other commands don't wait for these libraries.
+    # Imported here, so that other commands do not load these libraries.
     from crgame_ros.occupancy.rasterize import Raster
     from crgame_ros.scenario.loading import load_scenario
     spec = RasterSpec(values.resolution, values.tile, values.curb_width, values.min_island,
                       values.curbs, values.obstacles, values.close_ends)
-    # Now, not after the work.
+    # Check before the work.
     check_target(values.out, values.force)
     report = _reporter(time.monotonic())
     loaded = load_scenario(values.scenario)
@@ -210,7 +210,7 @@ def run(values: argparse.Namespace) -> int:
 
 
 def _reporter(start_s: float) -> Callable[[int, int], None]:
-    """Make a report of progress that says something once a second, if the work takes long."""
+    """Return a function that prints progress once a second, if the work takes long."""
     due_s = start_s + SILENT_S
 
     def report(done: int, total: int) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_EDGE = 1 << 20
-# Numbers as text must be read as a whole, and take many times their size in memory.
+# Numbers as text must be read at once, and take many times their size in memory.
 MAX_PLAIN_BYTES = 16 << 20
 HEADER_BYTES = 4096
 _GAP = rb'(?:\s|#[^\n]*\n)+'
@@ -27,15 +27,15 @@ class PgmImage:
     """
     An image whose pixels stay on disk.
 
-    The file is read, not mapped into memory: one that is cut short while it is mapped would kill
-    the process.
+    The file is read, not mapped into memory: if a mapped file were truncated, the process would
+    crash.
 
     :param path: the file.
     :param width: pixels in a row.
     :param height: rows; row 0 is the top.
     :param maximum: the value of white, 1 to 255.
-    :param first_byte: where the pixels begin in the file.
-    :param plain: (height, width) pixels of a file that holds numbers as text, else None.
+    :param first_byte: offset of the pixels in the file.
+    :param plain: (height, width) pixels of a file with numbers as text, else None.
     """
 
     path: Path
@@ -49,15 +49,15 @@ class PgmImage:
         """
         Read a piece.
 
-        :param rows: first, and the one behind the last.
-        :param columns: first, and the one behind the last.
-        :return: (rows, columns) the pixels as they are in the file.
+        :param rows: first row, and the one after the last.
+        :param columns: first column, and the one after the last.
+        :return: (rows, columns) pixels as in the file.
         :raises InputError: if the file has changed and cannot be read any more.
         """
         if self.plain is not None:
             return self.plain[slice(*rows), slice(*columns)]
         pixels = np.empty((rows[1] - rows[0], columns[1] - columns[0]), dtype=np.uint8)
-        # Whole rows lie in one piece.
+        # Complete rows are contiguous in the file.
         lines = pixels.reshape(1, -1) if pixels.shape[1] == self.width else pixels
         try:
             with self.path.open('rb') as stream:
@@ -74,7 +74,7 @@ def open_pgm(path: Path) -> PgmImage:
     """
     Open a grey image of 8 bits.
 
-    :raises InputError: if it is missing, no PGM image, of 16 bits, cut short or too large.
+    :raises InputError: if it is missing, not a PGM image, of 16 bits, truncated or too large.
     """
     try:
         status = path.stat()

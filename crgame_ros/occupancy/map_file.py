@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The YAML file of a map_server map: which image, where it lies, and what its greys mean."""
+"""The YAML file of a map_server map: image, position and meaning of grey values."""
 
 from dataclasses import dataclass, field
 import math
@@ -25,17 +25,16 @@ OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.25
 @dataclass(frozen=True)
 class MapEntry:
     """
-    A map as map_server has it; other keys are its own affair.
+    A map in the format of map_server; other keys are ignored.
 
     :param image: a PGM image in the folder of the file, or below it.
     :param resolution: edge of a pixel [m]
-    :param origin: lower left corner of the lower left pixel [m, m, rad]; maps that are turned are
-        refused.
+    :param origin: lower left corner of the lower left pixel [m, m, rad]; rotated maps are refused.
     :param negate: 1 where white is occupied.
-    :param occupied_thresh: occupied is what has a larger probability of it.
-    :param free_thresh: free is what has a smaller one.
+    :param occupied_thresh: pixels with a larger probability of occupancy are occupied.
+    :param free_thresh: pixels with a smaller probability are free.
     :param mode: scale differs from trinary only in cells that are not occupied.
-    :param tile_cells: cells along the edge of a tile, if the pixels stand for tiles.
+    :param tile_cells: cells along the edge of a tile, if each pixel represents a tile.
     """
 
     FORM: ClassVar[Form] = Form('give the YAML file of a map_server map', rest='others')
@@ -52,7 +51,7 @@ class MapEntry:
     others: dict[str, Any] = field(default_factory=dict)
 
     def check(self) -> None:
-        """Refuse thresholds that are crossed, and a map that is turned."""
+        """Refuse thresholds in the wrong order, and a rotated map."""
         if self.free_thresh > self.occupied_thresh:
             raise InputError('"free_thresh" is larger than "occupied_thresh"', '', 'swap them')
         if abs(math.remainder(self.origin[2], math.tau)) > 1e-9:
@@ -63,15 +62,15 @@ class MapEntry:
 @dataclass(frozen=True)
 class MapFile:
     """
-    What a map's YAML file says.
+    The content of a map's YAML file.
 
     :param path: the YAML file.
     :param image: the image file, inside the folder of the YAML file.
     :param resolution: edge of a pixel [m]
     :param origin: x, y of the lower left corner of the lower left pixel, frame map [m]
     :param negate: True where white is occupied.
-    :param occupied_thresh: occupied is what has a larger probability of it, 0 to 1.
-    :param tile_cells: cells along the edge of a tile, if the pixels stand for tiles, else None.
+    :param occupied_thresh: pixels with a larger probability of occupancy are occupied, 0 to 1.
+    :param tile_cells: cells along the edge of a tile, if each pixel represents a tile, else None.
     """
 
     path: Path
@@ -84,15 +83,15 @@ class MapFile:
 
     def occupied(self, pixels: NDArray[np.uint8], maximum: int) -> NDArray[np.bool_]:
         """
-        Interpret grey values as map_server does; unknown is not occupied.
+        Return which grey values are occupied, as in map_server; unknown is not occupied.
 
         :param pixels: (rows, columns) as in the image, the top row first.
         :param maximum: the value of white.
-        :return: (rows, columns) with the bottom row first, so that rows grow with y.
+        :return: (rows, columns) with the bottom row first, so that row indices grow with y.
         """
         shade = np.minimum(np.arange(256) / maximum, 1.0)
         probability = shade if self.negate else 1.0 - shade
-        # Occupied greys are the darkest, or the lightest: to compare is quicker than to look up.
+        # Occupied greys are the darkest or the lightest: a comparison is faster than a table.
         count = int(np.count_nonzero(probability > self.occupied_thresh))
         if count in (0, 256):
             return np.full(pixels.shape, count > 0)
@@ -118,13 +117,13 @@ def read_map_file(path: Path) -> MapFile:
 def map_text(image: str, resolution: float, origin: tuple[float, float], comment: str = '',
              tile_cells: int | None = None) -> str:
     """
-    Write the YAML file of a map, readable by map_server.
+    Return the YAML text of a map, readable by map_server.
 
     :param image: name of the image, in the same folder.
     :param resolution: edge of a pixel [m]
     :param origin: lower left corner [m]
-    :param comment: lines to put first.
-    :param tile_cells: if the pixels stand for tiles: cells along the edge of one.
+    :param comment: comment lines at the top.
+    :param tile_cells: cells along the edge of a tile, if each pixel represents a tile.
     """
     lines = [f'# {line}' for line in comment.splitlines()]
     lines += [f'image: {image}', f'resolution: {resolution!r}',

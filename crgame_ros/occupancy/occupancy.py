@@ -25,7 +25,7 @@ class OccupancyGrid:
 
     def occupied_at(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """
-        Return which points are in occupied cells; outside the grid nothing is.
+        Return which points are in occupied cells; points outside the grid are not.
 
         :param points: (..., 2) [m]
         :return: (...)
@@ -40,13 +40,13 @@ class OccupancyGrid:
 
 
 class OccupancyMap(Protocol):
-    """A map of any extent that gives the part of it that is wanted."""
+    """A map of any extent that returns the part around given points."""
 
     def near(self, points: NDArray[np.float64], reach_m: float) -> OccupancyGrid | None:
         """
-        Return at least everything within a reach of points.
+        Return a grid that covers at least the surroundings of points.
 
         :param points: (N, 2), frame map [m]; NaN points are left out.
-        :param reach_m: how far around the points [m]
+        :param reach_m: distance around the points [m]
         :return: None if nothing is occupied there.
         """

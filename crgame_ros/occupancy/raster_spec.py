@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How permanent obstacles are drawn into an occupancy map."""
+"""Settings for drawing permanent obstacles into an occupancy map."""
 
 from dataclasses import dataclass, fields
 import math
 
 from crgame_ros.errors import InputError
 
-# Memory that one tile may take: 4 MiB.
+# Greatest edge of a tile: 4 MiB of memory.
 MAX_TILE_CELLS = 2048
 BOUNDS = {'resolution': (0.01, 10.0), 'tile': (1.0, 10_000.0), 'curb_width': (0.01, 10.0),
           'min_island': (0.0, 1e6)}
@@ -16,14 +16,14 @@ BOUNDS = {'resolution': (0.01, 10.0), 'tile': (1.0, 10_000.0), 'curb_width': (0.
 @dataclass(frozen=True)
 class RasterSpec:
     """
-    How to draw.
+    Settings of an occupancy map.
 
-    :param resolution: edge of a cell [m]; 0.1 m is finer than what a vehicle's pose is known to.
+    :param resolution: edge of a cell [m]; 0.1 m is finer than the accuracy of a vehicle's pose.
     :param tile: edge of a tile, a whole number of cells [m]
     :param curb_width: width of a curb, outwards from the edge of the road [m]; kerb stones are
         0.12 to 0.18 m wide.
-    :param min_island: holes in the road that are smaller are gaps between lanelets, as in the
-        middle of junctions, and have no curb [m^2]; 2 m^2 parts them in the maps we have.
+    :param min_island: smaller holes in the road are gaps between lanelets, as in the middle of
+        junctions, and have no curb [m^2]; 2 m^2 separates them from islands in the maps tested.
     :param curbs: draw the edges of the road.
     :param obstacles: draw the scenario's static and environment obstacles.
     :param close_ends: draw curbs across the ends of the map's roads too.

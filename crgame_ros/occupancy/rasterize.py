@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Drawing the permanent obstacles of a scenario as an occupancy grid (FS II-A2).
+Draws the permanent obstacles of a scenario as an occupancy grid (FS II-A2).
 
-A cell is occupied if its inside meets a curb or an obstacle: every point of these lies in an
+A cell is occupied if its interior intersects a curb or an obstacle. Every point of these is in an
 occupied cell, and the centre of an occupied cell is no more than half a cell away from them, in x
 and in y. Cells that only share an edge with them stay free.
 """
@@ -30,23 +30,24 @@ import numpy as np
 from numpy.typing import NDArray
 import shapely
 
-# A piece of outline so close to the end of a road belongs to it [m].
+# Parts of the outline within this distance of a road's end belong to it [m].
 END_TOLERANCE = 0.02
 
 
 def curbs(network: LaneletNetwork, origin: tuple[float, float], spec: RasterSpec
           ) -> list[shapely.Polygon]:
     """
-    Draw a band along the outside of the road.
+    Return bands along the outside of the road.
 
-    The road is that of the check of road compliance: all lanelets united, seams closed; here also
-    gaps between lanelets up to the size of the smallest island. It stays open where it ends with
-    the map, that is where neither a lanelet nor any lanelet beside it leads on.
+    The road is that of the road compliance check: the union of all lanelets with closed seams. Here
+    gaps between lanelets up to the size of the smallest island are closed as well. The band stays
+    open where the road ends with the map: where neither a lanelet nor any lanelet beside it
+    continues.
 
     :param network: the lanelet network.
-    :param origin: position (x, y) from which the polygons count [m]
+    :param origin: position (x, y) to which the polygons are relative [m]
     :param spec: width of the curbs, smallest island, and whether ends are closed.
-    :return: polygons that touch the road but don't overlap it.
+    :return: polygons that touch the road but do not overlap it.
     """
     polygons = lanelet_polygons(network.lanelets, origin)
     surface = _without_gaps(road_surface(polygons, seam_patches(shapely.union_all(polygons))),
@@ -59,10 +60,10 @@ def curbs(network: LaneletNetwork, origin: tuple[float, float], spec: RasterSpec
 
 def road_ends(network: LaneletNetwork, origin: tuple[float, float]) -> shapely.MultiLineString:
     """
-    Find the lines at which roads end with the map.
+    Return the lines at which roads end with the map.
 
     :param network: the lanelet network.
-    :param origin: position (x, y) from which the lines count [m]
+    :param origin: position (x, y) to which the lines are relative [m]
     """
     known = {lanelet.lanelet_id: lanelet for lanelet in network.lanelets}
     lines = []
@@ -83,7 +84,7 @@ def _without_gaps(surface: shapely.Geometry, min_island: float) -> shapely.Multi
 
 
 def _leads_on(lanelet: Lanelet, is_exit: bool, known: dict[int, Lanelet]) -> bool:
-    """Return whether a lanelet, or one beside it, has another one behind this end."""
+    """Return whether a lanelet, or one beside it, continues beyond this end."""
     pending, seen = [(lanelet, is_exit)], {lanelet.lanelet_id}
     while pending:
         here, out = pending.pop()
@@ -98,16 +99,16 @@ def _leads_on(lanelet: Lanelet, is_exit: bool, known: dict[int, Lanelet]) -> boo
 
 
 def _without(outline: shapely.Geometry, ends: shapely.MultiLineString) -> shapely.Geometry:
-    """Cut road ends out of the outline."""
+    """Return the outline without road ends."""
     cut = ends.buffer(END_TOLERANCE, cap_style='flat')
     pieces = shapely.get_parts(shapely.line_merge(outline.difference(cut)))
-    # Where lanelets end beside each other, seams between them leave crumbs of the end.
+    # Where lanelets end beside each other, seams between them leave small remains of the end.
     crumb = (shapely.length(pieces) < 2.0 * SEAM_WIDTH) \
         & shapely.dwithin(pieces, ends, SEAM_WIDTH)
     return shapely.MultiLineString(pieces[~crumb].tolist())
 
 
-# Cells are so much smaller all around [cells]: what merely touches a cell doesn't fill it.
+# Cells are reduced by this on all sides [cells], so that a shape that only touches one is outside.
 INSET = 1e-6
 
 
@@ -116,13 +117,13 @@ class Raster:
     The permanent obstacles of a scenario, cut into tiles.
 
     :param loaded: the scenario.
-    :param spec: how to draw.
+    :param spec: settings of the map.
     :raises InputError: if there is nothing to draw, or the map is too wide.
     """
 
     def __init__(self, loaded: LoadedScenario, spec: RasterSpec) -> None:
         self.spec = spec
-        # Near the road the numbers are small, also on maps in projected coordinates.
+        # Relative to the road numbers are small, even on maps in projected coordinates.
         near = loaded.scenario.lanelet_network.lanelets[0].center_vertices[0][:2].tolist()
         shapes = _permanent_shapes(loaded, spec, (near[0], near[1]))
         if not shapes:
@@ -151,15 +152,15 @@ class Raster:
 
     @property
     def candidates(self) -> int:
-        """How many tiles have to be drawn; some of them may turn out empty."""
+        """Return the number of tiles to draw; some of them may be empty."""
         return len(self._near)
 
     def tiles(self) -> Iterator[tuple[int, int, NDArray[np.bool_] | None]]:
         """
-        Draw the tiles, row by row from the lower left.
+        Yield the tiles, row by row from the lower left.
 
-        :return: row, column and (tile_cells, tile_cells) cells, whose rows grow with y; None in
-            place of the cells if none is occupied.
+        :return: row, column and (tile_cells, tile_cells) cells, whose row indices grow with y;
+            None in place of the cells if none is occupied.
         """
         spec = self.spec
         for tile in sorted(self._near):
@@ -174,10 +175,10 @@ class Raster:
 def draw(shape: shapely.Geometry, origin: tuple[float, float], resolution: float,
          occupied: NDArray[np.bool_]) -> None:
     """
-    Occupy every cell whose inside meets a shape.
+    Occupy every cell whose interior intersects a shape.
 
-    The area is quartered again and again: parts that lie apart from the shape are dropped, parts
-    that lie within it are filled.
+    The area is divided into quarters recursively: parts outside the shape are dropped, parts
+    within it are filled.
 
     :param shape: prepared, for speed.
     :param origin: lower left corner of the cells [m]
@@ -185,7 +186,7 @@ def draw(shape: shapely.Geometry, origin: tuple[float, float], resolution: float
     :param occupied: (rows, columns), changed in place; rows grow with y.
     """
     inset = INSET * resolution
-    # Columns: first row, row behind the last, first column, column behind the last.
+    # Columns: first row, row after the last, first column, column after the last.
     parts = np.array([[0, occupied.shape[0], 0, occupied.shape[1]]])
     while len(parts):
         low, high, left, right = parts.T * resolution

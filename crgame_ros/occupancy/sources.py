@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the tiles of an occupancy map come from: a folder of tiles, or one image cut into them."""
+"""Sources of an occupancy map's tiles: a folder of tiles, or one image that is cut into tiles."""
 
 import os
 from pathlib import Path
@@ -12,7 +12,7 @@ from crgame_ros.occupancy.map_file import MapFile, MAX_RESOLUTION, read_map_file
 import numpy as np
 from numpy.typing import NDArray
 
-# A map of others is cut into tiles of this many cells, 100 m at 0.1 m.
+# A map from another source is cut into tiles with edges of this many cells, 100 m at 0.1 m.
 CUT_CELLS = 1000
 MAX_TILES = 4_000_000
 
@@ -35,14 +35,15 @@ class TileSource(Protocol):
         """
         Read a tile from disk.
 
-        :return: (tile_cells, tile_cells) with rows that grow with y; None if nothing is occupied.
+        :return: (tile_cells, tile_cells) with row indices that grow with y; None if no cell is
+            occupied.
         :raises InputError: if it cannot be used.
         """
 
 
 def open_tiles(path: Path) -> TileSource:
     """
-    Open a map: the YAML file (or the folder) of our tiles, or of any map_server map.
+    Open a map: the YAML file (or the folder) of a `crgame rasterize` map, or of any map_server map.
 
     :raises InputError: naming the file and the remedy.
     """
@@ -59,7 +60,7 @@ class TileFolder:
     """
     A map that `crgame rasterize` wrote: a map_server map for each tile that is not empty.
 
-    :param index: the map whose pixels are the tiles.
+    :param index: the map whose pixels represent tiles.
     :param tile_cells: cells along the edge of a tile.
     :raises InputError: if the index is too large, or a tile is missing.
     """
@@ -104,7 +105,7 @@ class TileFolder:
 
 class CutImage:
     """
-    A single map_server map, of which tiles are read as they are needed.
+    A single map_server map, from which tiles are read as needed.
 
     :param map_file: the map.
     :raises InputError: if the image cannot be used.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Occupancy maps of any extent, of which only what is near the vehicles is in memory (FS II-A2).
+Occupancy maps of any extent, of which only parts near the vehicles are in memory (FS II-A2).
 
 "As the host vehicle moves, segments of occupancy grids maps in proximity to the vehicle are
 loaded."
@@ -16,7 +16,7 @@ from crgame_ros.occupancy.sources import open_tiles
 import numpy as np
 from numpy.typing import NDArray
 
-# Tiles in memory at most, and as much again for neighbourhoods made of them: 64 MiB each.
+# Greatest number of cells in memory for tiles, and again for grids composed of them: 64 MiB each.
 MAX_CELLS = 1 << 26
 
 # First row, last row, first column, last column of tiles.
@@ -25,14 +25,14 @@ _Range = tuple[int, int, int, int]
 
 class TiledOccupancy:
     """
-    Permanent obstacles on disk, read in tiles as they are needed.
+    Permanent obstacles on disk, read in tiles as needed.
 
-    What is asked for repeatedly is the same object, which costs some microseconds; the step that
-    first needs other tiles costs some milliseconds for each.
+    A repeated request returns the same object and takes some microseconds. A request that needs
+    other tiles takes some milliseconds for each.
 
     :param path: the YAML file of a map that `crgame rasterize` wrote, or its folder, or the YAML
         file of any map_server map with a PGM image, which is cut into tiles as it is read.
-    :param max_cells: cells of tiles in memory at most, a byte each; neighbourhoods made of
+    :param max_cells: greatest number of cells of tiles in memory, a byte each; grids composed of
         several tiles may take as much again.
     :raises InputError: if the map cannot be used; so does `near` if a tile cannot be read.
     """
@@ -47,14 +47,14 @@ class TiledOccupancy:
                              f'{max_cells} may be in memory', str(path), 'use smaller tiles')
         self.loaded = 0
         self.dropped = 0
-        # Both in the order of their use, the latest last.
+        # Both are in the order of use, the latest last.
         self._tiles: dict[tuple[int, int], NDArray[np.bool_] | None] = {}
         self._grids: dict[_Range, OccupancyGrid | None] = {}
         self._last: tuple[_Range | None, OccupancyGrid | None] = (None, None)
 
     @property
     def resident_tiles(self) -> int:
-        """Tiles that are in memory now: `loaded` from disk so far without those `dropped`."""
+        """Return the number of tiles in memory: `loaded` from disk so far minus `dropped`."""
         return self.loaded - self.dropped
 
     @property
@@ -69,20 +69,20 @@ class TiledOccupancy:
         return x, y, x + self._source.columns * self._size, y + self._source.rows * self._size
 
     def fits(self, points: NDArray[np.float64], reach_m: float) -> bool:
-        """Return whether `near` may be asked for this: whether it is small enough for memory."""
+        """Return whether the grid of `near` for these arguments is small enough for memory."""
         tiles = self._range(points, reach_m)
         return tiles is None or _count(tiles) <= self.max_tiles
 
     def near(self, points: NDArray[np.float64], reach_m: float) -> OccupancyGrid | None:
         """
-        Return the tiles that a reach around points touches, as one rectangular grid.
+        Return the tiles around points as one rectangular grid.
 
         Every cell of the grid is as in the map. The array is read-only.
 
         :param points: (N, 2), frame map [m]; NaN points are left out.
         :param reach_m: half the edge of the square around each point [m]
         :return: the same object as long as the same tiles are needed; None if these tiles are
-            empty, or none are there.
+            empty, or there are none.
         :raises InputError: if the points lie too far apart to be held in memory together, or a
             tile cannot be used.
         """

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishers, subscriptions and services, created from the interface contract."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+import time
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -11,6 +12,8 @@ from crgame_ros.messages.cdr import message_header
 from crgame_ros.messages.contract import load_contract, Qos
 from crgame_ros.ros.diagnostics import Diagnostics
 from crgame_ros.ros.message_validator import message_type, MessageValidator, Refusals
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
 from rclpy.callback_groups import CallbackGroup
 from rclpy.client import Client
 from rclpy.node import Node
@@ -19,6 +22,14 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+PERIOD_S = 1.0
+# Unusable messages, and those for other nodes, are skipped: at most this many per read.
+MAX_PASSED_OVER = 100
+# Depth of a queue whose messages are filtered here: others' would fill a single slot.
+SHARED_DEPTH = 200
+# One entry for each node of this process.
+_TOLD: WeakKeyDictionary[Node, tuple[Diagnostics, Refusals]] = WeakKeyDictionary()
+
 
 def qos_profile(qos: Qos) -> QoSProfile:
     """Return the rclpy profile of a contract's QoS."""
@@ -26,14 +37,6 @@ def qos_profile(qos: Qos) -> QoSProfile:
         depth=qos.depth,
         reliability=ReliabilityPolicy[qos.reliability.upper()],
         durability=DurabilityPolicy[qos.durability.upper()])
-
-
-# Unusable messages, and those for other nodes, are skipped: at most this many per read.
-MAX_PASSED_OVER = 100
-# Depth of a queue whose messages are filtered here: others' would fill a single slot.
-SHARED_DEPTH = 200
-# One entry for each node of this process.
-_TOLD: WeakKeyDictionary[Node, tuple[Diagnostics, Refusals]] = WeakKeyDictionary()
 
 
 class PolledGroup(CallbackGroup):
@@ -196,3 +199,37 @@ def relative(name: str) -> str:
 
 def _unused(message: Any) -> None:
     raise RuntimeError('a polled subscription was run by an executor')
+
+
+class NodeReport:
+    """
+    The durations of pieces of work, and a status published once a second.
+
+    :param endpoints: of the node.
+    :param name: of the status: node and subject.
+    """
+
+    def __init__(self, endpoints: Endpoints, name: str) -> None:
+        self._diagnostics = endpoints.diagnostics
+        self._name = name
+        self._durations_s: list[float] = []
+        self._sent_s = 0.0
+
+    def worked(self, duration_s: float) -> bool:
+        """Note the duration of a piece of work [s]; return whether a report is due."""
+        self._durations_s.append(duration_s)
+        return time.monotonic() - self._sent_s > PERIOD_S
+
+    def publish(self, text: str, values: Mapping[str, object], stamp_ns: int) -> None:
+        """
+        Publish a status, with the times of the work since the last one.
+
+        :param stamp_ns: simulation time [ns]
+        """
+        self._sent_s = time.monotonic()
+        times_ms = 1e3 * np.array(self._durations_s or [0.0])
+        self._durations_s.clear()
+        work = {'work_ms_median': f'{np.median(times_ms):.3f}',
+                'work_ms_worst': f'{times_ms.max():.3f}'}
+        self._diagnostics.publish(self._name, DiagnosticStatus.OK, text, {**values, **work},
+                                  stamp_ns)

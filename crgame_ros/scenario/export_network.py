@@ -128,7 +128,7 @@ def _is_integer(text: str | None) -> bool:
 
 
 def framed(elements: list[etree._Element]) -> etree._Element:
-    """Return a document with copies of the roads and the other elements that the schema requires."""
+    """Return a document with copies of the roads and the elements that the schema requires."""
     frame = etree.fromstring(_FRAME)
     frame.extend(deepcopy(elements))
     # The schema refuses ids that are not numbers; the problem's id must differ from references.

@@ -82,7 +82,7 @@ def _add_initial_state(obstacle: etree._Element) -> None:
 
 
 def _place(shape: etree._Element, time: etree._Element) -> None:
-    """Return an initial state at a shape's place on the map, and centre the shape at the origin."""
+    """Write a shape's place on the map as an initial state, and centre the shape at the origin."""
     centers = shape.findall('*/center') + shape.findall('polygon/point')
     try:
         points = [(float(point.findtext('x', '')), float(point.findtext('y', '')))
@@ -112,7 +112,7 @@ def _place(shape: etree._Element, time: etree._Element) -> None:
 
 
 def _make_goal(state: etree._Element, problem: str) -> list[str]:
-    """Convert a goal's fields to intervals and areas of 2018b; return the names of others."""
+    """Convert a goal's fields to intervals and areas of 2018b; return remarks on the changes."""
     notices = []
     for field in list(state):
         if field.tag not in _GOAL_FIELDS:
@@ -134,7 +134,7 @@ def _make_goal(state: etree._Element, problem: str) -> list[str]:
 
 
 def _seconds_to_steps(root: etree._Element) -> bool:
-    """Divide times by the time step if any is not a whole number; return whether one was."""
+    """Divide times by the time step if any is not a whole number; return whether that was so."""
     nodes = [node for path in _TIMES for node in root.iterfind(path)]
     try:
         step = float(root.get('timeStepSize', ''))

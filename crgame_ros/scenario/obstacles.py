@@ -28,7 +28,7 @@ _MAX_CELLS = 20_000_000
 
 @dataclass(frozen=True)
 class _Track:
-    """Poses (n, 3) of an obstacle's centre, with time steps (n); None if it is static."""
+    """Poses (n, 3) of an obstacle's centre at time steps (n); no time steps if it is static."""
 
     steps: NDArray[np.int64]
     poses: FloatArray

@@ -167,7 +167,7 @@ class LanePrediction:
 
     def _predict_changed(self, now: ObjectStates, changed: NDArray[np.int64], time: FloatArray,
                          poses: FloatArray) -> None:
-        """Predict the few objects that are not at their recorded places, after finding their lanes."""
+        """Predict the few objects that are not at their recorded places, by their lanes."""
         columns = changed[self._follows_lanes[changed]]
         yaw, velocities = now.poses[columns, 2], now.velocities[columns]
         speed = velocities[:, 0] * np.cos(yaw) + velocities[:, 1] * np.sin(yaw)

@@ -171,7 +171,7 @@ def _on_lanelet(network: RoadNetwork, spawn: LaneletSpawn, vehicle_id: str) -> V
 
 def _near_av(network: RoadNetwork, parameters: VehicleParameters,
              av: VehicleState) -> Iterator[tuple[int, float]]:
-    """Propose places in the order of preference: beside, behind, level, ahead, anywhere near."""
+    """Yield places in the order of preference: beside, behind, level, ahead, anywhere near."""
     lane = network.nearest_lanelet(av.x, av.y, av.yaw)
     s_av, _ = network.locate(lane, av.x, av.y)
     length = parameters.length
@@ -185,7 +185,7 @@ def _near_av(network: RoadNetwork, parameters: VehicleParameters,
         beside.append((neighbour, s))
     gap = _HEADWAY_S * abs(av.speed) + 2.0 * length
     further = [gap + extra for extra in np.arange(0.0, 41.0, 5.0).tolist()]
-    # Where the road begins shortly before the AV, closer behind it, then level with it.
+    # If the road begins shortly before the AV: closer behind it, then level with it.
     closer = np.arange(gap, _CLOSEST * length, -0.5 * length)[1:].tolist()
     preferred = [
         *((*place, -back * length) for place in beside for back in (1.2, 1.6, 2.0, 3.0, 4.0)),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic bicycle that follows a path (FS II-A3)."""
+"""The kinematic bicycle model along a path (FS II-A3)."""
 
 from collections.abc import Sequence
 import math
@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Distance to the side below which something is in the way, besides both half widths [m].
+# A body is in the way if its lateral distance is below this plus both half widths [m].
 SIDE_MARGIN = 0.3
-# A reactive object looks as far as it takes to stop comfortably, and this much farther [m].
+# A reactive object considers others within its comfortable stopping distance plus this [m].
 _LOOK = 30.0
 _ARRIVED = 0.01
-# What `idm` of traffic adds to the model (traffic.car_following, which is compiled: too much to
+# Additions of traffic's `idm` to the model (traffic.car_following is compiled, and too large to
 # load into every node): the guard begins at this share of the hardest deceleration and leaves this
-# share of the gap at standstill; who stands stays until the model wants START.
+# share of the gap at standstill; a standing object starts once the model's acceleration reaches
+# START.
 _GUARD_SHARE, _GUARD_GAP, _LEAST_ROOM = 0.8, 0.5, 0.01
 _START = 0.2
 
@@ -34,14 +35,14 @@ _START = 0.2
 def follow(model: IdmParameters, speed: float, desired: float, gap: float,
            leader_speed: float) -> float:
     """
-    Return the acceleration behind a leader that may brake its hardest at any moment [m/s^2].
+    Return the acceleration behind a leader that may brake at its hardest at any moment [m/s^2].
 
-    The same as `idm` of traffic has, to the last bit.
+    The result equals that of traffic's `idm`, to the last bit.
 
     :param desired: speed on a free road, `STANDING` or above [m/s]
     :param gap: bumper to bumper [m]
     """
-    # Arrays, and products for squares: powers of Python's own numbers are rounded otherwise.
+    # Arrays, with products for squares: powers of Python's floats are rounded differently.
     v, v0, s, v_l = np.array([[speed], [desired], [gap], [leader_speed]])
     wanted = float((free_acceleration(v, v0, model, np.maximum)
                     + interaction(v, s, v_l, model, np.maximum))[0])
@@ -57,17 +58,17 @@ def follow(model: IdmParameters, speed: float, desired: float, gap: float,
 
 class BicycleMotion(Integrated):
     """
-    Moves the rear axle along a path: x' = v cos psi, y' = v sin psi, psi' = v tan(delta) / L.
+    A motion of the rear axle on a path: x' = v cos psi, y' = v sin psi, psi' = v tan(delta) / L.
 
-    The heading is the path's at the rear axle and delta = atan(L kappa), so that nothing slips;
-    the centre is as far ahead of the axle as the type has it, on the path where that is straight.
-    The speed tends to the wanted one within acceleration a and deceleration b, slow enough for
-    bends (sqrt(a_lat / kappa)) and speed limits, and for the end where it stays. A reactive one
-    follows what is ahead on its path by the IDM; others to the side, and crossing ones before
-    they are in the way, it does not mind.
+    The heading is the path's at the rear axle and delta = atan(L kappa), so that there is no slip.
+    The centre is ahead of the axle by the type's distance, so that it is on the path where that is
+    straight. The speed tends to the wanted one within acceleration a and deceleration b. It is
+    limited for bends (sqrt(a_lat / kappa)), by speed limits, and for the end if the object stays
+    there. A reactive object follows a leader on its path by the IDM. It ignores others to the side,
+    and crossing ones before they are in the way.
 
-    :param spec: of the object.
-    :param path: of the rear axle.
+    :param spec: specification of the object.
+    :param path: path of the rear axle.
     :param start: arc length of the centre at the beginning [m]
     :param wanted: (n,) wanted speed at each arc length of the path [m/s]
     """
@@ -77,7 +78,7 @@ class BicycleMotion(Integrated):
         super().__init__(spec.start)
         self._spec, self._path, self._type = spec, path, spec.mover
         self._s = start
-        # The bend that counts is that at the rear axle, behind the centre.
+        # The curvature at the rear axle counts, behind the centre.
         curvature = np.interp(path.s - self._type.rear_to_center, path.s, np.abs(path.curvature))
         bend = np.sqrt(self._type.lateral / np.maximum(curvature, 1e-9))
         limit = np.minimum(np.minimum(wanted, bend), path.speed_limit)
@@ -88,11 +89,11 @@ class BicycleMotion(Integrated):
             self._type.headway, self._type.distance, self._type.acceleration,
             self._type.deceleration, self._type.hardest)
         self._speed = self._profile.at(start) if spec.start == 0.0 else 0.0
-        # Until the first decision nothing is in the way.
+        # There is no leader until the first decision.
         self._following = math.inf
 
     def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Find what is ahead on the path, and the acceleration behind it."""
+        """Find the leader on the path, and the acceleration behind it."""
         if self._gone:
             return
         gap, speed = self._leader(others)
@@ -136,7 +137,7 @@ class BicycleMotion(Integrated):
             self._s, self._speed = min(self._s, end), 0.0
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Return the centre, ahead of the rear axle."""
+        """Return the state of the centre, which is ahead of the rear axle."""
         if self._gone:
             return ABSENT, ABSENT
         ahead = self._type.rear_to_center

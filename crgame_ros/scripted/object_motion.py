@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How objects move: what every movement model can do, and the trivial and the given ones."""
+"""The interface of objects' movement models, and the models of standstill and given motion."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -18,10 +18,10 @@ FloatArray = NDArray[np.float64]
 @dataclass(frozen=True)
 class ObjectSurroundings:
     """
-    The others that are there, as rectangles.
+    The present other bodies, as rectangles.
 
     :param poses: (O, 3) centre x [m], y [m], yaw [rad]
-    :param velocities: (O, 3) their derivatives.
+    :param velocities: (O, 3) derivatives of the poses.
     :param lengths: (O,) [m]
     :param widths: (O,) [m]
     """
@@ -32,7 +32,7 @@ class ObjectSurroundings:
     widths: FloatArray
 
     def chosen(self, rows: NDArray[np.bool_]) -> 'ObjectSurroundings':
-        """Return some of them."""
+        """Return the bodies of some rows."""
         return ObjectSurroundings(self.poses[rows], self.velocities[rows], self.lengths[rows],
                                   self.widths[rows])
 
@@ -44,7 +44,7 @@ class ObjectSurroundings:
 
 SUB_STEP_S = 0.01
 ABSENT = (np.nan, np.nan, np.nan)
-# A time step is a decimal fraction; ten of them are not exactly a second [s].
+# Time steps are decimal fractions, which are not exact: ten steps of 0.1 s may differ from 1 s [s].
 ROUNDING = 1e-9
 
 
@@ -53,7 +53,7 @@ class ObjectMotion(ABC):
 
     @abstractmethod
     def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Look at the others before a scenario time step; asked of reactive objects only."""
+        """React to the others before a scenario time step; called for reactive objects only."""
 
     @abstractmethod
     def move(self, time_s: float, duration_s: float) -> None:
@@ -66,9 +66,9 @@ class ObjectMotion(ABC):
 
 class Integrated(ObjectMotion):
     """
-    A movement that is integrated in small steps, from its start until it has gone.
+    A movement that is integrated in small steps, from its start until the object disappears.
 
-    :param start: until then it stands where it begins [s]
+    :param start: time until which it stands at its first place [s]
     """
 
     def __init__(self, start: float) -> None:

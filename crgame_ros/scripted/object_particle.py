@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The particle that goes wherever it likes: a pedestrian (FS II-A3)."""
+"""The particle model, which moves in any direction: a pedestrian (FS II-A3)."""
 
 from collections.abc import Sequence
 import math
@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Moving bodies smaller than this in both directions are people, who make way for each other [m].
+# Moving bodies smaller than this in both directions are people, which yield to each other [m].
 PERSON = 1.0
-# What is left between the moment he is clear of a vehicle's way and its arrival [s].
+# Least time between leaving a vehicle's path and the vehicle's arrival [s].
 CLEARANCE_S = 0.5
-# Farther ahead in time no vehicle counts [s].
+# Vehicles that arrive later are ignored [s].
 HORIZON_S = 10.0
-# From here to the way of a vehicle he has made his mind up [m]: a walker at 1.4 m/s stops in
-# 0.5 m at 2 m/s^2.
+# Within this distance of a vehicle's path the decision to cross is final [m]: a pedestrian at
+# 1.4 m/s stops in 0.5 m at 2 m/s^2.
 DECIDED = 0.7
 
 
 class _Way(NamedTuple):
-    """Part of the path [m] in a vehicle's way, and when its front comes and its rear leaves."""
+    """Part of the path [m] in a vehicle's path, and when its front arrives and its rear leaves."""
 
     enter: float
     leave: float
@@ -39,9 +39,10 @@ class _Way(NamedTuple):
 
 class _Parts(NamedTuple):
     """
-    What of the path is within each of O rectangles, each (O,); NaN where nothing is.
+    The parts of a path within O rectangles, each (O,); NaN where none is.
 
-    First and last arc length within, least and greatest x within in the rectangle's frame [m].
+    The fields are the first and last arc length within, and the least and greatest x within, in
+    the rectangle's frame [m].
     """
 
     enter: FloatArray
@@ -54,30 +55,31 @@ class Crossing:
     """
     The rule of a reactive pedestrian.
 
-    Every vehicle is expected to go straight on at its speed. Its way is as wide as itself and the
-    pedestrian, and the kept distance on both sides. He enters it only if the vehicle comes no
-    earlier than the accepted gap after that (3 s, the T of his type) and no earlier than 0.5 s
-    after he has left it, or has passed before he comes. Otherwise he stops at its edge; if the
-    edge lies in the way of another vehicle, at the edge of that one's. Once he has decided to
-    go, he stops again only in front of a vehicle that would hit him. In front of standing bodies
-    he stops in any case and waits until they are gone.
+    Every vehicle is expected to go straight on at its speed. Its path is as wide as the vehicle
+    plus the pedestrian, plus the kept distance on both sides. The pedestrian enters this path in
+    two cases. Either the vehicle has passed before. Or it arrives at least the accepted gap (3 s,
+    the T of the type) after the pedestrian enters, and at least 0.5 s after the pedestrian leaves.
+    Otherwise the pedestrian stops at the path's edge. If that edge is in the path of another
+    vehicle, it stops at the edge of that path. After the decision to cross, the pedestrian stops
+    only in front of a vehicle that would hit it. In front of standing bodies it always stops, and
+    waits until they are gone.
 
-    :param path: of the pedestrian.
+    :param path: path of the pedestrian.
     :param walker: radius, speed, acceleration, accepted gap and kept distance.
     """
 
     def __init__(self, path: Curve, walker: MoverType) -> None:
         self._path, self._walker = path, walker
         self._starts = path.s[:-1]
-        # Arc length up to which he has decided to go on.
+        # Arc length up to which the pedestrian has decided to walk.
         self._decided = 0.0
 
     def stop(self, s: float, speed: float, others: ObjectSurroundings) -> float:
         """
-        Return the arc length [m] at which he must stop, infinite where he may walk on.
+        Return the arc length [m] at which the pedestrian must stop, infinite if it may walk on.
 
-        :param s: his present arc length [m]
-        :param speed: his present speed [m/s]
+        :param s: current arc length [m]
+        :param speed: current speed [m/s]
         """
         small = np.maximum(others.lengths, others.widths) < PERSON
         moving = others.speeds >= QUEUEING
@@ -86,7 +88,7 @@ class Crossing:
         closed = [way.enter for way in ways if self._is_closed(way, s, speed)]
         stop = min([stop, *closed])
         for _ in ways:
-            # Not in the way of another while he waits for this one.
+            # The waiting place must not be in the path of another vehicle.
             inside = [way.enter for way in ways
                       if s - self._walker.distance < way.enter < stop < way.leave]
             if not inside:
@@ -101,7 +103,7 @@ class Crossing:
 
     def _is_closed(self, way: _Way, s: float, speed: float) -> bool:
         if s >= way.enter + self._walker.distance:
-            # Already in front of it: the best is to go on.
+            # Already in front of the vehicle: walking on is safest.
             return False
         enters = self._time_to(way.enter - s, speed)
         leaves = self._time_to(way.leave - s, speed)
@@ -112,7 +114,7 @@ class Crossing:
         return way.arrival < max(enters + self._walker.headway, leaves + CLEARANCE_S)
 
     def _time_to(self, distance: float, speed: float) -> float:
-        """Return the time for a distance when he speeds up to his own speed [s]."""
+        """Return the time for a distance with acceleration to the pedestrian's own speed [s]."""
         distance = max(distance, 0.0)
         a, v = self._walker.acceleration, max(self._walker.speed, speed)
         run_up = (v**2 - speed**2) / (2.0 * a)
@@ -124,10 +126,10 @@ class Crossing:
         speeds = vehicles.speeds
         yaws = np.arctan2(vehicles.velocities[:, 1], vehicles.velocities[:, 0])
         room = 0.5 * self._walker.shape.width
-        # Extents along and across the motion, should it not be along the body.
+        # Extents along and across the motion, which may differ from the body's axes.
         long, wide = (half + room for half in half_extents(
             vehicles.lengths, vehicles.widths, vehicles.poses[:, 2] - yaws))
-        # Who is not yet past the kept distance may still stop.
+        # A pedestrian that is not yet within the kept distance can still stop.
         parts = self._parts(
             np.column_stack((vehicles.poses[:, :2], yaws)), s - self._walker.distance,
             (-long, long + HORIZON_S * speeds), wide + self._walker.distance)
@@ -143,7 +145,7 @@ class Crossing:
                       for extent in (bodies.lengths, bodies.widths))
         enter = self._parts(bodies.poses, s, (-long - kept, long + kept), wide + kept).enter
         touch = self._parts(bodies.poses, s, (-long, long), wide).enter
-        # Nearer than he would come by himself: he may go away from it, or past it.
+        # The body is nearer than the kept distance: the pedestrian may walk away from it or past it.
         if ((enter <= s) & (touch > s)).any():
             return s
         return float(enter[enter > s].min(initial=math.inf))
@@ -151,12 +153,12 @@ class Crossing:
     def _parts(self, frames: FloatArray, s: float, along: tuple[FloatArray, FloatArray],
                wide: FloatArray) -> _Parts:
         """
-        Clip the path from an arc length on to rectangles.
+        Return the parts within rectangles of the path from an arc length on.
 
-        :param frames: (O, 3) x [m], y [m], yaw [rad] of their own axes.
+        :param frames: (O, 3) x [m], y [m], yaw [rad] of the rectangles' own axes.
         :param s: the arc length [m]
-        :param along: their extents on their x axes, (O,) and (O,) [m]
-        :param wide: (O,) to either side [m]
+        :param along: least and greatest extents on their x axes, (O,) and (O,) [m]
+        :param wide: (O,) extents to either side [m]
         """
         delta = self._path.points[None, :-1] - frames[:, None, :2]
         axes = np.stack((np.cos(frames[:, 2]), np.sin(frames[:, 2])), axis=-1)
@@ -181,9 +183,9 @@ class Crossing:
         return _Parts(enter, leave, nearest, farthest)
 
 
-# How far the way may pass a corner, which decides the speed there [m].
+# Distance at which corners are rounded, which determines the speed there [m].
 CORNER_OFFSET = 0.1
-# It walks towards a point of its path this far ahead, and as far as it gets in this time.
+# It walks towards a point on its path ahead by this distance [m] plus that of this time [s].
 _AHEAD, _AHEAD_S = 0.1, 0.15
 _SPACING = 0.1
 _ARRIVED = 0.02
@@ -191,13 +193,13 @@ _ARRIVED = 0.02
 
 class ParticleMotion(Integrated):
     """
-    A point that is accelerated in any direction, |a| <= a_max, and looks where it goes.
+    A point that can accelerate in any direction, |a| <= a_max, and faces its direction of motion.
 
     It walks along the straight lines between its way-points, slower at corners, which it rounds
-    by about 0.1 m, and comes to rest at its goal. A reactive one stops in front of what it must
-    not walk into (`Crossing`).
+    at about 0.1 m, and comes to rest at its goal. A reactive one stops for vehicles and in front of
+    standing bodies (`Crossing`).
 
-    :param spec: of the object.
+    :param spec: specification of the object.
     """
 
     def __init__(self, spec: ObjectSpec) -> None:
@@ -220,7 +222,7 @@ class ParticleMotion(Integrated):
                           self._corners)
         wanted = np.interp(grid, self._corners, self._spec.speeds) if self._spec.speeds \
             else np.full(len(grid), self._type.speed)
-        # A circle that passes a corner at this offset has the radius e / (1 / cos(turn / 2) - 1).
+        # A circle that passes a corner at the offset e has the radius e / (1 / cos(turn / 2) - 1).
         cosine = np.clip(np.sum(self._directions[1:] * self._directions[:-1], axis=1), -1.0, 1.0)
         half = np.sqrt(0.5 * (1.0 + cosine))
         radius = CORNER_OFFSET / np.maximum(1.0 / np.maximum(half, 1e-3) - 1.0, 1e-9)
@@ -232,7 +234,7 @@ class ParticleMotion(Integrated):
         return SpeedEnvelope(grid, wanted, self._type.deceleration)
 
     def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Choose how far to walk."""
+        """Determine the arc length at which to stop."""
         if not self._gone:
             self._stop = self._crossing.stop(self._s, math.hypot(*self._velocity), others)
 
@@ -256,7 +258,7 @@ class ParticleMotion(Integrated):
         self._gone = self._spec.end == 'vanish' and self._s >= self._goal - _ARRIVED
 
     def _point(self, s: float) -> tuple[float, float]:
-        """Return the point of the path at an arc length; straight on where it vanishes."""
+        """Return the point of the path at an arc length; straight on where the object disappears."""
         if self._spec.end == 'stay':
             s = min(s, self._goal)
         segment = min(int(np.searchsorted(self._corners, s, side='right')) - 1,
@@ -267,7 +269,7 @@ class ParticleMotion(Integrated):
         return x + along * dx, y + along * dy
 
     def _progress(self) -> None:
-        """Project the position on the present segment and the next, never backwards."""
+        """Update the arc length by projection on the current and the next segment, never backwards."""
         present = int(np.searchsorted(self._corners, self._s, side='right')) - 1
         best, nearest = self._s, math.inf
         for segment in range(present, min(present + 2, len(self._directions))):
@@ -282,7 +284,7 @@ class ParticleMotion(Integrated):
         self._s = max(self._s, best)
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Return position and velocity; its yaw rate counts as 0, for it turns at once."""
+        """Return position and velocity; the yaw rate is 0, because it turns instantly."""
         if self._gone:
             return ABSENT, ABSENT
         return (*self._position, self._yaw), (*self._velocity, 0.0)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Distance of the samples between which station and arc length are linear [m].
+# Spacing of samples; between them the arc length is linear in the station [m].
 _SPACING = 0.25
 # Gauss-Legendre points of the integral of |X'| between two samples.
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -22,11 +22,11 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 class Encounters(NamedTuple):
     """
-    Bodies seen from a path, each (O,).
+    Bodies relative to a path, each (O,).
 
-    :param s: arc length of the nearest sample of the path, moved along it to the centre [m]
-    :param d: offset to the left [m]
-    :param yaw: of the path there [rad]
+    :param s: arc length of the nearest sample of the path, corrected along it to the centre [m]
+    :param d: lateral offset to the left [m]
+    :param yaw: heading of the path there [rad]
     """
 
     s: FloatArray
@@ -36,15 +36,15 @@ class Encounters(NamedTuple):
 
 class ObjectPath:
     """
-    A way-point lane by its arc length, straight beyond both ends.
+    A way-point lane parametrised by its arc length, straight beyond both ends.
 
-    :param lane: whose station is not its arc length.
+    :param lane: the lane; its stations differ from arc lengths.
     """
 
     def __init__(self, lane: WaypointLane) -> None:
         self._lane = lane
         count = max(2, math.ceil(lane.length / _SPACING) + 1)
-        # Way-points are among the samples: between them everything is smooth.
+        # The samples include the way-points, between which the curve is smooth.
         self._u: FloatArray = np.union1d(np.linspace(0.0, lane.length, count), lane.s)
         step = np.diff(self._u)
         nodes = self._u[:-1, None] + 0.5 * step[:, None] * (_GAUSS + 1.0)
@@ -81,11 +81,11 @@ class ObjectPath:
 
     def meet(self, points: FloatArray, low: float, high: float) -> Encounters:
         """
-        See bodies from a part of the path: a path may come back to where it was.
+        Return bodies relative to a part of the path: a path may come back to the same place.
 
         :param points: (O, 2) centres [m]
         :param low: arc length at which the part begins [m]
-        :param high: and ends [m]
+        :param high: arc length at which it ends [m]
         """
         first, last = np.searchsorted(self.s, (low, high)).tolist()
         first, last = max(first - 1, 0), min(last + 1, len(self.s))

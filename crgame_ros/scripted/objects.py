@@ -25,21 +25,21 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# How far ahead of its first lanelet the way of an object is laid out [m].
+# Greatest length of an object's path beyond its first lanelet [m].
 MAX_REACH = 5000.0
-# Ratio of neighbouring distances between way-points above which a path gets more of them.
+# Ratio of neighbouring way-point distances above which way-points are added.
 PATH_RATIO = 1.5
 
 
 class ScriptedObjects:
     """
-    Moves the objects of a game, scenario time step by scenario time step.
+    The scripted objects of a game, moved by scenario time steps.
 
-    All look at the world of step k, then all move to k + 1: the order does not matter, and the
-    same inputs give the same bits.
+    All objects react to the world of step k, then all move to k + 1. Therefore their order does not
+    matter, and the same inputs give the same bits.
 
-    :param specs: of the objects.
-    :param network: whose lanelets some may follow; None if there is none.
+    :param specs: specifications of the objects.
+    :param network: network of the lanelets that objects may follow; None if there is none.
     :param time_step_s: Delta t_c [s]
     :param k0: scenario time step at which the run starts.
     :param where: file and key for messages.
@@ -64,7 +64,7 @@ class ScriptedObjects:
 
     @property
     def states(self) -> ObjectStates:
-        """Where the objects are at the present time step `k`; read-only."""
+        """Return the objects' states at the current time step `k`; read-only."""
         return self._states
 
     def advance(self, k: int, others_poses: FloatArray, others_velocities: FloatArray,
@@ -72,12 +72,12 @@ class ScriptedObjects:
         """
         Move from time step k to k + 1.
 
-        :param k: the present time step.
-        :param others_poses: (O, 3) centres of everything else at k; NaN where absent.
+        :param k: the current time step.
+        :param others_poses: (O, 3) centres of all others at k; NaN where absent.
         :param others_velocities: (O, 3)
-        :param lengths: (O,) of the others [m]
+        :param lengths: (O,) lengths of the others [m]
         :param widths: (O,) [m]
-        :raises ValueError: if k is not the present time step.
+        :raises ValueError: if k is not the current time step.
         """
         if k != self.k:
             raise ValueError(f'the objects are at time step {self.k}, not at {k}')
@@ -93,7 +93,7 @@ class ScriptedObjects:
                 own = seen[len(others_poses):]
                 own[index] = False
                 if self._particles[index]:
-                    # People make way for each other; they are no obstacles.
+                    # People yield to each other and are no obstacles.
                     own &= ~self._particles
                 self._motions[index].decide(time_s, everything.chosen(seen))
         for motion in self._motions:
@@ -128,7 +128,7 @@ def _path_motion(spec: ObjectSpec, where: str) -> ObjectMotion:
     lane = WaypointLane(x, y, np.zeros(len(x)), np.full(len(x), np.inf))
     path = ObjectPath(lane)
     check_bends(path, spec.mover, spec.type, where)
-    # Added way-points lie on the straights: the stations of those given are what they were.
+    # Added way-points are on straight segments, so that the stations of the given ones are unchanged.
     wanted = np.interp(path.s, path.arc_lengths(corners), spec.speeds) if spec.speeds \
         else np.full(len(path.s), spec.mover.speed)
     return BicycleMotion(spec, path, 0.0, wanted)

@@ -18,10 +18,9 @@ from typing import Any
 from aiohttp import ClientSession, CookieJar, Fingerprint, ServerFingerprintMismatch
 from cockpit_support import cockpit, get, HOST, in_loop, next_text, PumpBackend, wait_until
 from crgame_ros.cockpit import doorkeeper
-from crgame_ros.cockpit.access import Access
+from crgame_ros.cockpit.access import Access, reachable_addresses
 from crgame_ros.cockpit.exposure import Exposure, fingerprint, make_certificate, tls_context
 from crgame_ros.cockpit.invitations import Invitations
-from crgame_ros.cockpit.machine_addresses import reachable_addresses
 from crgame_ros.cockpit.rights import Rights
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import InputError

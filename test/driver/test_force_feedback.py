@@ -24,9 +24,9 @@ from crgame_ros.driver.force_feedback import (
     LENGTH_MS,
     RENEWAL_S,
     STATE_TIMEOUT_S,
+    SteeringTorque,
 )
 from crgame_ros.driver.force_limits import ForceLimits, TorqueLimiter
-from crgame_ros.driver.steering_torque import SteeringTorque
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from evdev import AbsInfo, ecodes, ff, UInput

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 import random
 
-from crgame_ros.driver.steering_torque import SteeringTorque, TorqueParameters, WheelMotion
+from crgame_ros.driver.force_feedback import SteeringTorque, TorqueParameters, WheelMotion
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 import numpy as np
 from pushed_wheel import wheel_at

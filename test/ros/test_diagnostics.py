@@ -9,9 +9,8 @@ import time
 
 from cockpit_graph import Graph, lived, OFFSET_NS
 from crgame_ros.game.file import load_game
-from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import from_time, to_time
-from crgame_ros.ros.node_report import NodeReport
 from crgame_ros.simulation.setup import build_setup
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from live_support import SCENARIOS

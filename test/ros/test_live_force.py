@@ -6,8 +6,7 @@ from pathlib import Path
 import sys
 import threading
 
-from crgame_ros.driver.force_feedback import FULL_LEVEL
-from crgame_ros.driver.steering_torque import SteeringTorque
+from crgame_ros.driver.force_feedback import FULL_LEVEL, SteeringTorque
 from crgame_ros.nodes.driver_node import DriverNode
 from crgame_ros.ros import live_driver
 from crgame_ros.ros.endpoints import Endpoints
