@@ -33,9 +33,8 @@ from crgame_ros.simulation.world import TrafficFeed, World
 from crgame_ros.timing.cycle_rows import lights_alone
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
-from crgame_ros.vehicle.human_vehicle import HumanVehicle
+from crgame_ros.vehicle.human_vehicle import HumanVehicle, TracedVehicle
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
-from crgame_ros.vehicle.traced_vehicle import TracedVehicle
 import numpy as np
 from numpy.typing import NDArray
 

@@ -16,9 +16,8 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.simulation.autonomous_vehicle import AutonomousVehicle
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
-from crgame_ros.vehicle.human_vehicle import HumanVehicle
+from crgame_ros.vehicle.human_vehicle import HumanVehicle, TracedVehicle
 from crgame_ros.vehicle.state import VehicleState
-from crgame_ros.vehicle.traced_vehicle import TracedVehicle
 import numpy as np
 from numpy.typing import NDArray
 import shapely

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A human's vehicle: command in, motion out (CRG III-C2)."""
+"""A human's vehicle: command in, motion out (CRG III-C2), or known states in their order."""
 
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.models import KinematicSingleTrack, VehicleModel
@@ -8,6 +8,8 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.powertrain import Powertrain
 from crgame_ros.vehicle.state import VehicleState
 from crgame_ros.vehicle.steering import Steering
+import numpy as np
+from numpy.typing import NDArray
 
 
 class HumanVehicle:
@@ -56,4 +58,27 @@ class HumanVehicle:
         acceleration = self._powertrain.command(command, speed, self._model.gear)
         angle = self._steering.target_angle(command.steering, speed)
         self.state = self._model.step(state, angle, acceleration, dt_s)
+        return self.state
+
+
+class TracedVehicle:
+    """
+    A substitute for a `HumanVehicle`, with known states.
+
+    :param states: (N, 8) rear-axle states of step 0, 1, …, columns as in `StateColumn`; after the
+        last one it stays there.
+    """
+
+    def __init__(self, states: NDArray[np.float64]) -> None:
+        self._states = [VehicleState(*row) for row in states.tolist()]
+        self._n = 0
+
+    @property
+    def state(self) -> VehicleState:
+        """Return the state of the present step, rear axle."""
+        return self._states[self._n]
+
+    def step(self, _command: DriverCommand, _dt_s: float) -> VehicleState:
+        """Advance to the next step; command and interval have no effect."""
+        self._n = min(self._n + 1, len(self._states) - 1)
         return self.state
