@@ -169,7 +169,7 @@ def _from_module(target: str, label: str) -> Any:
                              'apt install gcc python3-dev, then delete .venv') from error
         package = isinstance(error, ImportError) and PACKAGES.get((error.name or '').split('.')[0])
         if package:
-            raise InputError(f'needs the package {package}, which is not installed with crgame_ros',
+            raise InputError(f'needs the package {package}, which crgame_ros does not install',
                              label, planner_packages_install()) from error
         raise InputError(f'cannot import {module_name} ({type(error).__name__}: {error})',
                          label, 'check the name and what it imports') from error

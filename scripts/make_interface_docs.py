@@ -16,8 +16,8 @@ NOTICE = """\
 Made from the contract, [msg_defs/interfaces.yaml](../msg_defs/interfaces.yaml), by
 `scripts/make_interface_docs.py`: edit that file, not this one. The code creates its endpoints from
 the contract, and a test compares a running graph with it. All messages are of standard packages:
-nothing has to be built to take part. `external` stands for whoever else listens or answers. The
-history of every topic is keep last."""
+nothing has to be built to take part. `external` stands for any other node that listens or answers.
+The history of every topic is keep last."""
 
 
 def document(source: Path = SOURCE) -> str:

@@ -19,9 +19,9 @@ class RunMeasures(NamedTuple):
     """
     The measures of a run.
 
-    :param criticality: of all driven vehicles.
-    :param behaviour: of each driven vehicle, in the log's order.
-    :param detection: of each detection response task.
+    :param criticality: criticality of all driven vehicles.
+    :param behaviour: behaviour in each driven vehicle, in the log's order.
+    :param detection: scores of each detection response task.
     """
 
     criticality: Criticality

@@ -46,17 +46,17 @@ class PlannerChoice:
 @dataclass(frozen=True)
 class EvaluationPlan:
     """
-    A plan as its file says it: each scene with each of everything else.
+    The plan of an evaluation: each scene is combined with each value of all other keys.
 
-    :param games: game files, folders of them; their humans are driven by scripts or by nobody.
+    :param games: game files, or folders of them; their humans are driven by scripts or are idle.
     :param scenarios: CommonRoad files, folders of them; no human takes part.
     :param humans: recorded runs, whose humans drive again as they did, in the recorded game.
-    :param planners: who drives the AVs.
-    :param seeds: how many, from 0 on, or which ones.
-    :param perception: by label how AVs perceive; `own` as their games say.
-    :param traffic: by label the traffic; `own` as the games say.
-    :param duration: simulated seconds of each cell; as the game or recording says where none is
-        given, and 20 s where nobody says.
+    :param planners: planners of the AVs.
+    :param seeds: number of seeds, from 0 on, or a list of seeds.
+    :param perception: perception of the AVs, by label; `own` is that of the games.
+    :param traffic: traffic by label; `own` is that of the games.
+    :param duration: simulated duration of each cell [s]; by default that of the game or the
+        recording, or 20 s if these have none.
     :param latency: simulation steps between a request and its plan.
     :param commonroad_scores: whether CommonRoad's tools judge each cell, too: goals, validity,
         feasibility and costs, which doubles the time of a short cell.

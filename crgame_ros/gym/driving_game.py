@@ -221,12 +221,12 @@ class DrivingGame:
 
     @property
     def objects(self) -> ObjectStates:
-        """The current states of everything that is not a driven vehicle."""
+        """Return the current states of everything that is not a driven vehicle."""
         return self.simulation.objects
 
     @property
     def time_s(self) -> float:
-        """The simulated time since the start [s]."""
+        """Return the simulated time since the start [s]."""
         return self.simulation.n * self.simulation.scheduler.dt_s
 
     def begin(self, seed: int, observers: Sequence[RunObserver] = ()) -> None:

@@ -31,7 +31,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
     :param num_envs: number of games.
     :param seat: id of the agent's vehicle in each game.
     :param render_mode: `rgb_array` or None.
-    :param keywords: of `make_experiment`.
+    :param keywords: those of `make_experiment`.
     :raises InputError: if a keyword is wrong.
     """
 

@@ -32,7 +32,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
 
     :param seats: ids of the agents' vehicles; None takes all.
     :param render_mode: `rgb_array` or None.
-    :param keywords: of `make_experiment`.
+    :param keywords: those of `make_experiment`.
     :raises InputError: if a keyword is wrong.
     """
 

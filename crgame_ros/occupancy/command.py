@@ -79,7 +79,7 @@ def write_map(raster: Raster, folder: Path, name: str, force: bool = False,
     """
     Write a map into a folder, which appears once it is complete.
 
-    :param raster: what to draw.
+    :param raster: the map to draw.
     :param folder: folder to write; it is created with its parents.
     :param name: name of the scenario, for the comment in the file.
     :param force: whether to replace an existing map.

@@ -52,5 +52,5 @@ class RasterSpec:
 
     @property
     def tile_cells(self) -> int:
-        """Cells along the edge of a tile."""
+        """Return the number of cells along the edge of a tile."""
         return round(self.tile / self.resolution)

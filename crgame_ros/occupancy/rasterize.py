@@ -39,9 +39,9 @@ def curbs(network: LaneletNetwork, origin: tuple[float, float], spec: RasterSpec
     """
     Return bands along the outside of the road.
 
-    The road is that of the road compliance check: the union of all lanelets with closed seams. Here
-    gaps between lanelets up to the size of the smallest island are closed as well. The band stays
-    open where the road ends with the map: where neither a lanelet nor any lanelet beside it
+    The road is that of the road compliance check: the union of all lanelets with closed seams.
+    Here gaps between lanelets up to the size of the smallest island are closed as well. The band
+    stays open where the road ends with the map: where neither a lanelet nor any lanelet beside it
     continues.
 
     :param network: the lanelet network.

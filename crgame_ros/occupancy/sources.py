@@ -43,7 +43,7 @@ class TileSource(Protocol):
 
 def open_tiles(path: Path) -> TileSource:
     """
-    Open a map: the YAML file (or the folder) of a `crgame rasterize` map, or of any map_server map.
+    Open a map: the YAML file (or folder) of a `crgame rasterize` map, or of any map_server map.
 
     :raises InputError: naming the file and the remedy.
     """

@@ -59,12 +59,12 @@ class TiledOccupancy:
 
     @property
     def resolution(self) -> float:
-        """Edge of a cell [m]."""
+        """Return the edge of a cell [m]."""
         return self._source.resolution
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Smallest x and y, largest x and y of the map's tiles [m]."""
+        """Return the smallest x and y, largest x and y of the map's tiles [m]."""
         x, y = self._source.origin
         return x, y, x + self._source.columns * self._size, y + self._source.rows * self._size
 

@@ -14,8 +14,8 @@ class LaneletHeights:
     """
     Heights of a lanelet's bounds.
 
-    :param left: of the left bound's vertices (N) [m]
-    :param right: of the right bound's vertices (N) [m]
+    :param left: heights of the left bound's vertices (N) [m]
+    :param right: heights of the right bound's vertices (N) [m]
     """
 
     left: NDArray[np.float64]

@@ -133,7 +133,7 @@ class ObstacleMotions:
     """
     The obstacles of a scenario in one run, in which events change some of them.
 
-    :param obstacles: of the scenario; shared with other runs and never changed.
+    :param obstacles: obstacles of the scenario; shared with other runs and never changed.
     """
 
     def __init__(self, obstacles: ScenarioObstacles) -> None:

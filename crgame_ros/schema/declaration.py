@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a dataclass declares of the mapping that a user writes for it."""
+"""The declaration of a user's mapping by a dataclass."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, MISSING
@@ -38,20 +38,21 @@ _PARAM = re.compile(r'^:param (\w+):(.*?)(?=^:|\Z)', re.MULTILINE | re.DOTALL)
 @dataclass(frozen=True, eq=False, repr=False)
 class Form:
     """
-    How a dataclass stands in a file; its class attribute `FORM`, where it is not plainly so.
+    The form of a dataclass in a file: its class attribute `FORM`, if it differs from the default.
 
-    What no type says a method `check` may look at: it raises an InputError that names no place.
+    A method `check` of the dataclass may check conditions that types cannot express. It raises an
+    InputError that names no place.
 
-    :param remedy: what to do about a value that is no mapping.
-    :param short: key that a bare text stands for.
-    :param rest: field that takes all keys that are no fields.
-    :param moved: keys that may stand here though they are another's: key, section.
+    :param remedy: remedy in the message about a value that is not a mapping.
+    :param short: key for which a plain text may be written instead of the mapping.
+    :param rest: field that receives all keys that are not fields.
+    :param moved: keys that may be written here although they belong to a section: key, section.
     :param first: keys that are written first.
-    :param written: `given` leaves out what is None, `changed` what is as by default, `all`
-        nothing.
-    :param by: key whose value says which keys there are.
-    :param one_of: of these keys exactly one stands beside each value of `by`.
-    :param choices: values of a key, beside each value of `by`.
+    :param written: `given` leaves out values of None, `changed` leaves out defaults, `all`
+        writes everything.
+    :param by: key whose value determines the known keys.
+    :param one_of: keys of which exactly one is given, for each value of `by`.
+    :param choices: allowed values of a key, for each value of `by`.
     """
 
     remedy: str = ''
@@ -66,7 +67,7 @@ class Form:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Name all keys of which exactly one is given."""
+        """Return all keys of which exactly one is given."""
         return tuple(dict.fromkeys(key for keys in self.one_of.values() for key in keys))
 
 
@@ -75,11 +76,11 @@ class Key:
     """
     One field of a declaration.
 
-    :param name: in files.
-    :param field: of the dataclass.
+    :param name: name in files.
+    :param field: name of the dataclass's field.
     :param hint: its type, without marks.
-    :param marks: what its `Annotated` says besides.
-    :param default: `MISSING` if it has to be given.
+    :param marks: the marks of its `Annotated`.
+    :param default: `MISSING` if it is required.
     """
 
     name: str
@@ -90,16 +91,16 @@ class Key:
 
     @property
     def required(self) -> bool:
-        """Return whether it has to be given."""
+        """Return whether it is required."""
         return self.default is MISSING
 
     def mark(self, kind: type[T]) -> T | None:
-        """Find a mark of a kind."""
+        """Return the mark of a kind; None without one."""
         return mark_of(self.marks, kind)
 
 
 def mark_of(marks: tuple[Any, ...], kind: type[T]) -> T | None:
-    """Find a mark of a kind among others."""
+    """Return the mark of a kind among others; None without one."""
     for mark in marks:
         if isinstance(mark, kind):
             return mark
@@ -107,13 +108,13 @@ def mark_of(marks: tuple[Any, ...], kind: type[T]) -> T | None:
 
 
 def form_of(kind: type[Any]) -> Form:
-    """Return how a dataclass stands in a file."""
+    """Return the form of a dataclass in a file."""
     form: Form = getattr(kind, 'FORM', _PLAIN)
     return form
 
 
 _PLAIN = Form()
-# Looked up once.
+# Cache of `keys_of`.
 _KEYS: dict[Any, tuple[Key, ...]] = {}
 
 
@@ -140,7 +141,7 @@ def _keys(kind: Any) -> tuple[Key, ...]:
 
 
 def known_keys(kind: type[Any]) -> tuple[str, ...]:
-    """Name every key that a mapping may have, but for what goes into its `rest`."""
+    """Return all keys that a mapping may have, except those for its `rest`."""
     form = form_of(kind)
     names: list[str] = []
     for key in keys_of(kind):
@@ -153,14 +154,14 @@ def known_keys(kind: type[Any]) -> tuple[str, ...]:
 
 
 def sentences_of(kind: type[Any]) -> dict[str, str]:
-    """Return what the docstring of a class says of each of its fields, in one line each."""
+    """Return the description of each field from the docstring of a class, in one line each."""
     text = inspect.cleandoc(kind.__doc__ or '')
     return {name: ' '.join(words.split()).rstrip('.') for name, words in _PARAM.findall(text)}
 
 
 @functools.cache
 def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Take the marks off a type, those of the one type beside None included."""
+    """Return a type without marks, and its marks, including those of the one type beside None."""
     marks: tuple[Any, ...] = ()
     if get_origin(hint) is Annotated:
         hint, marks = hint.__origin__, hint.__metadata__
@@ -178,13 +179,13 @@ def choices_of(hint: Any) -> tuple[Any, ...]:
 
 
 def is_composite(hint: Any) -> bool:
-    """Return whether a value has places of its own: a mapping, a list of lists or of mappings."""
+    """Return whether a value has named parts: a mapping, or a list of lists or mappings."""
     plain, _ = split(hint)
     return any(is_dataclass(choice) or get_origin(choice) is tuple for choice in choices_of(plain))
 
 
 def wanted(hint: Any, marks: tuple[Any, ...] = ()) -> str:
-    """Return what kind of value is meant, to stand behind "give"."""
+    """Return the kind of value that is required, as text after "give"."""
     hint, own = split(hint)
     marks = (*marks, *own)
     special = mark_of(marks, Special)
@@ -230,7 +231,7 @@ def _plural(hint: Any, marks: tuple[Any, ...]) -> str:
 
 
 def advice(hint: Any, marks: tuple[Any, ...]) -> str:
-    """Return what to do about a wrong value."""
+    """Return the remedy for a wrong value."""
     given = mark_of(marks, Advice)
     if given is not None:
         return given.remedy

@@ -12,9 +12,9 @@ class FileKind(NamedTuple):
     """
     A kind of file.
 
-    :param module: that declares it.
-    :param name: of the class there.
-    :param title: for people.
+    :param module: module that declares it.
+    :param name: name of the class there.
+    :param title: title for people.
     """
 
     module: str
@@ -32,7 +32,7 @@ class FileKind(NamedTuple):
         return json_schema(self.declared, self.title)
 
     def keys(self) -> frozenset[str]:
-        """Return the keys that a file of it may begin with."""
+        """Return the top-level keys of such a file."""
         schema = self.schema()
         root = schema['$defs'][schema['$ref'].rpartition('/')[2]]
         return frozenset(root.get('properties', ()))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a declaration means as JSON Schema (draft 2020-12), for editors and other programs."""
+"""Declarations as JSON Schema (draft 2020-12), for editors and other programs."""
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass, MISSING
@@ -40,11 +40,11 @@ DIALECT = 'https://json-schema.org/draft/2020-12/schema'
 
 def json_schema(kind: type[Any], title: str) -> Schema:
     """
-    Describe the file that `read` reads a dataclass from.
+    Return the JSON Schema of the file from which `read` reads a dataclass.
 
-    Checks that compare several values (ids that repeat, lengths, steps in time) are no part of it.
+    Checks that compare several values (repeated ids, lengths, time steps) are not part of it.
 
-    :param title: what the file is, for people.
+    :param title: title of the file, for people.
     """
     describer = _Describer()
     top = describer.describe(kind)
@@ -52,7 +52,7 @@ def json_schema(kind: type[Any], title: str) -> Schema:
 
 
 class _Describer:
-    """Describes types, every dataclass once."""
+    """A builder of schemas for types, which describes every dataclass once."""
 
     def __init__(self) -> None:
         self.definitions: dict[str, Schema] = {}
@@ -158,7 +158,7 @@ def _number(kind: type[Any], within: Within) -> Schema:
 
 
 def _conditions(kind: Any) -> list[Schema]:
-    """Return which keys and values go together."""
+    """Return the conditions on combinations of keys and values."""
     form = form_of(kind)
     found: list[Schema] = []
     for by, places in form.one_of.items():

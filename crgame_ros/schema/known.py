@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which keys a mapping may have, and what to say of others."""
+"""Determines the known keys of a mapping, and refuses others."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
@@ -11,7 +11,7 @@ from crgame_ros.schema.marks import OnlyWith
 
 
 def moved(form: Form, given: Mapping[Any, Any]) -> dict[Any, Any]:
-    """Put keys that may stand here into the sections that they belong to."""
+    """Return the values with moved keys in the sections to which they belong."""
     values = dict(given)
     for key, section in form.moved:
         if key in values and isinstance(values.get(section, {}), Mapping):
@@ -22,10 +22,10 @@ def moved(form: Form, given: Mapping[Any, Any]) -> dict[Any, Any]:
 def known_beside(kind: type[Any], values: Mapping[Any, Any],
                  where: str) -> tuple[tuple[str, ...], str]:
     """
-    Name the keys that there are beside those given.
+    Return the keys that are known together with those given.
 
-    :return: the keys, and what they depend on, for messages.
-    :raises InputError: if of some keys not exactly one is given, or one does not fit its kind.
+    :return: the keys, and the condition on which they depend, for messages.
+    :raises InputError: if not exactly one of some keys is given, or one does not fit its kind.
     """
     form = form_of(kind)
     if not form.by:
@@ -51,7 +51,7 @@ def known_beside(kind: type[Any], values: Mapping[Any, Any],
 
 
 def keys_beside(kind: type[Any], place: str) -> tuple[str, ...]:
-    """Name the keys that there are beside one of which exactly one is given."""
+    """Return the keys that are known together with one of the exclusive keys."""
     return tuple(key.name for key in keys_of(kind)
                  if (beside := key.mark(OnlyWith)) is None or place in beside.keys)
 
@@ -60,10 +60,10 @@ def refuse_unknown(name: Any, known: Sequence[str], where: str, beside: str = ''
     """
     Refuse a key.
 
-    :param beside: what the known ones depend on, for the message.
+    :param beside: the condition on which the known keys depend, for the message.
     :raises InputError: always.
     """
-    # Seldom needed, so not loaded before.
+    # Imported here because it is seldom needed.
     from difflib import get_close_matches
     near = get_close_matches(name[:40], known, 1) if isinstance(name, str) else ()
     said = f'"{name}"' if isinstance(name, str) else short(name)

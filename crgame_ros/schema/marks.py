@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Marks that stand in `Annotated` and say what a type alone cannot."""
+"""Marks for `Annotated`, which express conditions that types cannot."""
 
 from dataclasses import dataclass
 import math
@@ -10,7 +10,7 @@ from typing import Any
 
 from crgame_ros.registry import POLICY
 
-# Without comparison and representation, which nobody needs, a mark costs half as much to import.
+# Comparison and representation are not needed; without them, marks take half the import time.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -19,8 +19,8 @@ class Within:
     Bounds of a number, or of each number of a list.
 
     :param above: whether the lower bound itself is excluded.
-    :param or_zero: whether 0 is allowed besides.
-    :param endless: whether infinity is allowed, where there is no upper bound.
+    :param or_zero: whether 0 is allowed as well.
+    :param endless: whether infinity is allowed if there is no upper bound.
     """
 
     low: float = -math.inf
@@ -38,7 +38,7 @@ class Within:
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
     def __str__(self) -> str:
-        """Return which numbers are meant, to stand behind the noun."""
+        """Return the allowed numbers, as text after the noun."""
         if self.low == -math.inf and self.high == math.inf:
             return ''
         zero = ', or 0' if self.or_zero else ''
@@ -51,9 +51,9 @@ class Within:
 @dataclass(frozen=True, eq=False, repr=False)
 class Wording:
     """
-    What a text has to look like.
+    The form of a text.
 
-    :param pattern: regular expression of the whole text, of those that JavaScript has too.
+    :param pattern: regular expression for the whole text, in syntax that JavaScript supports too.
     :param remedy: what to write, for messages.
     """
 
@@ -67,7 +67,7 @@ class Wording:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Meaning:
-    """Another value that a user may write, and what it stands for."""
+    """Another value that a user may write, and its meaning."""
 
     written: Any
     meant: Any
@@ -76,10 +76,10 @@ class Meaning:
 @dataclass(frozen=True, eq=False, repr=False)
 class Listed:
     """
-    How many entries a list has, and what they are.
+    The number and kind of a list's entries.
 
-    :param noun: what one of them is.
-    :param own: key of an entry that no other of the list may have alike.
+    :param noun: noun for an entry.
+    :param own: key of an entry whose value must be unique in the list.
     """
 
     least: int = 0
@@ -93,7 +93,7 @@ class Parts:
     """
     The names of a short list's numbers.
 
-    :param optional: how many of the last may be left out; they are 0.
+    :param optional: number of the last ones that may be left out; they are 0.
     """
 
     names: tuple[str, ...]
@@ -102,21 +102,21 @@ class Parts:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Numbered:
-    """An entry of a list that gives no such key gets this and its place in the list."""
+    """The prefix of an entry's default for a missing key, followed by its index in the list."""
 
     prefix: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Called:
-    """The key in files, where it cannot be the field's name."""
+    """The key in files, if it differs from the field's name."""
 
     name: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Advice:
-    """What to do about a value that is missing or wrong."""
+    """The remedy for a value that is missing or wrong."""
 
     remedy: str
 
@@ -124,9 +124,9 @@ class Advice:
 @dataclass(frozen=True, eq=False, repr=False)
 class OnlyWith:
     """
-    The key is known only beside one of these.
+    A mark of a key that is known only together with one of these keys or values.
 
-    :param needed: whether it has to be given there.
+    :param needed: whether it is required there.
     """
 
     keys: tuple[str, ...]
@@ -136,9 +136,9 @@ class OnlyWith:
 @dataclass(frozen=True, eq=False, repr=False)
 class Keyed:
     """
-    The value stands at one of several keys of the same mapping, which says what it is.
+    A mark of a value that is at one of several keys of its mapping, which determines its kind.
 
-    :param noun: what it is, for messages.
+    :param noun: noun for the value, for messages.
     """
 
     kinds: dict[str, Any]
@@ -146,47 +146,47 @@ class Keyed:
 
 
 class LeftOut:
-    """A value that is the default is not written."""
+    """A mark of a key that is not written if its value is the default."""
 
 
 class Folder:
-    """Never in a file: the folder against which the file's own names are resolved."""
+    """A mark of the field with the folder of the file's relative names; it is never in a file."""
 
 
 class Special:
-    """Base of marks of values that need a reader of their own."""
+    """The base of marks for values that need their own reader."""
 
     def read(self, given: Any, where: str, key: str, base: Path) -> Any:
         """
         Read a value.
 
-        :raises InputError: if it is none.
+        :raises InputError: if it is invalid.
         """
         raise NotImplementedError
 
     def json_schema(self) -> dict[str, Any]:
-        """Describe it as JSON Schema."""
+        """Return the JSON Schema of the value."""
         raise NotImplementedError
 
     def __str__(self) -> str:
-        """Return what is wanted, to stand behind "give"."""
+        """Return the kind of value that is required, as text after "give"."""
         raise NotImplementedError
 
 
 class Named:
-    """A name that may be a file's: `FILE.yaml` and `FILE.py:Class` are relative to the file."""
+    """A name or a file: `FILE.yaml` and `FILE.py:Class` are relative to the user's file."""
 
     def resolved(self, name: str, base: Path) -> str:
-        """Return the name as the program has it."""
+        """Return the name with its path resolved."""
         return named_file(name, base)
 
     def written(self, name: str, base: Path) -> str:
-        """Return the name as it can be read from anywhere."""
+        """Return the name in a form that is valid from any folder."""
         return named_file(name, Path.cwd())
 
 
 def named_file(name: str, base: Path) -> str:
-    """Resolve `FILE.yaml` and `[policy:]FILE.py:Class` against a directory; other names stay."""
+    """Resolve `FILE.yaml` and `[policy:]FILE.py:Class` against a directory; keep other names."""
     kind = POLICY if name.startswith(POLICY) else ''
     name = name.removeprefix(POLICY)
     file, colon, attribute = name.rpartition(':')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading what a user wrote by its declaration: a checked dataclass, or one clear refusal."""
+"""Reads a user's values by their declaration: returns a checked dataclass, or raises one error."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass
@@ -48,13 +48,13 @@ _EXPONENT = re.compile(r'[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+')
 
 def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
     """
-    Build a dataclass from what YAML or JSON gave, checking every key and value.
+    Build a dataclass from values of YAML or JSON, and check every key and value.
 
-    :param kind: a frozen dataclass whose types and marks declare what there is, or the type of
-        another value.
+    :param kind: a frozen dataclass whose types and marks declare the keys, or the type of another
+        value.
     :param where: file and key for messages.
     :param base: directory against which file names are resolved.
-    :raises InputError: about the first thing that is wrong, saying how many more are.
+    :raises InputError: about the first fault, with the number of further ones.
     """
     try:
         made: T = _Reader(base).value(kind, (), values, '', where)
@@ -68,7 +68,7 @@ def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
 
 
 def faults_of(kind: type[Any], values: Any, where: str, base: Path) -> tuple[InputError, ...]:
-    """Return everything that `read` would refuse, each by itself."""
+    """Return all faults that `read` would refuse, one error each."""
     try:
         _Reader(base).value(kind, (), values, '', where)
     except InputError as error:
@@ -77,7 +77,7 @@ def faults_of(kind: type[Any], values: Any, where: str, base: Path) -> tuple[Inp
 
 
 class _SeveralError(InputError):
-    """Everything that is wrong with one value, in the order in which it was found."""
+    """All faults of one value, in the order in which they were found."""
 
     def __init__(self, wrong: Sequence[InputError]) -> None:
         super().__init__(wrong[0].what, wrong[0].where, wrong[0].remedy)
@@ -85,7 +85,7 @@ class _SeveralError(InputError):
 
 
 class _Wrong:
-    """Collects what is wrong with the parts of a value."""
+    """A collection of faults in the parts of a value."""
 
     def __init__(self) -> None:
         self.found: list[InputError] = []
@@ -105,7 +105,7 @@ class _Wrong:
 
 
 class _Reader:
-    """Reads values whose file names are relative to one folder."""
+    """A reader of values whose file names are relative to one folder."""
 
     def __init__(self, base: Path) -> None:
         self._base = base
@@ -152,7 +152,7 @@ class _Reader:
                 if name not in known and form.rest is None:
                     with wrong:
                         refuse_unknown(name, known, where, beside)
-        # What is not known beside what is given needs no other complaint.
+        # A key that is unknown in this combination needs no further error.
         checked: dict[str, Any] = {}
         for key in () if wrong.found and form.by else keys_of(kind):
             with wrong:
@@ -169,7 +169,7 @@ class _Reader:
 
     def _field(self, key: Key, form: Form, values: Mapping[Any, Any], known: tuple[str, ...],
                where: str, index: int | None) -> dict[str, Any]:
-        """Read a field, nothing if its default is to be taken."""
+        """Read a field; return nothing if it is missing and its default applies."""
         if key.mark(Folder):
             return {key.field: self._base}
         keyed = key.mark(Keyed)
@@ -205,7 +205,7 @@ class _Reader:
         return self.value(keyed.kinds[given[0]], (), values[given[0]], given[0], where)
 
     def _kind(self, kinds: Sequence[Any], given: Mapping[Any, Any], where: str) -> Any:
-        """Choose by the first key of each kind."""
+        """Return the kind whose first key is given."""
         fitting = [kind for kind in kinds if keys_of(kind)[0].name in given]
         if len(fitting) != 1:
             names = ', '.join(f'"{keys_of(kind)[0].name}"' for kind in fitting or kinds)
@@ -244,7 +244,7 @@ class _Reader:
 
     def _part(self, item: Any, marks: tuple[Any, ...], given: Any, whole: tuple[Any, Any],
               key: str, where: str) -> Any:
-        """Read a plain value in a list; advice is about the list, of which type and marks."""
+        """Read a plain value in a list; errors advise on the list, with its type and marks."""
         try:
             return self.value(item, marks, given, key, where)
         except InputError as error:
@@ -285,7 +285,7 @@ class _Reader:
         return tuple(read)
 
     def _label(self, own: Key | None, entry: Any) -> str:
-        """Name the entry by its own key behind its place, if it has a good one."""
+        """Return an entry's label: the value of its own key after its index, if that is valid."""
         if own is None or not isinstance(entry, Mapping) or own.name not in entry:
             return ''
         try:
@@ -331,6 +331,6 @@ def _refuse(given: Any, key: str, where: str, remedy: str) -> NoReturn:
 
 
 def _as_yaml(given: Any) -> str:
-    """Return how YAML writes a number that it has taken for a text."""
+    """Return the correct YAML spelling of a number that YAML read as text."""
     number = isinstance(given, str) and _EXPONENT.fullmatch(given)
     return ' (YAML: 1.0e-3, not 1e-3)' if number else ''

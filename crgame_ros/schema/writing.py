@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writing a value as the file says it from which it could have been read."""
+"""Writes a value as the content of a file from which it can be read."""
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass
@@ -15,11 +15,11 @@ _HERE = Path()
 
 def write(value: Any, base: Path = _HERE) -> Any:
     """
-    Return the YAML values from which `read` makes the same again, from any folder.
+    Return the YAML values from which `read` builds an equal value, from any folder.
 
-    :param value: a dataclass that `read` gave, or could have given.
-    :param base: directory against which its relative file names were meant.
-    :return: mappings, lists, text, numbers, truth values and None, shared with nothing.
+    :param value: a dataclass that `read` returned, or could return.
+    :param base: directory of its relative file names.
+    :return: new mappings, lists, texts, numbers, truth values and None.
     """
     if is_dataclass(value):
         return _mapping(value, base)

@@ -64,8 +64,8 @@ class BicycleMotion(Integrated):
     The centre is ahead of the axle by the type's distance, so that it is on the path where that is
     straight. The speed tends to the wanted one within acceleration a and deceleration b. It is
     limited for bends (sqrt(a_lat / kappa)), by speed limits, and for the end if the object stays
-    there. A reactive object follows a leader on its path by the IDM. It ignores others to the side,
-    and crossing ones before they are in the way.
+    there. A reactive object follows a leader on its path by the IDM. It ignores others to the
+    side, and crossing ones before they are in the way.
 
     :param spec: specification of the object.
     :param path: path of the rear axle.

@@ -38,13 +38,13 @@ class ObjectSurroundings:
 
     @property
     def speeds(self) -> FloatArray:
-        """Speeds (O,) [m/s]."""
+        """Return the speeds (O,) [m/s]."""
         return np.hypot(self.velocities[:, 0], self.velocities[:, 1])
 
 
 SUB_STEP_S = 0.01
 ABSENT = (np.nan, np.nan, np.nan)
-# Time steps are decimal fractions, which are not exact: ten steps of 0.1 s may differ from 1 s [s].
+# Time steps are decimal fractions: ten steps of 0.1 s are not exactly 1 s [s].
 ROUNDING = 1e-9
 
 
@@ -100,10 +100,10 @@ class Standstill(ObjectMotion):
         self._pose = (pose[0], pose[1], wrap_pi(pose[2]))
 
     def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Mind nobody."""
+        """Do nothing: the motion ignores others."""
 
     def move(self, time_s: float, duration_s: float) -> None:
-        """Stay."""
+        """Do nothing: the object stays."""
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:
         """Return the pose."""
@@ -133,10 +133,10 @@ class Predetermined(ObjectMotion):
         self._time_s = 0.0
 
     def decide(self, time_s: float, others: ObjectSurroundings) -> None:
-        """Mind nobody."""
+        """Do nothing: the motion ignores others."""
 
     def move(self, time_s: float, duration_s: float) -> None:
-        """Go on."""
+        """Advance the current time."""
         self._time_s = time_s + duration_s
 
     def state(self) -> tuple[Sequence[float], Sequence[float]]:

@@ -129,7 +129,7 @@ class Crossing:
         # Extents along and across the motion, which may differ from the body's axes.
         long, wide = (half + room for half in half_extents(
             vehicles.lengths, vehicles.widths, vehicles.poses[:, 2] - yaws))
-        # A pedestrian that is not yet within the kept distance can still stop.
+        # A pedestrian that has entered only the kept distance can still stop.
         parts = self._parts(
             np.column_stack((vehicles.poses[:, :2], yaws)), s - self._walker.distance,
             (-long, long + HORIZON_S * speeds), wide + self._walker.distance)
@@ -145,7 +145,7 @@ class Crossing:
                       for extent in (bodies.lengths, bodies.widths))
         enter = self._parts(bodies.poses, s, (-long - kept, long + kept), wide + kept).enter
         touch = self._parts(bodies.poses, s, (-long, long), wide).enter
-        # The body is nearer than the kept distance: the pedestrian may walk away from it or past it.
+        # Within the kept distance of a body: the pedestrian may walk away from it or past it.
         if ((enter <= s) & (touch > s)).any():
             return s
         return float(enter[enter > s].min(initial=math.inf))
@@ -196,8 +196,8 @@ class ParticleMotion(Integrated):
     A point that can accelerate in any direction, |a| <= a_max, and faces its direction of motion.
 
     It walks along the straight lines between its way-points, slower at corners, which it rounds
-    at about 0.1 m, and comes to rest at its goal. A reactive one stops for vehicles and in front of
-    standing bodies (`Crossing`).
+    at about 0.1 m, and comes to rest at its goal. A reactive one stops for vehicles and in front
+    of standing bodies (`Crossing`).
 
     :param spec: specification of the object.
     """
@@ -258,7 +258,7 @@ class ParticleMotion(Integrated):
         self._gone = self._spec.end == 'vanish' and self._s >= self._goal - _ARRIVED
 
     def _point(self, s: float) -> tuple[float, float]:
-        """Return the point of the path at an arc length; straight on where the object disappears."""
+        """Return the point at an arc length; straight on beyond the end unless it stays there."""
         if self._spec.end == 'stay':
             s = min(s, self._goal)
         segment = min(int(np.searchsorted(self._corners, s, side='right')) - 1,
@@ -269,7 +269,7 @@ class ParticleMotion(Integrated):
         return x + along * dx, y + along * dy
 
     def _progress(self) -> None:
-        """Update the arc length by projection on the current and the next segment, never backwards."""
+        """Project the position on the current and the next segment, and never move backwards."""
         present = int(np.searchsorted(self._corners, self._s, side='right')) - 1
         best, nearest = self._s, math.inf
         for segment in range(present, min(present + 2, len(self._directions))):

@@ -63,7 +63,7 @@ class ObjectPath:
 
     @property
     def length(self) -> float:
-        """Arc length [m]."""
+        """Return the total arc length [m]."""
         return float(self.s[-1])
 
     def arc_lengths(self, stations: FloatArray) -> FloatArray:

@@ -35,8 +35,8 @@ class ScriptedObjects:
     """
     The scripted objects of a game, moved by scenario time steps.
 
-    All objects react to the world of step k, then all move to k + 1. Therefore their order does not
-    matter, and the same inputs give the same bits.
+    All objects react to the world of step k, then all move to k + 1. Therefore their order does
+    not matter, and the same inputs give the same bits.
 
     :param specs: specifications of the objects.
     :param network: network of the lanelets that objects may follow; None if there is none.
@@ -128,7 +128,7 @@ def _path_motion(spec: ObjectSpec, where: str) -> ObjectMotion:
     lane = WaypointLane(x, y, np.zeros(len(x)), np.full(len(x), np.inf))
     path = ObjectPath(lane)
     check_bends(path, spec.mover, spec.type, where)
-    # Added way-points are on straight segments, so that the stations of the given ones are unchanged.
+    # Added way-points are on straight segments, so that stations of the given ones do not change.
     wanted = np.interp(path.s, path.arc_lengths(corners), spec.speeds) if spec.speeds \
         else np.full(len(path.s), spec.mover.speed)
     return BicycleMotion(spec, path, 0.0, wanted)

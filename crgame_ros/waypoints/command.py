@@ -10,7 +10,7 @@ from typing import Literal
 
 from crgame_ros.errors import InputError
 
-# Lanes of which it is told how they were cut.
+# Greatest number of lanes whose cuts are printed.
 _TOLD = 10
 
 
@@ -43,7 +43,7 @@ With --start and --goal the scenario has a planning problem, that is, an AV can 
 
 def run(values: argparse.Namespace) -> int:
     """
-    Write the one from the other and say what was written.
+    Convert way-points to a scenario or a scenario to way-points, and print a summary.
 
     :return: exit code.
     :raises InputError: naming file, lane and station, or option.
@@ -54,14 +54,14 @@ def run(values: argparse.Namespace) -> int:
         raise InputError(f'cannot turn {values.source.name} into {values.out.name}',
                          'crgame roads', 'name way-points (.csv) and a scenario (.xml), '
                          'in either order')
-    # Now, not after the work.
+    # Check before the work.
     _check_target(values.out, values.force)
     way(values)
     return 0
 
 
 def _to_scenario(values: argparse.Namespace) -> None:
-    # Here, so that other commands don't wait for these libraries.
+    # Imported here, so that other commands do not load these libraries.
     from crgame_ros.waypoints.export import Drive, export_roads
     from crgame_ros.waypoints.file import write_whole
     from crgame_ros.waypoints.roads import WaypointRoads
@@ -137,7 +137,7 @@ def _lane(text: str, option: str, remedy: str) -> int:
 
 
 def _check_target(path: Path, force: bool) -> None:
-    """Refuse to write where something is that must not be lost."""
+    """Refuse to overwrite an existing file, unless forced."""
     if not (path.exists() or path.is_symlink()):
         return
     if not path.is_file() or path.is_symlink():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Way-point roads as a CommonRoad 2020a scenario, to drive on."""
+"""Exports way-point roads as a CommonRoad 2020a scenario."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,9 +35,9 @@ import numpy as np
 LaneletKind = Literal['urban', 'highway']
 
 TIME_STEP_S = 0.1
-# A longer map is more than a scenario file may hold [m], a longer lane more than a lanelet may.
+# Greatest length of a map in a scenario file, and of a lane in a lanelet [m].
 MAX_LENGTH, MAX_LANE_LENGTH = 600e3, 99e3
-# The goal may be reached within ten minutes.
+# Last time step of the goal: ten minutes.
 _GOAL_STEPS = 6000
 _MAX_SPEED = 100.0
 _LIMIT_SIGN = '274'
@@ -51,12 +51,12 @@ _HEAD = ('<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>'
 @dataclass(frozen=True)
 class Drive:
     """
-    What an AV shall do: a planning problem.
+    The task of an AV, for a planning problem.
 
-    :param lane: id of the lane on whose centre it starts.
-    :param station: of the vehicle's centre [m]
-    :param speed: at the start [m/s]
-    :param goal: id of the lane that it shall reach.
+    :param lane: id of the lane on whose centre line it starts.
+    :param station: station of the vehicle's centre at the start [m]
+    :param speed: initial speed [m/s]
+    :param goal: id of the lane to reach.
     """
 
     lane: int
@@ -82,23 +82,23 @@ class ExportedRoads:
     problem_id: int | None
 
     def lanelets(self, lane: int) -> tuple[int, ...]:
-        """List the lanelets of a lane, in driving direction."""
+        """Return the lanelets of a lane, in driving direction."""
         return tuple(piece.number for piece in self.pieces if piece.lane == lane)
 
 
 def export_roads(roads: WaypointRoads, name: str, kind: LaneletKind = 'urban',
                  drive: Drive | None = None, where: str = 'way-point roads') -> ExportedRoads:
     """
-    Turn way-point lanes into a map of lanelets.
+    Convert way-point lanes to a map of lanelets.
 
     Every lane becomes a lanelet, or several where its speed limit changes (`cut_lanes`). Without
-    a drive there is no planning problem, which only CommonRoad's schema asks for; everything else
-    is as the schema has it.
+    a drive there is no planning problem, although CommonRoad's schema requires one; everything
+    else conforms to the schema.
 
-    :param name: of the map; the benchmark id is made of it.
+    :param name: name of the map, part of the benchmark id.
     :param kind: lanelet type of all lanes.
-    :param where: what to name in messages, before the lane.
-    :raises InputError: if a lane or a link cannot be a lanelet's.
+    :param where: text for messages, before the lane.
+    :raises InputError: if a lane or a link cannot be represented by lanelets.
     :raises CrgameError: if the schema refuses the result.
     """
     _refuse_long(roads, where)
@@ -127,7 +127,7 @@ def export_roads(roads: WaypointRoads, name: str, kind: LaneletKind = 'urban',
     network = _HEAD.format(kind) + ''.join(lanelets + signs)
     _refuse_invalid(_document(benchmark_id, network + problem, where))
     text = _document(benchmark_id, network + (problem if drive is not None else ''), where)
-    # What is written can be loaded: the loader refuses more than the schema, large files too.
+    # Check that the file can be loaded: the loader refuses more than the schema, e.g. large files.
     parse_scenario(text, f'{where} as a scenario')
     return ExportedRoads(benchmark_id, text, pieces, None if drive is None else problem_id)
 
@@ -160,7 +160,7 @@ def _check_drive(roads: WaypointRoads, drive: Drive) -> None:
 
 def _problem(number: int, roads: WaypointRoads, drive: Drive | None,
              pieces: Sequence[Piece]) -> str:
-    """Write the planning problem, or one that stands in for the check by the schema."""
+    """Return the XML of the planning problem, or of a substitute for the check by the schema."""
     if drive is None:
         drive = Drive(pieces[0].lane, 0.0, 0.0, pieces[0].lane)
     here = roads.lane(drive.lane).at(np.array([drive.station]))
@@ -187,7 +187,7 @@ def _lanelet(piece: Piece, bounds: Bounds, kind: LaneletKind, sign: int | None) 
 
 
 def _sign(number: int, limit: float, position: FloatArray) -> str:
-    # Every digit, so that the limit is the same number when it is read again.
+    # All digits, so that reading it again gives the same number.
     value = np.format_float_positional(limit, trim='0')
     return (f'<trafficSign id="{number}"><trafficSignElement><trafficSignID>{_LIMIT_SIGN}'
             f'</trafficSignID><additionalValue>{value}</additionalValue></trafficSignElement>'
@@ -201,7 +201,7 @@ def _points(points: FloatArray) -> str:
 
 
 def _document(benchmark_id: str, content: str, source: str) -> str:
-    # The day is always the same: the same way-points give the same bytes. The folder is left out.
+    # The date is constant and the folder left out, so that equal way-points give equal bytes.
     name = ''.join(letter for letter in Path(source).name if letter.isprintable())
     header = {'timeStepSize': exact_number(TIME_STEP_S), 'commonRoadVersion': '2020a',
               'author': '', 'affiliation': '', 'source': f'{name}, made by crgame roads',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of way-points as CSV files; docs/roads.md has the columns."""
+"""Tables of way-points as CSV files; docs/roads.md documents the columns."""
 
 from collections.abc import Mapping
 import csv
@@ -30,9 +30,9 @@ class LaneRows:
     """
     One lane of a table.
 
-    :param line: of its first row.
+    :param line: line number of its first row.
     :param points: (W, 4) x [m], y [m], width [m], speed limit [m/s]
-    :param links: successors, predecessors, left, … as `LaneLinks` has them.
+    :param links: successors, predecessors, left, … as in `LaneLinks`.
     """
 
     line: int
@@ -142,7 +142,7 @@ def _links(cells: Mapping[str, str], where: str) -> dict[str, Any]:
 
 def write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
     """
-    Write a table of way-points that `read_lane_rows` reads; numbers keep every bit.
+    Write a table of way-points that `read_lane_rows` can read; numbers keep every bit.
 
     :raises InputError: if the file cannot be written.
     """
@@ -162,7 +162,7 @@ def write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
 
 def write_whole(path: Path, text: str) -> None:
     """
-    Write a file that is there whole or not at all.
+    Write a file completely or not at all.
 
     :raises InputError: if it cannot be written.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Way-points of lanelets: their centre lines, made fit for splines."""
+"""Way-points from lanelets' centre lines, prepared for splines, and bounds from way-points."""
 
 from collections.abc import Mapping, Sequence
 import math
@@ -15,21 +15,22 @@ import shapely
 
 FloatArray = NDArray[np.float64]
 
-# Vertices closer than this to the one before are noise of the map's maker [m]: two of them 1 cm
-# apart bend the spline of USA_US101-4 to a radius of 2 m.
+# Vertices closer than this to the previous one are noise in the map [m]: two of them 1 cm apart
+# bend the spline of USA_US101-4 to a radius of 2 m.
 MIN_SPACING = 0.5
-# A segment this many times as long as its neighbour is a straight, and the spline must know it:
-# next to vertices 1 m apart it swings out by 1.5 m on the 100 m segments of OSC_Pedestrian….
+# A segment that is longer than its neighbour by this factor is a straight, and needs additional
+# points: next to vertices 1 m apart the spline overshoots by 1.5 m on the 100 m segments of
+# OSC_Pedestrian….
 MAX_RATIO = 4.0
-# Lanelets of one chain at most.
+# Greatest number of lanelets in a chain.
 _MAX_CHAIN = 1000
-# Distance of the vertices on a straight [m], and the least in a bend.
+# Spacing of the vertices on a straight, and the least spacing in a bend [m].
 SPACING, MIN_BOUND_SPACING = 1.0, 0.05
-# The polyline of a bend is beside the bend by no more than this [m].
+# Greatest distance of a bend's polyline from the bend [m].
 TOLERANCE = 0.003
-# Decimals of the coordinates, as CommonRoad files have them.
+# Number of decimals of coordinates, as usual in CommonRoad files.
 DECIMALS = 4
-# The turn of the last cross-sections of a lane fades out over so many widths.
+# The rotation of a lane's end cross-sections decreases to zero over so many widths.
 _FADING = 2.0
 
 
@@ -37,9 +38,9 @@ def lanelet_waypoints(network: RoadNetwork, lanelet_id: int) -> FloatArray:
     """
     Return the way-points of one lanelet.
 
-    Position and width are those of the centre line's vertices; vertices within `MIN_SPACING` of
-    the last are left out, and way-points on the straight are added next to the ends of segments
-    that are much longer than their neighbours (`graded`).
+    Position and width are those of the centre line's vertices. Vertices within `MIN_SPACING` of
+    the previous one are left out. Way-points are added near the ends of segments that are much
+    longer than their neighbours (`graded`).
 
     :return: (W, 4) x [m], y [m], width between the bounds [m], speed limit of the traffic signs
         [m/s], infinite without one.
@@ -56,15 +57,15 @@ def lanelet_waypoints(network: RoadNetwork, lanelet_id: int) -> FloatArray:
 
 def lanelet_lane(network: RoadNetwork, lanelet_id: int,
                  kinds: Mapping[str, Interpolation] | None = None) -> WaypointLane:
-    """Make a lane of one lanelet; see `lanelet_waypoints`."""
+    """Return a lane of one lanelet; see `lanelet_waypoints`."""
     return WaypointLane.from_rows(lanelet_waypoints(network, lanelet_id), kinds)
 
 
 def lanelet_chain(network: RoadNetwork, lanelet_id: int, length: float) -> Sequence[int]:
     """
-    List a lanelet and its successors, always the straightest.
+    Return a lanelet and its successors, always the straightest.
 
-    :param length: how far they reach beyond the end of the first [m]; less where the map ends.
+    :param length: length beyond the end of the first lanelet [m]; less where the map ends.
     """
     chain = [lanelet_id]
     while length > 0.0 and len(chain) < _MAX_CHAIN:
@@ -77,10 +78,10 @@ def lanelet_chain(network: RoadNetwork, lanelet_id: int, length: float) -> Seque
 
 
 def lane_of_chain(network: RoadNetwork, chain: Sequence[int]) -> WaypointLane:
-    """Make one lane of lanelets that follow each other; their limits hold from their starts."""
+    """Return one lane of successive lanelets, whose speed limits hold from their starts."""
     parts = [lanelet_waypoints(network, lanelet_id) for lanelet_id in chain]
     for index, part in enumerate(parts[:-1]):
-        # Where lanelets join, the end of one and the start of the next are the same way-point.
+        # The end of a lanelet and the start of the next one are the same way-point.
         if np.hypot(*(part[-1, :2] - parts[index + 1][0, :2])) < MIN_SPACING and len(part) > 1:
             parts[index] = part[:-1]
     return WaypointLane.from_rows(np.concatenate(parts))
@@ -88,7 +89,7 @@ def lane_of_chain(network: RoadNetwork, chain: Sequence[int]) -> WaypointLane:
 
 def thinned(s: FloatArray, spacing: float) -> FloatArray:
     """
-    Leave out stations that are close to the last one kept, but not the ends.
+    Return stations without those that are close to the last one kept; both ends are kept.
 
     :param s: (n,) stations, increasing [m]
     :param spacing: least distance [m]
@@ -102,25 +103,25 @@ def thinned(s: FloatArray, spacing: float) -> FloatArray:
 
 def graded(s: FloatArray, ratio: float) -> FloatArray:
     """
-    Add stations next to the ends of segments that are much longer than their neighbours.
+    Return stations, with more near the ends of segments much longer than their neighbours.
 
-    A spline swings out beside a long straight that follows short segments, unless it has points
-    on the straight.
+    A spline overshoots at a long straight that follows short segments, unless it has points on
+    the straight.
 
     :param s: (n,) stations, increasing [m]
-    :param ratio: of neighbouring lengths that is allowed, and half as much again.
+    :param ratio: ratio of neighbouring lengths; up to 1.5 times it may remain.
     """
     for _ in range(2):
         forward = [float(s[0])]
         for station in s[1:].tolist():
             while len(forward) > 1:
                 reach = ratio * (forward[-1] - forward[-2])
-                # A rest that is short itself would make a new pair of unlike neighbours.
+                # A short remainder would itself have too large a ratio to its neighbour.
                 if station - forward[-1] <= 1.5 * reach:
                     break
                 forward.append(forward[-1] + reach)
             forward.append(station)
-        # The same backwards, from the other end.
+        # The same from the other end.
         s = -np.array(forward[::-1])
     return s
 
@@ -135,21 +136,22 @@ class Bounds(NamedTuple):
 def lane_bounds(lane: WaypointLane, start: float, end: float, turns: tuple[float, float],
                 where: str) -> Bounds:
     """
-    Draw the bounds of a lane: its centre, plus and minus half its width along the normal (FS 1).
+    Return the bounds of a lane: its centre, plus and minus half its width along the normal (FS 1).
 
-    There are vertices at the way-points, and between them so many that they are at most 1 m
-    apart and the chords of a bend at most 3 mm (`TOLERANCE`) beside it.
+    Vertices are at the way-points, and between them at a spacing of at most 1 m, such that the
+    chords of a bend are within 3 mm (`TOLERANCE`) of it.
 
     :param start: station at which they begin [m]
     :param end: station at which they end [m]
-    :param turns: angles by which the cross-sections at the lane's own start and end are turned
-        [rad]; they fade out over two of its largest widths.
-    :param where: what to name in messages, before the station.
-    :raises InputError: naming the station, if a bound turns back or meets itself or the other.
+    :param turns: angles by which the cross-sections at the lane's own start and end are rotated
+        [rad]; they decrease to zero over twice its largest width.
+    :param where: text for messages, before the station.
+    :raises InputError: naming the station, if a bound turns back or intersects itself or the
+        other.
     """
     s = _stations(lane, start, end)
     here = lane.at(s)
-    # The same for all pieces of the lane, so that they fit together.
+    # This length is the same for all pieces of the lane, so that their bounds join.
     reach = min(max(_FADING * float(lane.width.max()), SPACING), 0.5 * lane.length)
     yaw = (here.yaw + turns[0] * np.clip(1.0 - s / reach, 0.0, 1.0)
            + turns[1] * np.clip(1.0 - (lane.length - s) / reach, 0.0, 1.0))
@@ -171,14 +173,14 @@ def _stations(lane: WaypointLane, start: float, end: float) -> FloatArray:
     knots = thinned(np.array([start, *inside.tolist(), end]), MIN_BOUND_SPACING)
     coarse = _divided(knots, np.full(len(knots) - 1, SPACING))
     curvature = np.abs(lane.at(coarse).curvature)
-    # The chord of an arc is beside its outer bound by less than 2 kappa ds^2 / 8.
+    # The distance of a chord from the outer bound's arc is less than 2 kappa ds^2 / 8.
     step = 2.0 * np.sqrt(TOLERANCE / np.maximum(
         np.maximum(curvature[:-1], curvature[1:]), 1e-9))
     return _divided(coarse, np.maximum(step, MIN_BOUND_SPACING))
 
 
 def _divided(s: FloatArray, step: FloatArray) -> FloatArray:
-    """Divide intervals (n - 1) between stations (n) evenly, into parts of a step at most."""
+    """Return stations (n) with their intervals (n - 1) divided evenly, into parts up to a step."""
     length = np.diff(s)
     counts = np.maximum(np.ceil(length / step - 1e-9), 1).astype(np.int64)
     part = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -186,7 +188,7 @@ def _divided(s: FloatArray, step: FloatArray) -> FloatArray:
 
 
 def _refuse_narrow(s: FloatArray, width: FloatArray, where: str) -> None:
-    """Refuse a lane without width between its ends: there is nothing to drive on."""
+    """Refuse a lane that has no width at a place between its ends: it cannot be driven."""
     bad = np.flatnonzero(width[1:-1] < 10.0**-DECIMALS) + 1
     if len(bad) or max(width[0], width[-1]) < 10.0**-DECIMALS:
         station = s[bad[0]] if len(bad) else s[0]
@@ -210,7 +212,7 @@ def _refuse_turning_back(bounds: Bounds, s: FloatArray, center: FloatArray,
 
 
 def _place(reason: str, lane: WaypointLane, s: FloatArray) -> str:
-    """Return the station of the place that shapely names, as in `Self-intersection[1 2]`."""
+    """Return the station of the place in shapely's reason, such as `Self-intersection[1 2]`."""
     _, _, rest = reason.partition('[')
     try:
         x, y = (float(text) for text in rest.rstrip(']').split())

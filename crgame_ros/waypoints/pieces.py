@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Way-point lanes cut into pieces of one speed limit each, with links from piece to piece."""
+"""Cuts way-point lanes into pieces with one speed limit each, and links the pieces."""
 
 from bisect import bisect_right, insort
 from collections.abc import Iterator, Mapping
@@ -14,13 +14,13 @@ from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.waypoints.roads import LaneLinks, MAX_GAP, WaypointRoads
 import numpy as np
 
-# A neighbour with a cut so close by has its counterpart there already [m].
+# A neighbour's cut within this distance is the counterpart of a cut [m].
 SNAP = 2.0
-# Ids above this are left to those who gave them.
+# New ids do not continue above existing ids that are greater than this.
 _MANY = 10**15
-# Lanes that meet at a greater angle than this have a corner there, and keep it [rad].
+# Lanes that meet at a greater angle than this have an intended corner there, which is kept [rad].
 MAX_TURN = 0.3
-# The name of a link, and what the lane at its other end calls it.
+# Name of a link, and its name in the lane at its other end.
 _SIDES = (('left', 'right'), ('right', 'left'), ('oncoming_left', 'oncoming_left'),
           ('oncoming_right', 'oncoming_right'))
 # A lane's start (0) or end (-1).
@@ -39,7 +39,7 @@ class Piece:
     :param speed_limit: [m/s]; infinite without one.
     :param successors: ids of pieces.
     :param predecessors: ids of pieces.
-    :param left: id of the piece beside it and whether that has the same direction; None without.
+    :param left: id of the piece beside it, and whether that has the same direction; None without.
     :param right: likewise.
     """
 
@@ -55,7 +55,7 @@ class Piece:
 
 
 def free_ids(taken: tuple[int, ...]) -> Iterator[int]:
-    """Yield ids that nothing has: those above the others, unless these are huge."""
+    """Yield unused ids: above the existing ones, unless these are huge."""
     known = set(taken)
     first = max(known) + 1 if max(known) < _MANY else 1
     return (number for number in itertools.count(max(first, 1)) if number not in known)
@@ -66,13 +66,13 @@ def cut_lanes(roads: WaypointRoads, links: Mapping[int, LaneLinks], ids: Iterato
     """
     Cut every lane where its speed limit changes, and where a neighbour is cut.
 
-    The first piece of a lane has the lane's id (but 0, which no lanelet may have). A lane that
-    follows itself is cut in the middle: no lanelet may.
+    The first piece of a lane has the lane's id (except 0, which lanelets cannot have). A lane that
+    is its own successor is cut in the middle, because a lanelet cannot be its own successor.
 
-    :param links: as `completed_links` gives them.
-    :param ids: for the other pieces.
-    :param where: what to name in messages, before the lane.
-    :raises InputError: if a speed limit is no step.
+    :param links: links as `completed_links` returns them.
+    :param ids: ids for the other pieces.
+    :param where: text for messages, before the lane.
+    :raises InputError: if a speed limit is not a step function.
     """
     cuts = _cuts(roads, links, where)
     numbers = {lane: [lane or next(ids), *itertools.islice(ids, len(cuts[lane]))]
@@ -122,7 +122,7 @@ def _beside(near: LaneLinks) -> list[int]:
 
 
 def _across(roads: WaypointRoads, lane: int, s: float, other: int) -> float:
-    """Find the station of another lane beside a station of a lane."""
+    """Return the station of another lane beside a station of a lane."""
     here = roads.lane(lane).at(np.array([s]))
     return float(roads.lane(other).project(np.stack((here.x, here.y), axis=-1)).s[0])
 
@@ -130,7 +130,7 @@ def _across(roads: WaypointRoads, lane: int, s: float, other: int) -> float:
 def _piece_beside(roads: WaypointRoads, cuts: Mapping[int, list[float]],
                   numbers: Mapping[int, list[int]], lane: int, index: int, same: int | None,
                   oncoming: int | None) -> tuple[int, bool] | None:
-    """Name the piece beside a piece: the one whose middle is beside it, and the other way."""
+    """Return the piece beside a piece: the middle of each must be beside the other."""
     other = oncoming if same is None else same
     if other is None:
         return None
@@ -151,11 +151,11 @@ def _middle(roads: WaypointRoads, cuts: Mapping[int, list[float]], lane: int,
 
 def completed_links(roads: WaypointRoads, where: str) -> dict[int, LaneLinks]:
     """
-    Return the links of every lane, with those that only the lane at the other end names.
+    Return the links of every lane, including those that only the lane at the other end names.
 
     A neighbour that already has another neighbour on that side keeps it.
 
-    :param where: what to name in messages, before the lane.
+    :param where: text for messages, before the lane.
     :raises InputError: if a lane is beside itself, has two neighbours on a side, or is followed
         by a lane that begins elsewhere.
     """
@@ -181,10 +181,10 @@ def completed_links(roads: WaypointRoads, where: str) -> dict[int, LaneLinks]:
 
 def turns(roads: WaypointRoads, links: Mapping[int, LaneLinks]) -> dict[End, float]:
     """
-    Return the angles by which ends of lanes turn to the mean heading of the lanes that meet there.
+    Return the rotations of lanes' ends to the mean heading of the lanes that meet there.
 
-    Splines of lanes that follow each other have slightly different headings where they meet;
-    their bounds would gape there. An end that turns by more than `MAX_TURN` stays.
+    Splines of successive lanes have slightly different headings where they meet, which would
+    leave gaps between their bounds. An end with a rotation above `MAX_TURN` is not rotated.
 
     :return: [rad], by lane and end.
     """
@@ -237,7 +237,7 @@ def _check(roads: WaypointRoads, lane: int, near: LaneLinks, where: str) -> None
 
 
 def _meeting(end: End, links: Mapping[int, LaneLinks]) -> list[End]:
-    """List the ends of lanes that meet in one place, in a fixed order."""
+    """Return the ends of lanes that meet at the place of an end, in a fixed order."""
     found = [end]
     for lane, which in found:
         near = links[lane].successors if which else links[lane].predecessors

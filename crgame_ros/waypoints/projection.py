@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The nearest points of plane curves made of cubic pieces, found in logarithmic time."""
+"""Finds the nearest points on plane curves of cubic pieces, in logarithmic time."""
 
 from typing import NamedTuple
 
@@ -11,28 +11,29 @@ from scipy.spatial import cKDTree
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Distance of the samples among which the tree finds the place to search [m].
+# Spacing of the samples in the tree, which gives the places to search [m].
 _SAMPLING = 0.5
-# Samples of one piece and of all pieces at most: way-points far apart must not fill the memory.
+# Greatest numbers of samples of one piece and of all pieces, which limit memory if way-points are
+# far apart.
 _MAX_PER_PIECE = 64
 _MAX_SAMPLES = 4_000_000
-# Places per point that are refined: curves that cross have their samples side by side, and on one
-# curve the nearest sample is next to the nearest point, but where it comes back to itself.
+# Number of places refined per point. On one curve the nearest sample is next to the nearest point,
+# except where the curve comes back to itself; samples of crossing curves are close together.
 ALONE, SEVERAL = 3, 8
 _TOLERANCE = 1e-10
-# Halving alone would reach the tolerance from any sampling after as many steps.
+# Bisection alone reaches the tolerance within this number of steps, for any sampling.
 _MAX_STEPS = 60
 
 
 class CurvePieces(NamedTuple):
     """
-    The cubic pieces of one or several curves, those of one curve in order and next to each other.
+    The cubic pieces of one or several curves; those of one curve are contiguous and in order.
 
-    :param coefficients: (4, P, 2) of x and y in powers 3, 2, 1, 0 of the distance from the start
-        of the piece.
+    :param coefficients: (4, P, 2) coefficients of x and y for powers 3, 2, 1, 0 of the distance
+        from the start of the piece.
     :param start: (P,) station at which a piece starts [m]
-    :param length: (P,) of the stations that it covers [m]
-    :param curve: (P,) number of the curve that it belongs to.
+    :param length: (P,) length in stations [m]
+    :param curve: (P,) number of its curve.
     """
 
     coefficients: FloatArray
@@ -52,14 +53,14 @@ class Nearest(NamedTuple):
 
 class CurveIndex:
     """
-    Finds the points of curves that are nearest to given points.
+    An index of curves that finds their nearest points to given points.
 
-    A k-d tree over samples of the curves gives the places to search, in O(log P) for each point;
-    Newton steps on the squared distance, kept between the neighbouring samples by halving, find
-    the point there. The best of several places counts. Where more curves than that lie within half
-    a sampling distance (0.25 m) of each other, it may take one of them that is not the nearest.
+    A k-d tree over samples of the curves gives the places to search, in O(log P) for each point.
+    There, Newton steps on the squared distance find the point; bisection keeps them between the
+    neighbouring samples. The best of several places counts. If more curves than that are within
+    half a sampling distance (0.25 m) of each other, the result may be on one that is not nearest.
 
-    :param pieces: of the curves; they may not be changed afterwards.
+    :param pieces: pieces of the curves; they must not be changed afterwards.
     """
 
     def __init__(self, pieces: CurvePieces) -> None:
@@ -89,7 +90,8 @@ class CurveIndex:
         Find the nearest point of any curve for each of many points.
 
         :param points: (N, 2) finite x, y [m]
-        :param candidates: places for each point among which to choose; `ALONE` do for one curve.
+        :param candidates: number of places to search for each point; `ALONE` suffices for one
+            curve.
         :return: s within its curve; d is the offset along the normal there, positive to the left,
             and |d| the distance unless the nearest point is an end.
         """
@@ -109,12 +111,12 @@ class CurveIndex:
                        distance[np.arange(len(points)), best])
 
     def _refine(self, points: FloatArray, samples: IntArray) -> tuple[IntArray, FloatArray]:
-        """Find the piece and the place on it nearest to each point beside its sample."""
+        """Return the piece nearest to each point around its sample, and the place on it."""
         before, after = self._before[samples], self._after[samples]
         here = np.where(after < 0, before, after)
         u = np.where(after < 0, self._high[here], self._low[here])
         slope, _ = self._slopes(self._piece[here], u, points)
-        # The squared distance falls to one side of the sample; at an end there is but one.
+        # The squared distance decreases to one side of the sample; an end has only one side.
         backwards = (slope > 0.0) & (before >= 0)
         fixed = (slope > 0.0) & (before < 0) | (slope <= 0.0) & (after < 0)
         interval = np.where(backwards, before, here)

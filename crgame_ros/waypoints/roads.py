@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Published maps hold successors that begin elsewhere, even the lanelet itself [m].
+# Published maps contain successors that start elsewhere, even the lanelet itself [m].
 MAX_GAP = 1.0
 
 
@@ -45,12 +45,12 @@ class LaneLinks:
 
     @property
     def named(self) -> tuple[int, ...]:
-        """Every lane that is named."""
+        """Return all lanes in the links."""
         beside = (self.left, self.right, self.oncoming_left, self.oncoming_right)
         return (*self.successors, *self.predecessors, *(x for x in beside if x is not None))
 
     def only(self, lane_ids: Collection[int]) -> 'LaneLinks':
-        """Leave out the other lanes."""
+        """Return the links without other lanes."""
         return LaneLinks(
             tuple(x for x in self.successors if x in lane_ids),
             tuple(x for x in self.predecessors if x in lane_ids),
@@ -64,8 +64,9 @@ class NearestLanes(NamedTuple):
 
     :param lane: ids.
     :param s: stations in [0, length] [m]
-    :param d: offsets to the left of the lane's centre [m]
-    :param distance: to the lane's centre [m]; |d| unless the nearest point is an end.
+    :param d: offsets to the left of the lane's centre line [m]
+    :param distance: distances to the lane's centre line [m]; |d| unless the nearest point is an
+        end.
     """
 
     lane: NDArray[np.int64]
@@ -76,7 +77,7 @@ class NearestLanes(NamedTuple):
 
 class WaypointRoads:
     """
-    Way-point lanes and how they are connected.
+    Way-point lanes and their connections.
 
     :param lanes: by id; one at least.
     :param links: by id; a lane without an entry has none.
@@ -101,9 +102,9 @@ class WaypointRoads:
         """
         Derive the lanes from lanelets; their ids are the lanelets'.
 
-        Position and width come from the bounds and limits from the traffic signs. Links are the
-        lanelets' own, without those to lanelets that are not there and without successors and
-        predecessors that begin more than 1 m elsewhere (`MAX_GAP`).
+        Positions and widths come from the bounds, and limits from the traffic signs. Links are
+        the lanelets' own, without those to missing lanelets, and without successors and
+        predecessors with a gap of more than 1 m (`MAX_GAP`).
         """
         lanes = {lanelet: lanelet_lane(network, lanelet, kinds) for lanelet in network.lanelet_ids}
         return cls(lanes, {lanelet: _lanelet_links(network, lanelet, lanes) for lanelet in lanes})
@@ -112,7 +113,7 @@ class WaypointRoads:
     def from_csv(cls, path: Path,
                  kinds: Mapping[str, Interpolation] | None = None) -> 'WaypointRoads':
         """
-        Read lanes from a table of way-points; docs/roads.md has its columns.
+        Read lanes from a table of way-points; docs/roads.md documents its columns.
 
         :raises InputError: naming the file and the line.
         """
@@ -141,9 +142,9 @@ class WaypointRoads:
 
     def only(self, lane_ids: Collection[int]) -> 'WaypointRoads':
         """
-        Return some of the lanes, with the links between these.
+        Return the roads of some lanes, with the links between these.
 
-        :raises InputError: if there is none.
+        :raises InputError: if none of them exists.
         """
         kept = {lane: None for lane in self._lanes if lane in lane_ids}
         return WaypointRoads({lane: self._lanes[lane] for lane in kept},
@@ -151,7 +152,7 @@ class WaypointRoads:
 
     @property
     def lane_ids(self) -> tuple[int, ...]:
-        """Ids of all lanes."""
+        """Return the ids of all lanes."""
         return tuple(self._lanes)
 
     def lane(self, lane_id: int) -> WaypointLane:
@@ -170,24 +171,24 @@ class WaypointRoads:
         return self._links[lane_id]
 
     def successors(self, lane_id: int) -> tuple[int, ...]:
-        """List the lanes that begin at the end of a lane."""
+        """Return the lanes that begin at the end of a lane."""
         return self.links(lane_id).successors
 
     def predecessors(self, lane_id: int) -> tuple[int, ...]:
-        """List the lanes that end at the start of a lane."""
+        """Return the lanes that end at the start of a lane."""
         return self.links(lane_id).predecessors
 
     def left(self, lane_id: int) -> int | None:
-        """Name the neighbour on the left that has the same direction."""
+        """Return the left neighbour with the same direction; None without one."""
         return self.links(lane_id).left
 
     def right(self, lane_id: int) -> int | None:
-        """Name the neighbour on the right that has the same direction."""
+        """Return the right neighbour with the same direction; None without one."""
         return self.links(lane_id).right
 
     def nearest(self, points: FloatArray) -> NearestLanes:
         """
-        Find the lane whose centre is nearest to each of many points, whatever its direction.
+        Find the lane whose centre line is nearest to each of many points, in any direction.
 
         :param points: (N, 2) [m]; O(log of all way-points) each.
         """

@@ -21,12 +21,12 @@ if TYPE_CHECKING:  # A third of a second to load, which a run without way-points
 FloatArray = NDArray[np.float64]
 Interpolation = Literal['cubic', 'step']
 
-# What each quantity is interpolated by unless the caller says otherwise.
+# Default interpolation of each quantity.
 DEFAULT_KINDS: Mapping[str, Interpolation] = MappingProxyType(
     {'width': 'cubic', 'speed_limit': 'step'})
-# Way-points closer than this are one [m].
+# Way-points closer than this are merged [m].
 _SAME = 1e-6
-# Coordinates beyond leave less than a micrometre to double precision [m].
+# Beyond this, double precision does not resolve a micrometre [m].
 MAX_COORDINATE = 1e9
 _WHERE = 'way-points'
 
@@ -62,21 +62,21 @@ class WaypointLane:
     """
     A lane through way-points, with every quantity a function of the station s (FS 1).
 
-    The station of a way-point is the length of the straight lines up to it (FS II-A1); along the
-    curve itself it is a parameter that differs from the arc length by the square of the distance
-    of the way-points.
+    The station of a way-point is the length of the straight lines up to it (FS II-A1). Along the
+    curve it is a parameter, whose difference from the arc length is of second order in the
+    distance of the way-points.
 
     - x, y: cubic spline with continuous curvature through the way-points. Its ends are not-a-knot:
       a natural end has no curvature, but most lanes end in the middle of a bend.
     - `cubic` width and speed limit: a cubic polynomial between any two way-points (PCHIP) that
       stays between their values, so that no width is negative and no limit is exceeded, which a
-      spline would not promise.
-    - `step`: the value of the last way-point passed, from that way-point itself on.
+      spline would not guarantee.
+    - `step`: the value of the last way-point passed, from that way-point on.
 
     Beyond its ends a lane is clamped: stations are limited to [0, length].
 
-    :param x: (W,) [m]; W >= 2 way-points, of which at least two differ. Of way-points at the
-        same place the last counts.
+    :param x: (W,) [m]; W >= 2 way-points, of which at least two differ. If several are at the
+        same place, the last counts.
     :param y: (W,) [m]
     :param width: (W,) w >= 0 [m]
     :param speed_limit: (W,) v_lim > 0 [m/s]; infinite where there is none.
@@ -111,7 +111,7 @@ class WaypointLane:
     @classmethod
     def from_rows(cls, rows: FloatArray,
                   kinds: Mapping[str, Interpolation] | None = None) -> 'WaypointLane':
-        """Build a lane of rows (W, 4): x, y, width, speed limit."""
+        """Build a lane from rows (W, 4): x, y, width, speed limit."""
         return cls(rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3], kinds)
 
     @property
@@ -121,7 +121,7 @@ class WaypointLane:
 
     @property
     def length(self) -> float:
-        """Station of the last way-point [m]."""
+        """Return the station of the last way-point [m]."""
         return float(self.s[-1])
 
     @property
@@ -132,7 +132,7 @@ class WaypointLane:
 
     def at(self, s: FloatArray) -> LaneSample:
         """
-        Evaluate the lane (FS 1), heading and curvature by analytic derivatives.
+        Evaluate the lane (FS 1); heading and curvature come from analytic derivatives.
 
         theta = atan2(y', x'); kappa = (x' y'' - y' x'') / (x'^2 + y'^2)^(3/2).
 
@@ -163,7 +163,7 @@ class WaypointLane:
 
     def project(self, points: FloatArray) -> LanePosition:
         """
-        Find the nearest point of the lane's centre for each of many points, in O(log W) each.
+        Find the nearest point of the lane's centre line for each of many points, in O(log W) each.
 
         :param points: (N, 2) [m]
         :return: s in [0, length] and the offset d along the normal there, positive to the left;
@@ -190,7 +190,7 @@ class WaypointLane:
 
 
 def _checked(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Refuse columns that are no lane; give them as arrays of our own."""
+    """Check the columns of a lane, and return them as new arrays."""
     count = len(columns['x'])
     if count < 2:
         raise InputError(f'there is {count} way-point' if count else 'there are no way-points',

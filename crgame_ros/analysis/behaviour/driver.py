@@ -99,7 +99,7 @@ def measure_behaviour(record: RunRecord, limits: ResponseLimits = USUAL_LIMITS,
     """
     Measure how each driven vehicle of a run was driven, in the log's order.
 
-    :param record: of a recording (`read_run_record`) or of an offline run (`run_record_of`).
+    :param record: record of a recording (`read_run_record`) or an offline run (`run_record_of`).
     :param limits: limits that define a response to an event.
     :param requests: names of further events that count as requests to take over; orders of the
         seat and the game's take-over requests always do.

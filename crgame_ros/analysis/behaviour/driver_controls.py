@@ -41,8 +41,8 @@ class DriverControls:
 
         :param commands: (R, 4) throttle, brake, steering in [-1, 1] and reverse; NaN where no
             human drove.
-        :param max_wheel_angle: of the steering wheel at a steering of 1: theta_sw = s theta_sw,max
-            (CRG III-C2b) [rad]
+        :param max_wheel_angle: angle of the steering wheel at a steering of 1:
+            theta_sw = s theta_sw,max (CRG III-C2b) [rad]
         """
         known = np.isfinite(commands[:, :3]).all(axis=1)
         throttle, brake, steering = commands[known, :3].T
@@ -58,7 +58,7 @@ class DriverControls:
 
     @property
     def driven_s(self) -> float:
-        """The time driven by a human: each command counts as one step [s]."""
+        """Return the time driven by a human: each command counts as one step [s]."""
         return sum((self.times_s[piece][-1] - self.times_s[piece][0] + self.dt_s
                     for piece in self.pieces()), 0.0)
 

@@ -30,8 +30,8 @@ class LaneCrossing(NamedTuple):
     """
     Times to lane crossing, (K) each; 0 with a wheel beyond a boundary, inf without a crossing [s].
 
-    :param tlc_s: with speed and yaw rate held.
-    :param linear_s: by distance and speed towards the boundary.
+    :param tlc_s: time at constant speed and yaw rate.
+    :param linear_s: time from the distance to the boundary and the speed towards it.
     """
 
     tlc_s: FloatArray

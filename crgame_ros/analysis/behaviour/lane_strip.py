@@ -101,7 +101,7 @@ def wheels_of(rear: FloatArray, wheelbase: float, width: float) -> FloatArray:
     Return the outer edges of the wheels, at the vehicle's sides: rear left and right, then front.
 
     :param rear: (K, 3) poses of the rear axle.
-    :param width: of the vehicle [m]
+    :param width: width of the vehicle [m]
     :return: (K, 4, 2) [m]
     """
     half = 0.5 * width

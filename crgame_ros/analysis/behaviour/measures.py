@@ -80,8 +80,8 @@ def _reversals(setting: ReversalSetting, load: str) -> BehaviourMeasure:
 
 _STEPS = 'at the scenario steps'
 _EVENT = f'within {USUAL_LIMITS.window_s:g} s, first onset after the event'
-_GAP = (f'first step at which a wheel is beyond the boundary; in the lane is who overlaps it by '
-        f'{IN_LANE:g} m, up to {NEAR:g} m away')
+_GAP = (f'first step at which a wheel is beyond the boundary; others are in the lane if they '
+        f'overlap it by {IN_LANE:g} m, up to {NEAR:g} m away')
 _TAKEN = f'simulated time; a request counts for {LONGEST_WAIT_S:g} s'
 _WHEELS = 'wheels, at the sides of the vehicle'
 

@@ -55,7 +55,7 @@ def reaction_to(event_s: float, controls: DriverControls,
     :param event_s: time at which the event took effect, since the run's start [s]
     """
     times_s = controls.times_s
-    # The first command belongs to the first step: an event at the start lies before it.
+    # The first command belongs to the first step: an event at the start is before it.
     at = max(int(np.searchsorted(times_s, event_s + 1e-9)) - 1, 0)
     if not len(times_s) or abs(times_s[at] - event_s) > 1.5 * controls.dt_s:
         return Reaction(math.nan, math.nan, math.nan)

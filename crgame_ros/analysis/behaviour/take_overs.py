@@ -52,12 +52,12 @@ class TakeOver(NamedTuple):
 
     @property
     def to_hands_on_s(self) -> float:
-        """Time from the request to hands on; NaN where one is missing [s]."""
+        """Return the time from the request to hands on; NaN where one is missing [s]."""
         return math.nan if self.request is None else self.hands_on_s - self.request.time_s
 
     @property
     def to_stable_s(self) -> float:
-        """Time from the request to the first stable second; NaN where one is missing [s]."""
+        """Return the time from the request to the first stable second; NaN if one is missing [s]."""
         return math.nan if self.request is None else self.stable_s - self.request.time_s
 
 

@@ -168,7 +168,7 @@ def detection_scores(events: Sequence[TaskEvent]) -> list[DetectionScore]:
     """
     Score every detection response task of a run, in the order of their beginnings.
 
-    :param events: of the run, from `task_events`.
+    :param events: events of the run, from `task_events`.
     """
     of_kind = [event for event in events if event.kind == 'detection_response']
     return [_score(name, [event for event in of_kind if event.name == name])

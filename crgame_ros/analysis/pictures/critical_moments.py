@@ -79,8 +79,8 @@ def critical_moments(record: RunRecord, criticality: Criticality,
     they fired, the smallest ttc that is not critical, and finally the smallest distance of each
     vehicle. A moment within `TOGETHER_S` of a more critical one becomes part of it, at its time.
 
-    :param criticality: of the same run (`measure_log`).
-    :param contacts: of the run.
+    :param criticality: criticality of the same run (`measure_log`).
+    :param contacts: contacts of the run.
     """
     scheduler = record.log.game.scheduler
     dt_s = scheduler.dt_s

@@ -45,7 +45,7 @@ class FigureRun:
 
     @property
     def name(self) -> str:
-        """The name for files."""
+        """Return the name for files."""
         return re.sub(r'[^\w.-]+', '_', self.label).lstrip('.') or 'run'
 
     @cached_property

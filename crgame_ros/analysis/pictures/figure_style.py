@@ -55,7 +55,7 @@ class VehicleStyle:
 
     :param colour: as #rrggbb.
     :param dashes: line style of matplotlib.
-    :param marker: of matplotlib.
+    :param marker: marker of matplotlib.
     """
 
     colour: str
@@ -76,7 +76,7 @@ def new_figure(columns: int, height: float) -> Figure:
     """
     Build an empty figure that is independent of displays and of other figures.
 
-    :param columns: of the page that it takes, 1 or 2.
+    :param columns: number of page columns for the figure, 1 or 2.
     :param height: [inch]
     """
     figure = Figure(figsize=(WIDTHS[columns], height), layout='constrained')
@@ -89,7 +89,7 @@ def figure_bytes(figure: Figure, file_format: str, resolution: int = RESOLUTION)
     Return the bytes of a figure's file, without a date: equal figures give equal bytes.
 
     :param file_format: one of `FORMATS`.
-    :param resolution: of PNG [dots per inch].
+    :param resolution: resolution of PNG [dots per inch].
     """
     buffer = BytesIO()
     with paper_style():

@@ -30,8 +30,8 @@ def draw_run(record: RunRecord, times_s: Sequence[float]) -> Figure:
     """
     Draw a run over the two columns of a page.
 
-    :param record: of a recording or an offline run.
-    :param times_s: of the frames, since the start of the run [s]
+    :param record: record of a recording or an offline run.
+    :param times_s: times of the frames, since the start of the run [s]
     """
     scene = FrameScene(record.log)
     ks = [scene.k_at(time_s) for time_s in times_s]

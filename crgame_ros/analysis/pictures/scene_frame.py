@@ -148,7 +148,7 @@ class FrameBody:
     :param corners: (C, 2)
     :param front: (3, 2) corners of the mark at its front; empty for a short body.
     :param colour: as #rrggbb.
-    :param is_driven: by a human or a planner.
+    :param is_driven: whether a human or a planner drives it.
     :param is_labelled: whether its id is written beside it.
     """
 

@@ -44,22 +44,22 @@ class TimedRun:
 
     @property
     def scheduled_s(self) -> FloatArray:
-        """Scheduled starts S_n on the original anchor (`docs/timing.md`) (R) [s]."""
+        """Return scheduled starts S_n on the original anchor (`docs/timing.md`) (R) [s]."""
         return np.asarray(self.cycles.column('ideal_s') - self.cycles.column('dropped_s'))
 
     @property
     def actual_s(self) -> FloatArray:
-        """Measured starts tau_n (R) [s]."""
+        """Return measured starts tau_n (R) [s]."""
         return self.cycles.column('actual_s')
 
     @property
     def lags_s(self) -> FloatArray:
-        """Cumulative errors L_n against the original anchor (R) [s]."""
+        """Return cumulative errors L_n against the original anchor (R) [s]."""
         return np.asarray(self.actual_s - self.scheduled_s)
 
     @property
     def step_errors_s(self) -> FloatArray:
-        """Step errors e_n (R - 1) [s], whose sum is the change of the lag."""
+        """Return step errors e_n (R - 1) [s], whose sum is the change of the lag."""
         return np.diff(self.lags_s)
 
 

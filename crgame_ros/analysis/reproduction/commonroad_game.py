@@ -112,7 +112,7 @@ class EvaluationRequest:
     :param reactive: planner that replaces the reactive planner.
     :param is_live: whether the games are recorded live and the timing is measured.
     :param timed_s: wall time of each loop of the timing experiment [s]
-    :param formats: of figures.
+    :param formats: file formats of figures.
     :param say: called with a line of progress, for people.
     """
 

@@ -67,17 +67,17 @@ class Encounter:
 
     @property
     def speeds(self) -> FloatArray:
-        """Speeds of the AV (K) [m/s]."""
+        """Return the speeds of the AV (K) [m/s]."""
         return self.alternative.log.vehicle_states[:, self._place, StateColumn.SPEED]
 
     @property
     def deviation(self) -> float:
-        """The greatest distance of the AV's rear axle from its lane's centre line [m]."""
+        """Return the greatest distance of the AV's rear axle from its lane's centre line [m]."""
         return float(np.abs(self.lane.across[:, self._place]).max())
 
     @property
     def lead(self) -> float:
-        """The AV's lead over the human at the end, between rear axles along the lane [m]."""
+        """Return the AV's lead over the human at the end, by rear axles along the lane [m]."""
         last = self.lane.along[-1]
         return float(last[self._place] - last[0])
 
@@ -93,7 +93,7 @@ class Encounter:
 
     @property
     def contacts(self) -> int | None:
-        """The number of contacts of the AV; None if it is unknown."""
+        """Return the number of contacts of the AV; None if it is unknown."""
         found = self.alternative.contacts
         return None if found is None else sum(
             self.av in (item['vehicle'], item['with']) for item in found)

@@ -44,7 +44,7 @@ class RecordedHuman:
 
     @property
     def duration_s(self) -> float:
-        """The duration on the scenario's time line [s]."""
+        """Return the duration on the scenario's time line [s]."""
         return (len(self.log.ks) - 1) * self.log.game.scheduler.time_step_s
 
     def against(self, planner: str) -> Alternative:

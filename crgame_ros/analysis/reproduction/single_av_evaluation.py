@@ -160,7 +160,7 @@ class MultiAvRun:
     """
     A run of several AVs, and the same game without its human.
 
-    :param run: with the human.
+    :param run: run with the human.
     :param alone: without.
     """
 

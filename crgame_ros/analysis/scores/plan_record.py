@@ -44,7 +44,7 @@ class PlanRecord:
 
     @property
     def accepted_share(self) -> float | None:
-        """The share of answers that were accepted and are no fallback; None without answers."""
+        """Return the share of answers that were accepted and no fallback; None without answers."""
         accepted, plans = self.counts['accepted'], self.counts['plans']
         if accepted is None or not plans:
             return None

@@ -69,17 +69,17 @@ class ScoredDrive:
 
     @property
     def duration_s(self) -> float:
-        """Time from the first step to the last [s]."""
+        """Return the time from the first step to the last [s]."""
         return (len(self.poses) - 1) * self.dt_s
 
     @functools.cached_property
     def rear_axles(self) -> FloatArray:
-        """Poses (K, 3) of the rear axle."""
+        """Return poses (K, 3) of the rear axle."""
         return shifted(self.poses, -self.rear_to_center)
 
     @functools.cached_property
     def outlines(self) -> FloatArray:
-        """Corners (K, C, 2) of the footprint [m]; of a rectangle FL, RL, RR, FR."""
+        """Return corners (K, C, 2) of the footprint [m]; of a rectangle FL, RL, RR, FR."""
         return placed(outline(self.shape), self.poses[:, None, :][:, 0])
 
 

@@ -100,7 +100,7 @@ class ScoredScenario:
 
     @functools.cached_property
     def obstacles(self) -> ScenarioObstacles:
-        """All obstacles, over time."""
+        """Return all obstacles, over time."""
         return ScenarioObstacles(self.loaded)
 
     def course(self, obstacle_id: int) -> FloatArray:

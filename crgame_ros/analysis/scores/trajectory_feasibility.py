@@ -83,7 +83,7 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     If time steps are shorter than `LEAST_STEP_S`, a transition combines enough of them.
 
     :param dt_s: time step [s]
-    :param progress: called with the share asked so far, 0 to 1.
+    :param progress: called with the share checked so far, 0 to 1.
     """
     dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
     if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):

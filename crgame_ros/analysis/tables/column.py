@@ -36,7 +36,7 @@ class Column:
 
     @property
     def kind(self) -> str:
-        """Name of its type in Table Schemas: number, integer, string or boolean."""
+        """Return the name of its type in Table Schemas: number, integer, string or boolean."""
         return {NUMBER: 'number', INTEGER: 'integer', TEXT: 'string',
                 FLAG: 'boolean'}[self.type]
 

@@ -112,7 +112,7 @@ def summarise_command(folder: Path, values: argparse.Namespace) -> int:
     """
     Print the summary of an evaluation, and write its page into the folder.
 
-    :param folder: of the evaluation.
+    :param folder: folder of the evaluation.
     :param values: values of the arguments that `add_summary_arguments` declares.
     :raises InputError: if the evaluation or an argument cannot be used.
     """
