@@ -20,7 +20,7 @@ class RunMeasures(NamedTuple):
     The measures of a run.
 
     :param criticality: criticality of all driven vehicles.
-    :param behaviour: behaviour in each driven vehicle, in the log's order.
+    :param behaviour: how each driven vehicle was driven, in the log's order.
     :param detection: scores of each detection response task.
     """
 

@@ -26,8 +26,8 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
 
     :param seat: id of the agent's vehicle: a human's (hv0, …) or an AV (av0, …).
     :param render_mode: `rgb_array` draws a picture, `human` shows the cockpit's page.
-    :param keywords: those of `make_experiment`: game or scenario, action, observation, reward, ends,
-        duration, ticks, drivers, planners, vary, worlds.
+    :param keywords: those of `make_experiment`: game or scenario, action, observation, reward,
+        ends, duration, ticks, drivers, planners, vary, worlds.
     :raises InputError: if a keyword is wrong.
     """
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recording as `ros2 bag play` does: its bytes, at its pace, and their QoS."""
+"""Plays a recording as `ros2 bag play` does: the same bytes, pace and QoS."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -19,7 +19,7 @@ class BagPlayer:
 
     :param bag: the recording.
     :param domain: of the graph that it is played to.
-    :param without: topics that are not played: those of the nodes that listen.
+    :param without: topics that are not played: those that the listening nodes publish.
     """
 
     def __init__(self, bag: Path, domain: int, without: Collection[str]) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Make what the tests of the live part share importable; the graph that failures happen in."""
+"""Make the shared modules of the live tests importable; the graph for the failure tests."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,7 +27,7 @@ def steady_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
 
 @pytest.fixture
 def run(steady_graph: Run) -> Iterator[Run]:
-    """Begin the game again, at the pace of the clock, and leave nobody frozen behind."""
+    """Begin the game again, at the pace of the clock, and leave no process frozen behind."""
     launcher, peer = steady_graph
     try:
         _begin_again(peer)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A process that shouts what nobody asked for: plans, commands and agents, hundreds of each a second.
+A process that publishes unrequested plans, commands and agents, hundreds of each a second.
 
     python test/live/flood.py SECONDS, in the ROS domain of a graph
 """
@@ -22,7 +22,7 @@ STAMP = Time(sec=1_000_000, nanosec=7)
 
 
 def main() -> None:
-    """Shout."""
+    """Publish the messages."""
     until_s = time.monotonic() + float(sys.argv[1])
     rclpy.init()
     node = rclpy.create_node('flood')

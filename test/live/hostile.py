@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages that somebody sends who means harm, or whose program is broken."""
+"""Messages from a malicious sender or a broken program."""
 
 from array import array
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 # Topic in the contract, vehicle, message or serialised bytes.
 Sent = tuple[str, str, Any]
 NAMES = [f'av0/{joint}' for joint in ('x', 'y', 'yaw', 'steering')]
-# Nothing at all stays in the middleware, which then passes on no more from who sent it.
+# An empty payload stays in the middleware, which then passes on no more from its sender.
 GARBAGE = (b'\x00', b'\x00\x01\x00\x00', b'\xff' * 64, b'\x00\x01\x00\x00' + b'\xff' * 200,
            b'\x00\x01\x00\x00\xff\xff\xff\x7f' + b'a' * 40)
 TEXTS = ('', '{', '[]', 'null', '"x"', '7', '{"a": 1e999}', '[' * 100_000, '\x00', '{"epoch": -1}',
@@ -42,7 +42,7 @@ def trajectory(stamp: Time, names: list[str], points: list[JointTrajectoryPoint]
 
 
 def trajectories(stamp: Time, names: list[str]) -> Iterator[JointTrajectory]:
-    """Make every kind of trajectory that is none."""
+    """Make every kind of invalid trajectory."""
     joints = len(names)
     yield trajectory(stamp, [], [])
     yield trajectory(stamp, names, [])
@@ -66,7 +66,7 @@ def trajectories(stamp: Time, names: list[str]) -> Iterator[JointTrajectory]:
 
 
 def games(text: str) -> Iterator[str]:
-    """Make games that are none from a good one."""
+    """Make invalid games from a valid one."""
     for change in (
             {'humans': [{}]}, {'humans': None}, {'avs': 7}, {'dt_c_ns': 0}, {'dt_c_ns': -10},
             {'steps_per_tick': 0}, {'epoch': 'x'}, {'timing': {'rate': 'fast', 'more': 1}},
@@ -85,7 +85,7 @@ def games(text: str) -> Iterator[str]:
 
 
 def code(text: str, path: str) -> str:
-    """Name code in a game that is good otherwise."""
+    """Name code in a game that is valid otherwise."""
     game = json.loads(text)
     game['avs'][0]['planner'] = f'{path}:Planner'
     return json.dumps(game)

@@ -27,7 +27,7 @@ from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 QUEUE_DEPTH = 5000
-# Whoever waits asks for the games a hundred times a second.
+# A test that waits asks for the games a hundred times a second.
 _parsed = lru_cache(parse_game_document)
 
 
@@ -52,7 +52,7 @@ class Peer:
                        for name, vehicle in pairs}
 
     def listen(self) -> None:
-        """Take what has come."""
+        """Receive the waiting messages."""
         self._executor.spin_once(timeout_sec=0.01)
         for name, slot in self._slots.items():
             while (message := slot.pop()) is not None:
@@ -74,13 +74,13 @@ class Peer:
             self.listen()
 
     def publisher(self, name: str, vehicle_id: str = '') -> Publisher:
-        """Return a publisher that somebody listens to."""
+        """Return a publisher that has a subscriber."""
         publisher = self._endpoints.publisher(name, vehicle_id)
         self.wait_until(publisher.get_subscription_count, f'a subscriber of {name}')
         return publisher
 
     def call(self, service: str) -> Trigger.Response:
-        """Call a service of the simulation and give its answer."""
+        """Call a service of the simulation and return its answer."""
         client = self.node.create_client(Trigger, service)
         self.wait_until(client.service_is_ready, f'the service {service}')
         future = client.call_async(Trigger.Request())
@@ -89,7 +89,7 @@ class Peer:
         return future.result()
 
     def set_parameter(self, name: str, value: Any) -> SetParametersResult:
-        """Set a parameter of the simulation and give what it says to that."""
+        """Set a parameter of the simulation and return its answer."""
         client = self.node.create_client(SetParameters, '/sim_node/set_parameters')
         self.wait_until(client.service_is_ready, 'the parameters of sim_node')
         message = Parameter(name, value=value).to_parameter_msg()
@@ -100,12 +100,12 @@ class Peer:
 
     @property
     def clock_ns(self) -> list[int]:
-        """Every time on /clock so far [ns]."""
+        """All times on /clock so far [ns]."""
         return [from_time(message.clock) for message in self.messages['/clock']]
 
     @property
     def games(self) -> list[GameDocument]:
-        """Every game document so far."""
+        """All game documents so far."""
         return [_parsed(message.data) for message in self.messages['/scenario/game']]
 
     @property
@@ -142,7 +142,7 @@ class Peer:
                 if status.name == name]
 
     def forget(self) -> None:
-        """Forget everything heard but what is said once and then holds."""
+        """Forget all messages but those that are sent once and then hold."""
         self.listen()
         for name, messages in self.messages.items():
             if not name.startswith('/scenario/') and name != '/seats':

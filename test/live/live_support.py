@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A graph of real processes under the launcher, and what the tests of the live part share."""
+"""A graph of real processes under the launcher, and shared helpers of the live tests."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -23,13 +23,13 @@ SCENARIOS = ROOT / 'scenarios'
 CUT_IN = SCENARIOS / 'cut_in.yaml'
 # As the kernel names their processes, in 15 characters.
 NODES = {path.stem[:15] for path in (ROOT / 'crgame_ros' / 'nodes').glob('*_node.py')}
-# How long to wait for what will come [s]: many times what an idle machine takes.
+# How long to wait for an expected event [s]: many times what an idle machine takes.
 PATIENCE_S = 90.0
 _STARTED = re.compile(r'(\w+): process (\d+)')
 
 
 def wait_until(condition: Callable[[], object], what: str, limit_s: float = PATIENCE_S) -> None:
-    """Look at a condition until it holds; fail, naming it, if it never does."""
+    """Check a condition until it holds; fail, naming it, if it never does."""
     until_s = time.monotonic() + limit_s
     while not condition():
         assert time.monotonic() < until_s, f'waited {limit_s:g} s in vain for {what}'
@@ -96,7 +96,7 @@ class Launcher:
 
     @property
     def text(self) -> str:
-        """Everything said so far."""
+        """All output so far."""
         return '\n'.join(self.lines)
 
     @property
@@ -141,11 +141,11 @@ class Launcher:
         wait_until(lambda: _state(pid) == 'T', f'{name} to stand')
 
     def thaw(self, name: str) -> None:
-        """Let a frozen node go on."""
+        """Resume a frozen node."""
         os.kill(self.node(name), signal.SIGCONT)
 
     def tell_where(self) -> None:
-        """Let every node say what its threads are at, for whoever reads why a test failed."""
+        """Make every node print the stacks of its threads, to explain why a test failed."""
         for name, pid in dict(self.started).items():
             if is_node(pid) and _state(pid) != 'T':
                 print(f'{name}: where it is:')
@@ -158,14 +158,14 @@ class Launcher:
                    f'another start of {name}')
 
     def wait(self) -> int:
-        """Wait for the launcher's end and give its exit code."""
+        """Wait for the launcher's end and return its exit code."""
         wait_until(lambda: self._process.poll() is not None, f'the end of\n{self.text}')
         for reader in self._readers:
             reader.join(10.0)
         return self._process.wait()
 
     def close(self) -> None:
-        """End what still runs of it."""
+        """End its processes that still run."""
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait()

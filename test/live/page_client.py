@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A client of the cockpit that is no browser: what a page sends and gets, over its WebSocket."""
+"""A client of the cockpit without a browser: it sends and gets what a page does, by WebSocket."""
 
 import json
 import threading
@@ -78,7 +78,7 @@ class PageClient:
             self.closed = True
 
     def request(self, kind: str, **fields: Any) -> dict[str, Any]:
-        """Send a request and give the reply to it."""
+        """Send a request and return the reply to it."""
         self._next_id += 1
         number = self._next_id
         self.send({'type': kind, 'id': number, **fields})
@@ -96,7 +96,7 @@ class PageClient:
         self._held = {'type': 'input', 'seat': seat, 'keys': keys, 'reverse': 0}
 
     def let_go(self) -> None:
-        """Send nothing any more."""
+        """Stop sending."""
         self._held = None
 
     def seat(self, name: str) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A game in which the human holds the pedal and the AV drives on: the ground for failures."""
+"""A game for the failure tests: the human holds the pedal and the AV drives on."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -44,12 +44,12 @@ class Run(NamedTuple):
         self.peer.wait_until(lambda: self.peer.n >= last, f'n = {last}')
 
     def counters(self) -> dict[str, str]:
-        """Return what sim_node said last of the plans of av0."""
+        """Return what sim_node reported last about the plans of av0."""
         return self.peer.statuses('sim_node: av0 plans')[-1][1]
 
 
 def write_steady_game(folder: Path) -> Path:
-    """Write the game and its timeline into a folder, and give the game file."""
+    """Write the game and its timeline into a folder, and return the game file."""
     (folder / 'steady.joy.yaml').write_text(TIMELINE)
     (folder / 'steady.yaml').write_text(GAME)
     return folder / 'steady.yaml'

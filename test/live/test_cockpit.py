@@ -49,7 +49,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
 
 
 def free_port() -> int:
-    """Find a port that nobody uses now."""
+    """Find a port that is free now."""
     with socket.socket() as probe:
         probe.bind(('127.0.0.1', 0))
         return int(probe.getsockname()[1])
@@ -57,7 +57,7 @@ def free_port() -> int:
 
 @pytest.fixture
 def page(graph: Graph) -> Iterator[PageClient]:
-    """Open a client; give back what it holds at the end."""
+    """Open a client; release its seats at the end."""
     with PageClient(graph.page) as client:
         yield client
         client.let_go()
@@ -72,7 +72,7 @@ def _commands(graph: Graph) -> np.ndarray:
 
 
 def test_frames_carry_the_published_poses(graph: Graph, page: PageClient) -> None:
-    """Bit for bit, and under the right step."""
+    """They agree bit for bit, under the right step."""
     graph.peer.forget()
     page.frames.clear()
     graph.peer.wait_until(lambda: len(page.frames) > 60, 'frames')
@@ -155,7 +155,7 @@ def test_silence_lets_go_too(graph: Graph, page: PageClient) -> None:
 
 @pytest.mark.clock
 def test_hands_off_is_immediate(graph: Graph, page: PageClient) -> None:
-    """What a page sends at blur: the next cycle that hears it has the pedals released."""
+    """A page sends hands off at blur: the next cycle that gets it has the pedals released."""
     assert page.request('claim', seat='hv0')['ok']
     page.hold_keys('hv0', [1, 0, 1, 0])
     graph.peer.forget()
@@ -167,12 +167,12 @@ def test_hands_off_is_immediate(graph: Graph, page: PageClient) -> None:
     graph.peer.wait_until(lambda: _commands(graph)[-1, 0] == 0.0, 'the throttle released', 10.0)
     rows = _commands(graph)
     released = int(np.flatnonzero(rows[:, 0] > 0.0)[-1]) + 1
-    # From the whole pedal to nothing in one cycle, the steering with it: no ramp.
+    # The pedal goes from full to zero in one cycle, and the steering with it: no ramp.
     assert rows[released - 1, 0] > 0.9 and rows[released, 2] == 0.0
 
 
 def test_a_seat_changes_hands(graph: Graph, page: PageClient) -> None:
-    """Claimed by one, refused to the other, asked for, handed over, given back."""
+    """A seat is claimed by one page, refused to the other, asked for, handed over, given back."""
     with PageClient(graph.page) as other:
         other.send({'type': 'name', 'name': 'Bob <i>'})
         assert page.request('claim', seat='hv0')['ok']
@@ -187,7 +187,7 @@ def test_a_seat_changes_hands(graph: Graph, page: PageClient) -> None:
         assert page.seat('hv0')['holder'] == page.id
         assert other.request('answer', seat='hv0', accept=True)['ok']
         wait_until(lambda: page.seat('hv0')['holder'] == other.id, 'the new holder')
-        # Input of the one who has handed over is ignored.
+        # Input of the page that has handed over is ignored.
         other.hold_keys('hv0', [0, 1, 0, 0])
         page.hold_keys('hv0', [1, 0, 0, 0])
         graph.peer.forget()
@@ -202,7 +202,7 @@ def test_a_seat_changes_hands(graph: Graph, page: PageClient) -> None:
 
 
 def test_run_control(graph: Graph, page: PageClient) -> None:
-    """Pause, step by one tick, another pace, a reset: all through the page."""
+    """The page can pause, step by one tick, set another pace and reset."""
     assert page.request('control', action='pause')['ok']
     wait_until(lambda: page.documents['status']['run'] == 'paused', 'the pause')
     before = page.documents['status']['n']
@@ -222,7 +222,7 @@ def test_run_control(graph: Graph, page: PageClient) -> None:
 
 @pytest.mark.exhaustive
 def test_planner_stop_and_go(graph: Graph, page: PageClient) -> None:
-    """The AV's row says so, and its plans stop coming."""
+    """The AV's row shows that its planner is stopped, and its plans stop coming."""
     assert page.request('planner', av='av0', run=False)['ok']
     wait_until(lambda: _planner(page).get('running') is False, 'the stop')
     assert page.request('planner', av='av0', run=True)['ok']
@@ -250,7 +250,7 @@ def test_trigger(graph: Graph, page: PageClient) -> None:
 
 @pytest.mark.exhaustive
 def test_another_game_with_more_vehicles(graph: Graph, page: PageClient) -> None:
-    """Chosen from the list: reset into it, its second AV gets a planner of its own."""
+    """A game chosen from the list begins by a reset; its second AV gets a planner of its own."""
     with urllib.request.urlopen(f'{graph.page}api/scenarios', timeout=10) as answer:
         content = json.load(answer)
     entries = [entry for folder in content['folders'] for entry in folder['entries']]
@@ -286,7 +286,7 @@ def _post(url: str, content: dict) -> dict:
 
 @pytest.mark.exhaustive
 def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
-    """Killed outright: the run keeps its pace, a new one comes back at once."""
+    """After a kill the run keeps its pace, and a new cockpit starts at once."""
     with PageClient(graph.page) as client:
         assert client.request('claim', seat='hv0')['ok']
         client.hold_keys('hv0', [1, 0, 0, 0])
@@ -301,10 +301,10 @@ def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
     wait_until(lambda: sum('the cockpit is at' in line for line in graph.launcher.lines) > 1,
                'the address of the new one')
     with PageClient(graph.launcher.page) as client:
-        # It hears of the graph's seats a moment after it serves.
+        # It gets the graph's seats a moment after it begins to serve.
         wait_until(lambda: 'hv0' in client.documents.get('seats', {}).get('seats', {}),
                    'the seats')
-        # The seat is kept for who had it at the dead one; here everybody is a director.
+        # The seat is kept for the client that had it at the dead cockpit; here all are directors.
         wait_until(lambda: client.seat('hv0')['source'] == 'cockpit'
                    and client.seat('hv0')['holder'] is None, 'the empty seat')
         assert client.seat('hv0')['kept']['name'].startswith('Guest')
@@ -314,7 +314,7 @@ def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
 
 @pytest.mark.exhaustive
 def test_the_next_port_is_taken_when_one_is_in_use(tmp_path: Path) -> None:
-    """And said so; somebody must be in the seat before a `cockpit` driver's run begins."""
+    """The launcher says so; the seat must be taken before a `cockpit` driver's run begins."""
     with socket.socket() as taken:
         taken.bind(('127.0.0.1', 0))
         taken.listen()

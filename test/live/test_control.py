@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pause, step, reset, pace, another scenario and stop: the orders that a running graph takes."""
+"""Orders that a running graph obeys: pause, step, reset, pace, another scenario and stop."""
 
 from collections.abc import Iterator
 import time
@@ -21,7 +21,7 @@ TOPICS = ('/clock', '/scenario/game', '/scenario/xml', '/scenario/objects', '/se
           '/timing/cycle', '/vehicles/state', '/diagnostics', ('/<v>/driver_command', 'hv0'),
           ('/<av>/plan', 'av0'), ('/<av>/plan_request', 'av0'))
 OTHER_SCENARIO = 'ZAM_Roundabout-1_1_T-1.xml'
-# So long nothing may happen during a pause [s]; ten ticks would fit into it.
+# For this long nothing may happen during a pause [s]; ten ticks would fit into it.
 QUIET_S = 1.0
 
 
@@ -44,7 +44,7 @@ def _reset(peer: Peer) -> None:
 
 @pytest.fixture
 def peer(graph: tuple[Launcher, Peer]) -> Iterator[Peer]:
-    """Leave the game running at its pace."""
+    """Return a peer of the game, and leave the game running at its pace."""
     peer = graph[1]
     yield peer
     assert peer.call('/sim/start').success
@@ -59,7 +59,7 @@ def _anew(peer: Peer) -> None:
 
 
 def _counts(peer: Peer) -> dict[str, int]:
-    """Count the messages by topic, but for the reports by which nodes say that they live."""
+    """Count the messages by topic, without the nodes' reports that they are alive."""
     return {name: len(messages) for name, messages in peer.messages.items()
             if name != '/diagnostics'}
 
@@ -83,7 +83,7 @@ def test_pause_freezes_everything_and_step_advances_one_tick(peer: Peer) -> None
         peer.wait_until(lambda goal=goal: peer.n >= goal, f'n = {goal}')
         peer.listen_for(0.3)
         assert peer.n == goal
-        # Each such stretch has one tick, at which the planner is asked.
+        # Each scenario step has one tick, at which the planner is asked.
         assert len(peer.messages['/<av>/plan_request']) == before['/<av>/plan_request'] + steps
     assert peer.call('/sim/start').success
     peer.wait_until(lambda: peer.n > goal + 20, 'the run going on')
@@ -93,7 +93,7 @@ def test_pause_freezes_everything_and_step_advances_one_tick(peer: Peer) -> None
     # A pause counts neither as lag nor as a long interval: Delta t_max is 50 ms.
     assert cycles.column('dt_eff_s').max() <= 0.05
     assert np.array_equal(cycles.column('resets'), np.zeros(len(numbers)))
-    # CRG's keyboard filter moves by about 2 in a second: in the pause it stood.
+    # CRG's keyboard filter moves by about 2 in a second: it did not move in the pause.
     throttle = cycles.commands('hv0')[:, 0]
     assert abs(throttle[paused_n] - throttle[paused_n - 1]) < 0.1
     assert peer.statuses('sim_node: hv0 seat')[-1][1]['losses'] == '0'
@@ -121,7 +121,7 @@ def test_reset_begins_a_new_epoch_and_bag(graph: tuple[Launcher, Peer], peer: Pe
               for game in (first, second)]
     assert np.array_equal(*starts)
     launcher.wait_for(rf'recording into .*/run_{epoch + 2}/bag$')
-    # The bag of the epoch before is finished, and holds every cycle of it and no other's.
+    # The bag of the epoch before is finished, and holds all cycles of that epoch only.
     bag = run_folder(launcher.out, epoch) / 'bag'
     with BagReader(bag) as reader:
         assert reader.complete
@@ -154,7 +154,7 @@ def test_messages_of_an_earlier_epoch_are_refused(peer: Peer) -> None:
     peer.wait_until(lambda: counted(refused) and counted(seat), 'both refusals')
     assert f'{from_time(plan.header.stamp)} ns answers no request' \
         in peer.statuses(refused)[-1][0].message
-    # Only with a stamp of this epoch is full braking obeyed: the same message, and it works.
+    # The same message with a stamp of this epoch works: full braking is obeyed.
     assert peer.cycles().commands('hv0')[:, 1].max() == 0.0
     command.header.stamp = to_time(offset_ns)
 
@@ -174,7 +174,7 @@ def test_pace_of_the_clock_follows_the_real_time_factor(peer: Peer, factor: floa
     peer.wait_until(lambda n=peer.n: peer.n > n + 10, 'the new pace')
     wall_s, first = time.monotonic(), peer.n
     peer.wait_until(lambda: peer.n >= first + 100 * factor, 'a second')
-    # What a long stall of the machine takes is dropped: another factor would still be told apart.
+    # Long stalls of the machine are left out: another factor would still be told apart.
     simulated_s = (peer.n - first) * 0.01
     assert simulated_s / (time.monotonic() - wall_s) == pytest.approx(factor, rel=0.3)
     # By the cycles' own measure the schedule was kept: its steps are dt / factor apart.
@@ -185,7 +185,7 @@ def test_pace_of_the_clock_follows_the_real_time_factor(peer: Peer, factor: floa
 
 def test_another_scenario_is_taken_at_the_next_reset(graph: tuple[Launcher, Peer],
                                                      peer: Peer) -> None:
-    """The same processes go on with it: the planner sets up anew and its plans are followed."""
+    """The same processes continue: the planner is set up anew and its plans are followed."""
     launcher, _ = graph
     started = launcher.started
     assert peer.set_parameter('scenario', OTHER_SCENARIO).successful
@@ -208,7 +208,7 @@ def test_another_scenario_is_taken_at_the_next_reset(graph: tuple[Launcher, Peer
 @pytest.mark.parametrize('name', ['/etc/hostname', '../pyproject.toml', '../../etc/passwd',
                                   'no_such.xml'])
 def test_files_outside_the_directories_are_refused(peer: Peer, name: str) -> None:
-    """A peer can't make the simulation open any file: not by path, nor by climbing out."""
+    """A peer can't make the simulation open any file: not by path, and not by `..`."""
     result = peer.set_parameter('scenario', name)
     assert not result.successful
     assert 'in none of the configured directories' in result.reason
@@ -218,7 +218,7 @@ def test_files_outside_the_directories_are_refused(peer: Peer, name: str) -> Non
 @pytest.mark.usefixtures('_anew')
 def test_malformed_scenario_leaves_the_present_game(graph: tuple[Launcher, Peer],
                                                     peer: Peer) -> None:
-    """It is named with an error, and the game that ran begins again."""
+    """An error names it, and the game that ran begins again."""
     launcher, _ = graph
     text = (SCENARIOS / OTHER_SCENARIO).read_text()
     broken = launcher.out / 'broken.xml'
@@ -234,8 +234,8 @@ def test_malformed_scenario_leaves_the_present_game(graph: tuple[Launcher, Peer]
     broken.unlink()
 
 
-def test_who_comes_in_a_pause_sees_the_world(graph: tuple[Launcher, Peer], peer: Peer) -> None:
-    """The states are sent again to a newcomer, as they are; nobody's time passes."""
+def test_newcomer_in_a_pause_sees_the_world(graph: tuple[Launcher, Peer], peer: Peer) -> None:
+    """The states are sent again to a newcomer, unchanged; no time passes."""
     assert peer.call('/sim/pause').success
     peer.listen_for(0.3)
     paused_n, ticks = peer.n, len(peer.messages['/clock'])

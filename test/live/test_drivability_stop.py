@@ -43,7 +43,7 @@ def _told(bag: Path) -> dict[str, int]:
 
 
 def test_live_and_offline_end_at_the_violation(tmp_path: Path) -> None:
-    """The last cycle of the recording is n of the violation, and so is offline the last state."""
+    """The recording's last cycle and the last state offline are at step n of the violation."""
     game = _game(tmp_path)
     with Launcher([game, '--real-time-factor', SLOW], tmp_path / 'run') as launcher:
         assert launcher.wait() == 0, launcher.text
@@ -56,5 +56,5 @@ def test_live_and_offline_end_at_the_violation(tmp_path: Path) -> None:
     again = run_offline(setup, drivers=drivers, intervals_s=intervals_s)
     assert again.stop is not None
     assert again.stop.n == told['violation_n'] == told['stop_n'] == len(again.vehicle_states) - 1
-    # It is no coincidence with a scenario step, at which alone orders of other kinds are taken.
+    # It is not at a scenario step: orders of other kinds are obeyed only at scenario steps.
     assert told['stop_n'] % 10 != 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""However a run ends, its files are there and nobody is left behind."""
+"""However a run ends, its files are there and no process is left behind."""
 
 from collections.abc import Callable
 import os
@@ -95,7 +95,7 @@ def _says(pattern: str) -> Callable[[subprocess.Popen[str], list[str]], bool]:
 def test_ctrl_c_during_the_start_is_a_line_and_no_traceback(
         moment: Callable[[subprocess.Popen[str], list[str]], bool], early: bool,
         tmp_path: Path) -> None:
-    """As run.sh starts it, with everybody at the terminal getting the signal."""
+    """The run is started as by run.sh; all processes at the terminal get the signal."""
     line = (ROOT / 'run.sh').read_text().splitlines()[-1]
     words = [{'$CRGAME_PYTHON': sys.executable}.get(word, word) for word in shlex.split(line)]
     assert words[0] == 'exec' and words[-1] == '$@'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Perception and reactive traffic in their own processes: as offline, and when they fail."""
+"""Perception and reactive traffic in their own processes: as offline, and after failures."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -82,9 +82,9 @@ def stage(graph: tuple[Launcher, Peer]) -> Iterator[Stage]:
 
 def test_trigger_releases_the_pedestrian(stage: Stage) -> None:
     """
-    He stands until then, and walks at 1.4 m/s from the published tick on.
+    The pedestrian stands until then, and walks at 1.4 m/s from the published tick on.
 
-    What fired is told as a whole, after an empty list at the start of the epoch.
+    The list of fired events is published whole, and empty at the start of the epoch.
     """
     peer = stage.peer
     assert stage.fired == ()
@@ -109,7 +109,7 @@ def test_trigger_releases_the_pedestrian(stage: Stage) -> None:
 
 
 def test_refusals_are_told(stage: Stage) -> None:
-    """An unknown name, and an event that has had its turn; the run goes on."""
+    """An unknown name and an event that has already fired are refused; the run goes on."""
     peer = stage.peer
     stage.press('hide-plan')
     for name in ('fly', 'hide-plan'):
@@ -127,9 +127,9 @@ def test_refusals_are_told(stage: Stage) -> None:
 @pytest.mark.exhaustive
 def test_planner_changes_and_comes_back_the_same_when_restarted(stage: Stage) -> None:
     """
-    Another planner and another limit; after its death the node is as it was before.
+    Planner and limit change; a restarted node has the same planner and limit.
 
-    Nothing but /scenario/events tells it: the events lie in the past when it starts.
+    It knows them from /scenario/events alone: the events lie in the past when it starts.
     """
     peer = stage.peer
     swapped, limited = (stage.said_by_planner(text) for text in (
@@ -151,7 +151,7 @@ def test_planner_changes_and_comes_back_the_same_when_restarted(stage: Stage) ->
 
 @pytest.mark.exhaustive
 def test_stopped_planner_is_asked_for_nothing(stage: Stage) -> None:
-    """No request after the tick of the event, until another event lets it go on."""
+    """It gets no request after the tick of the event, until another event resumes it."""
     peer = stage.peer
     stage.press('planner-stops')
     stopped = stage.fired[0].n

@@ -20,14 +20,14 @@ RELEASE_RATE, GENTLE_BRAKE, SILENCE_S = 2.2, 0.15, 0.2
 
 
 def _check_loss(cycles: CycleTable, last_n: int) -> None:
-    """Check how a seat lets go: after 0.2 s, at the release rate, then the gentle brake."""
+    """Check how a seat releases: after 0.2 s, at the release rate, then the gentle brake."""
     numbers, actual = cycles.column('n'), cycles.column('actual_s')
     throttle, brake, steering = cycles.commands('hv0')[:, :3].T
     falling = int(np.flatnonzero(throttle < THROTTLE)[0])
     heard = int(np.flatnonzero(numbers == last_n)[0])
-    # The cycle may have begun a little before it was due: what it knows of time is a step long.
+    # The cycle may have begun a little before it was due: its time has a resolution of one step.
     assert actual[falling] - actual[heard] > SILENCE_S - STEP_NS / 1e9
-    # A command may take a while on a busy machine; it never counts for twice the silence more.
+    # A command may be late on a busy machine; it counts at most twice the silence longer.
     assert actual[falling - 1] - actual[heard] < 3 * SILENCE_S
     assert np.all(throttle[heard:falling] == THROTTLE)
     released = falling + int(np.flatnonzero(throttle[falling:] == 0.0)[0])
@@ -42,7 +42,7 @@ def _check_loss(cycles: CycleTable, last_n: int) -> None:
 
 @pytest.mark.clock
 def test_seat_lets_go_while_the_driver_is_frozen(run: Run) -> None:
-    """0.2 s of silence: the pedal is released, then braked gently; the driver then continues."""
+    """After 0.2 s of silence the pedal is released, then braked gently; the driver continues."""
     launcher, peer = run
     run.wait_for_steps(5)
     launcher.freeze('driver_node_hv0')
@@ -65,7 +65,7 @@ def test_seat_lets_go_while_the_driver_is_frozen(run: Run) -> None:
 
 
 def test_killed_driver_is_started_again_and_drives(run: Run) -> None:
-    """The seat lets go meanwhile; the successor continues where the timeline is by then."""
+    """The seat releases meanwhile; the successor continues where the timeline is by then."""
     launcher, peer = run
     starts = len(launcher.started)
     launcher.kill('driver_node_hv0')
@@ -102,8 +102,8 @@ def _computed_s(pid: int) -> float:
 
 
 @pytest.mark.exhaustive
-def test_who_takes_the_place_of_the_dead_has_everything_loaded(run: Run) -> None:
-    """Twice in a row, and of any node: it works after less computing than imports alone take."""
+def test_replacement_has_everything_loaded(run: Run) -> None:
+    """Any node, twice in a row: its replacement works after less computing than imports take."""
     launcher, peer = run
     for name, topic in (('planner_node_av0', '/<av>/plan'), ('planner_node_av0', '/<av>/plan'),
                         ('drivability_node', '/<v>/drivability')):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""No message of anybody ends a process, owns a run, or costs its files."""
+"""No message ends a process, takes over a run, or costs its files."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -75,12 +75,12 @@ class Sender:
         self._publishers: dict[tuple[str, str], Publisher] = {}
 
     def meet(self, topics: Iterable[tuple[str, str]]) -> None:
-        """Wait until whoever reads one of these topics hears this sender."""
+        """Wait until all subscribers of these topics hear this sender."""
         new = dict.fromkeys(topic for topic in topics if topic not in self._publishers)
         for topic, vehicle in new:
             self._publishers[topic, vehicle] = self._peer.publisher(topic, vehicle)
         if new:
-            # The first who listens may be the test itself: the others are to hear it, too.
+            # The first subscriber may be the test itself: the others must hear it, too.
             self._peer.listen_for(0.5)
 
     def send(self, topic: str, vehicle: str, message: object) -> None:
@@ -91,13 +91,13 @@ class Sender:
             self._publishers[topic, vehicle].publish(message)
 
     def close(self) -> None:
-        """Take the publishers away: what they latched is gone."""
+        """Remove the publishers, and with them their latched messages."""
         for publisher in self._publishers.values():
             self._peer.node.destroy_publisher(publisher)
 
 
 def _whole(run: Run, pids: dict[str, int]) -> None:
-    """Check that the nodes that were there are there, and that the run goes on."""
+    """Check that no node has ended, and that the run goes on."""
     launcher, peer = run
     assert dict(launcher.started) == pids, 'a node was started again'
     assert [name for name, pid in pids.items() if not is_node(pid)] == []
@@ -111,7 +111,7 @@ def _whole(run: Run, pids: dict[str, int]) -> None:
 
 @pytest.mark.exhaustive
 def test_no_message_ends_a_node_or_the_run(run: Run) -> None:
-    """More than 300 of them on 24 topics: refused and counted, and everybody drives on."""
+    """More than 300 messages on 24 topics are refused and counted; all vehicles drive on."""
     launcher, peer = run
     pids, sender, sent = dict(launcher.started), Sender(peer), 0
     names = [list(peer.messages[topic][-1].joint_names) for topic in (
@@ -134,7 +134,7 @@ def test_no_message_ends_a_node_or_the_run(run: Run) -> None:
 
 
 def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path) -> None:
-    """Documents that are none are told and dropped; code that they name is not imported."""
+    """Invalid documents are reported and dropped; code that they name is not imported."""
     launcher, peer = run
     pids, sender = dict(launcher.started), Sender(peer)
     good = peer.messages['/scenario/game'][-1].data
@@ -142,7 +142,7 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
     (tmp_path / 'planner.py').write_text(PROOF.format(path=str(proof)))
     sender.meet((topic, '') for topic in (
         '/scenario/xml', '/scenario/objects', '/scenario/game'))
-    # What the test before has sent of these is forgotten at the next reset; here at once.
+    # Forget the documents that the test before has sent now, instead of at the next reset.
     for topic in ('/scenario/xml', '/scenario/objects'):
         sender.send(topic, '', peer.messages[topic][0])
     for text in games(good):
@@ -154,7 +154,7 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
     sender.send('/scenario/game', '', String(data=good))
     peer.listen_for(1.0)
     sender.close()
-    # The test's own node has read all that, too.
+    # The test's own node has received all these messages, too.
     peer.messages['/scenario/game'][:] = [String(data=good)]
     _whole(run, pids)
 
@@ -162,9 +162,9 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
 @pytest.mark.clock
 def test_a_flood_takes_nobodys_place(run: Run) -> None:
     """
-    Hundreds of strangers' plans, agents and commands a second: everybody's own arrive.
+    Under hundreds of foreign plans, agents and commands a second the real ones arrive.
 
-    Nine of ten: the machine has the flood to carry, too.
+    Nine of ten must: the flood costs the machine time, too.
     """
     launcher, peer = run
     pids = dict(launcher.started)
@@ -199,7 +199,7 @@ def test_a_flood_takes_nobodys_place(run: Run) -> None:
 
 @pytest.mark.exhaustive
 def test_the_run_has_its_files(run: Run) -> None:
-    """After all that: bag, scenario, timing and game."""
+    """After these attacks the bag, scenario, timing and game are there."""
     launcher, peer = run
     assert peer.n > 500
     time.sleep(1.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What makes the running simulation late is told by its cause, in the recording and after it."""
+"""The causes of late steps are reported, in the recording and after the run."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,14 +23,14 @@ from steady_game import write_steady_game
 
 pytestmark = pytest.mark.clock
 STOPPED_S = 0.15
-# So many names take sim_node some tens of milliseconds to answer.
+# sim_node takes some tens of milliseconds to answer for so many names.
 NAMES = 15_000
 HOG = 'import os\nwhile os.getppid() > 1: pass'
 
 
 @contextmanager
 def kept_busy(pid: int) -> Iterator[None]:
-    """Keep the only processor that a process may use busy, with others who go before it."""
+    """Keep the only processor of a process busy with processes of higher priority."""
     processor = {min(os.sched_getaffinity(pid))}
     for task in Path(f'/proc/{pid}/task').iterdir():
         os.sched_setaffinity(int(task.name), processor)
@@ -64,7 +64,7 @@ def published_ns(slot: PolledSubscription) -> dict[int, int]:
 
 
 def test_late_steps_of_a_run_are_told_with_their_causes(tmp_path: Path) -> None:
-    """Stopped by a signal, asked for much, and without a processor, one after the other."""
+    """Three causes in turn: a stop by a signal, a long service call, and no processor."""
     with Launcher([write_steady_game(tmp_path), '--duration', 6], tmp_path / 'run') as launcher, \
             Peer(launcher.domain, '/diagnostics', '/clock') as peer:
         endpoints = Endpoints(peer.node)
@@ -81,7 +81,7 @@ def test_late_steps_of_a_run_are_told_with_their_causes(tmp_path: Path) -> None:
         peer.listen()
         shown_ns, asked_ns = published_ns(odometry), published_ns(requests)
         assert 'ms late at' in peer.statuses('timesync_node: table I')[-1][1]['worst_late_step']
-    # A driver sees what the step has made of the command before planners are asked anything.
+    # A driver sees the result of its command before planners are asked anything.
     both = shown_ns.keys() & asked_ns.keys()
     assert len(both) > 20 and all(shown_ns[stamp] < asked_ns[stamp] for stamp in both)
     cycles = read_cycles(tmp_path / 'run' / 'bag')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The sockets of a running graph: none that takes anything from another machine."""
+"""The sockets of a running graph: none receives anything from another machine."""
 
 from collections.abc import Iterator
 import os
@@ -27,7 +27,7 @@ class Endpoint(NamedTuple):
 
     @property
     def on_loopback(self) -> bool:
-        """Whether only this machine can reach it."""
+        """Return whether only this machine can reach it."""
         return self.address.startswith('127.') or self.address == '::1'
 
 
@@ -69,8 +69,8 @@ def test_every_receiving_socket_is_on_loopback(graph: Launcher) -> None:
     Sockets are on 127.0.0.1, but for those that DDS sends from and never reads.
 
     Such a socket is a UDP one with a port that the system chose: one without an address and one
-    for each interface, to send from. That they take nothing in is proven: what is sent to them
-    stays unread for the life of the process, while what is sent to the others is read.
+    for each interface, to send from. The test proves that they receive nothing: data sent to
+    them stays unread for the life of the process, while data sent to the others is read.
     """
     lowest = int(Path('/proc/sys/net/ipv4/ip_local_port_range').read_text().split()[0])
     domain = range(PORT_BASE + PORTS_PER_DOMAIN * graph.domain,
@@ -96,7 +96,7 @@ def test_every_receiving_socket_is_on_loopback(graph: Launcher) -> None:
             for item in sockets_of(pid):
                 if not item.on_loopback:
                     assert item.unread >= len(DATAGRAM), f'{name} reads {item}'
-            # Others speak to them too: at one moment or another nothing is left.
+            # Other senders use them too: at some moment nothing is left.
             waiting = {item.port for item in sockets_of(pid)
                        if item.on_loopback and item.port in domain}
 
@@ -120,5 +120,5 @@ def test_nothing_answers_at_the_outer_addresses(graph: Launcher) -> None:
     assert ports
     for port in ports:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            # It would be in use if anybody were bound to it there or on 0.0.0.0.
+            # It would be in use if a socket were bound to it there or on 0.0.0.0.
             free.bind((outer, port))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two graphs in one ROS domain: apart in namespaces, refused in the same one."""
+"""Two graphs in one ROS domain: separate in two namespaces, refused in the same one."""
 
 import json
 import os
@@ -17,7 +17,7 @@ SECONDS = 5
 
 
 def _finished(launcher: Launcher) -> None:
-    """Check that a run has all its cycles, and nobody else's."""
+    """Check that a run has all its cycles, and none of another run."""
     assert launcher.wait() == 0, launcher.text
     timing = json.loads((launcher.out / 'timing.json').read_text())
     assert timing['cycles'] == SECONDS * 100 and timing['gaps'] == 0
@@ -38,7 +38,7 @@ def test_two_graphs_in_one_domain_do_not_touch_each_other(tmp_path: Path) -> Non
 
 @pytest.mark.exhaustive
 def test_a_second_simulation_in_a_namespace_is_refused(tmp_path: Path) -> None:
-    """By the launcher before it starts a node; by a sim_node that is started by hand."""
+    """The launcher refuses before it starts a node; so does a sim_node started by hand."""
     game = write_steady_game(tmp_path)
     with Launcher([game, '--namespace', '/exp1'], tmp_path / 'one') as one:
         one.wait_for('recording into')

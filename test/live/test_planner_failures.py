@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Planners freeze, die and lie: the AV keeps to its last good plan, and brakes where it ends."""
+"""Planners freeze, die and send bad plans: the AV follows its last good plan, then brakes."""
 
 from collections.abc import Callable
 
@@ -52,7 +52,9 @@ def _followed(plan: Plan, rows: NDArray[np.float64]) -> int:
 @pytest.mark.clock
 def test_av_follows_its_last_plan_and_brakes_while_the_planner_is_frozen(run: Run) -> None:
     """
-    Frozen: the last plan to its end, then 4 m/s^2 straight on to a stop, counted; then recovery.
+    It follows its last plan, then brakes straight on at 4 m/s^2 to a stop, then recovers.
+
+    The steps without a plan are counted.
 
     The plan reaches 3 s; the stop needs v / 4 more seconds.
     """

@@ -12,6 +12,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
@@ -113,22 +114,32 @@ def cut_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _joints(bag: Path, topic: str) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
     """Read names, positions and velocities of the first point of every message of a topic."""
     names: list[str] = []
-    positions, velocities = [], []
+    # By stamp: the first states are sent again until all planners have got them.
+    points: dict[tuple[int, int], Any] = {}
     with BagReader(bag) as reader:
         for item in reader.decoded([topic]):
             names = list(item.message.joint_names)
-            positions.append(item.message.points[0].positions)
-            velocities.append(item.message.points[0].velocities)
-    return names, np.array(positions), np.array(velocities)
+            stamp = item.message.header.stamp
+            points[stamp.sec, stamp.nanosec] = item.message.points[0]
+    return (names, np.array([point.positions for point in points.values()]),
+            np.array([point.velocities for point in points.values()]))
 
 
 def test_every_plan_is_accepted(cut_in: Path) -> None:
     """A request at each tick, an accepted plan for each but perhaps the last, no refusal."""
     plans = json.loads((cut_in / 'timing.json').read_text())['planners']['av0']
-    # A stall of the machine may make the planner miss a tick, which is then skipped.
+    # While the planner still works on a request, the next tick is skipped.
     assert plans['requests'] + plans['skipped'] == TICKS + 1
-    assert plans['accepted'] >= plans['requests'] - 1 >= 0.9 * TICKS
-    assert plans['refused'] == plans['timed_out'] == plans['steps_without_plan'] == 0
+    assert plans['accepted'] + plans['timed_out'] >= plans['requests'] - 1 > 0
+    assert plans['refused'] == 0
+
+
+@pytest.mark.clock
+def test_no_request_is_late(cut_in: Path) -> None:
+    """A free machine answers nearly every tick in time."""
+    plans = json.loads((cut_in / 'timing.json').read_text())['planners']['av0']
+    assert plans['accepted'] >= 0.9 * TICKS
+    assert plans['timed_out'] == plans['steps_without_plan'] == 0
 
 
 def test_plans_answer_requests(cut_in: Path) -> None:
@@ -142,8 +153,8 @@ def test_plans_answer_requests(cut_in: Path) -> None:
             times = [point.time_from_start.sec * 1_000_000_000 + point.time_from_start.nanosec
                      for point in item.message.points]
             assert times == [100_000_000 * i for i in range(31)]
-    # On a busy machine a planner may take longer than a tick: it is then asked less often.
-    assert len(set(stamps['plan'])) >= 0.9 * len(set(stamps['request'])) > 0.3 * TICKS
+    # All but perhaps the last one; fewer than ticks on a busy machine.
+    assert len(set(stamps['plan'])) >= len(set(stamps['request'])) - 1 > 0
     assert set(stamps['plan']) <= set(stamps['request'])
     # However late recorder and planner have come to know each other.
     assert min(stamps['plan']) == min(stamps['request'])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What each behaviour of the agents is good for: the same situation with it and without."""
+"""The effect of each behaviour of the agents: the same situation with it and without."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ from crgame_ros.traffic.car_following import AdaptiveCruise
 
 
 class Free(AdaptiveCruise):
-    """Sees nobody."""
+    """A model that sees no leader."""
 
     name = 'free'
 
@@ -53,7 +53,7 @@ class Car:
 @dataclass(frozen=True)
 class Drive:
     """
-    What cars (C) did in ticks (K).
+    Motion of cars (C) over ticks (K).
 
     :param poses: (K, C, 3) of their centres.
     :param speeds: (K, C) [m/s]
@@ -91,7 +91,7 @@ class Drive:
 def drive(name: str, cars: Sequence[Car], seconds: float, obstacle: tuple[float, ...] = (),
           **spec: Any) -> Drive:
     """
-    Let cars drive on a map of ours.
+    Run cars on one of the package's maps.
 
     :param obstacle: x, y, yaw, length, width of something that stands there.
     """
@@ -101,7 +101,7 @@ def drive(name: str, cars: Sequence[Car], seconds: float, obstacle: tuple[float,
     for number, car in enumerate(cars):
         pose = network.pose_on(car.lanelet, car.s)
         way = (np.cos(pose[2]), np.sin(pose[2]), 0.0)
-        # The fastest of a recording is what its driver wants.
+        # The highest speed of a recording is its driver's desired speed.
         adopted.append(Adopted(
             ObjectDescription(f'o{number}', 'car', Role.RECORDED, CAR), 0,
             np.array([pose, pose]), np.multiply.outer((car.speed, car.desired), way)))
@@ -127,7 +127,7 @@ AT = 150.0
 
 
 def _past_the_obstacle(**spec: Any) -> tuple[Drive, FloatArray, FloatArray]:
-    """Drive towards an obstacle; give the run, the car's distances from it, and its s."""
+    """Drive towards an obstacle; return the run, the car's distances from it, and its s."""
     network = RoadNetwork(load_scenario(
         SCENARIOS / 'ZAM_BlockedLane-1_1_T-1.xml').scenario.lanelet_network)
     x, y, yaw = network.pose_on(11, AT)
@@ -158,13 +158,13 @@ SLOW, FAST = 0.5 * 80.0 / 3.6, 80.0 / 3.6
 
 
 def _behind_a_slow_one(seconds: float, **spec: Any) -> Drive:
-    """Let a fast car come from behind a slow one on the right of two lanes."""
+    """Run a fast car that comes from behind a slow one on the right of two lanes."""
     return drive('ZAM_LaneChange-1_1_T-1', [Car(11, 90.0, SLOW, SLOW), Car(11, 30.0, FAST, FAST)],
                  seconds, **spec)
 
 
 def test_m2_car_following_keeps_the_gap_that_is_driven_into_without(tmp_path: Path) -> None:
-    """With FS 3 the gap ends at s0 + T v = 2 + 1.5 * 11.1 m; with a model that is blind at 0."""
+    """With FS 3 the gap ends at s0 + T v = 2 + 1.5 * 11.1 m; with a blind model it ends at 0."""
     run = _behind_a_slow_one(30.0, lane_changes=False)
     gaps = run.distances(0, 1)
     assert gaps.min() > 10.0
@@ -198,7 +198,7 @@ PLATOON = 14
 
 
 def _onto_a_full_motorway(**spec: Any) -> Drive:
-    """Let one car come up a ramp whose lane ends, beside two platoons that keep 1 s."""
+    """Run one car up a ramp whose lane ends, beside two platoons that keep 1 s."""
     spacing = 4.5 + 2.0 + HEADWAY * CRAWL
     cars = [Car(lanelet, 480.0 - shift - i * spacing, CRAWL, CRAWL)
             for lanelet, shift in ((11, 0.0), (12, 5.0)) for i in range(PLATOON)]
@@ -212,7 +212,7 @@ def _first(run: Drive, car: int, lanelets: set[int]) -> int:
 
 @pytest.mark.slow
 def test_courtesy_lets_a_car_merge_that_would_wait_for_the_end_of_the_platoon() -> None:
-    """With it a gap is opened gently and the car goes at its speed; without it has to halt."""
+    """With it a gap opens gently and the car keeps its speed; without it the car halts."""
     ramp = 2 * PLATOON
     run = _onto_a_full_motorway()
     merged = _first(run, ramp, {21, 31})
@@ -241,5 +241,5 @@ def test_m3_without_lane_changes_a_ramp_is_a_dead_end() -> None:
     assert {stuck.lanelets(k)[0] for k in range(0, 401, 5)} == {51, 52}
     assert stuck.speeds[-1, 0] < 0.1
     end = stuck.network.line(52).length - stuck.network.locate(52, *stuck.poses[-1, 0, :2])[0]
-    # Whoever stands there has 12 m left to change lanes in.
+    # A car that stands there has 12 m left to change lanes in.
     assert 2.25 + 12.0 < end < 2.25 + 14.0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Situations made to mislead agents: small things beside the road, tight bends, sudden lights."""
+"""Situations that may mislead agents: small things beside the road, tight bends, sudden lights."""
 
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
@@ -33,13 +33,13 @@ def test_cones_at_the_edge_do_not_hide_a_standing_car() -> None:
     run.ticks(350)
     assert run.overlaps() == []
     poses, speeds = run.series(0)
-    # It stands behind it, and has braked no harder than comfort asks for.
+    # The agent stands behind the car, and has braked no harder than comfort allows.
     assert speeds[-1] < 0.1 and 240.0 < poses[-1, 0] + 2.25 < 247.75
     assert accelerations(run, 0).min() > -3.0
 
 
 def test_posts_do_not_hide_a_faster_follower() -> None:
-    # Three posts between the lanes; somebody at 25 m/s comes from behind in the left one.
+    # Three posts between the lanes; a vehicle at 25 m/s comes from behind in the left one.
     right = support.straight_lane(1, -3.5, 0.0, 800.0, adjacent_left=2,
                                   adjacent_left_same_direction=True)
     left = support.straight_lane(2, 0.0, 0.0, 800.0, adjacent_right=1,
@@ -51,7 +51,7 @@ def test_posts_do_not_hide_a_faster_follower() -> None:
     run = support.Run(support.roads(right, left), TrafficSpec(cooperative=False), 0, posts,
                       [slow, wants, fast]).ticks(200)
     assert run.overlaps() == []
-    # Who overtakes waits for whoever comes, who need not brake hard.
+    # The overtaking agent waits for the faster follower, which need not brake hard.
     assert accelerations(run, 2).min() > -3.0
 
 
@@ -78,7 +78,7 @@ def test_a_tight_bend_is_entered_at_its_speed_and_not_cut() -> None:
 
 
 def test_comfortable_driving_has_little_jerk() -> None:
-    # Two cars up to a stop behind a wreck, and nobody has to hurry.
+    # Two cars up to a stop behind a wreck, and neither has to hurry.
     lane = support.roads(support.straight_lane(1, 0.0, 0.0, 500.0))
     wreck = support.human(400.0, 0.0, 0.0, kind='parkedVehicle')
     run = support.Run(lane, TrafficSpec(), 0, [wreck], [

@@ -20,7 +20,7 @@ NAMES = ['acc', 'idm']
 
 def drive(model: CarFollowing, speed: Array, desired: Array, gap: Array, lead_speed: Array,
           lead_acceleration: float, duration: float) -> tuple[Array, Array, Array]:
-    """Decide at 10 Hz, move at 100 Hz; give gaps, speeds and accelerations at each decision."""
+    """Decide at 10 Hz, move at 100 Hz; return gaps, speeds and accelerations at each decision."""
     rows = []
     lead_speed = np.array(lead_speed, dtype=float)
     for _ in range(round(10 * duration)):
@@ -36,7 +36,7 @@ def drive(model: CarFollowing, speed: Array, desired: Array, gap: Array, lead_sp
 
 
 def test_acc_is_fs_3_with_a_gap_at_standstill() -> None:
-    """Write FS 3 down in its own terms; l_lead is the distance of centres at contact plus s0."""
+    """The ACC law equals FS 3 as published; l_lead is the distance of centres at contact + s0."""
     rng = np.random.default_rng(3)
     host, lead = rng.uniform(0.0, 50.0, 40), rng.uniform(60.0, 120.0, 40)
     v, v_lead = rng.uniform(0.3, 30.0, 40), rng.uniform(0.0, 30.0, 40)
@@ -51,7 +51,7 @@ def test_acc_is_fs_3_with_a_gap_at_standstill() -> None:
 
 
 def test_idm_is_the_equation_of_treiber() -> None:
-    """Write a (1 - (v / v0)^4 - (s* / s)^2) down, s* = s0 + v T + v dv / (2 sqrt(a b))."""
+    """It equals a (1 - (v / v0)^4 - (s* / s)^2), s* = s0 + v T + v dv / (2 sqrt(a b))."""
     v, v0, s, dv = (np.array(column) for column in zip(
         (20.0, 33.0, 40.0, 2.0), (5.0, 14.0, 12.0, -1.0), (0.5, 8.0, 3.0, 0.5), strict=True))
     wanted_gap = 2.0 + v * 1.6 + v * dv / (2.0 * np.sqrt(0.73 * 1.67))
@@ -73,7 +73,7 @@ def test_stops_behind_a_standing_vehicle_with_the_gap_of_standstill(model: CarFo
     assert gaps[-1].min() > model.standstill_gap - 0.01
     assert gaps[-1].max() < model.standstill_gap + 0.3
     assert wanted.min() >= -7.0
-    # No stop and go: after the first braking nobody accelerates again.
+    # No stop and go: after the first braking no agent accelerates again.
     braked = np.maximum.accumulate(wanted < -0.2, axis=0)
     assert wanted[braked].max() <= 0.0
 
@@ -121,7 +121,7 @@ def test_a_short_gap_survives_the_hardest_braking_ahead(model: CarFollowing,
 
 
 def test_relief_spares_the_braking_for_a_short_gap() -> None:
-    """At 15 m/s and 8 m: plainly lambda 16.5 / 1.5 = 4.4 m/s^2; relieved of 16.5 m nothing."""
+    """At 15 m/s and 8 m: lambda 16.5 / 1.5 = 4.4 m/s^2 without relief, 0 relieved of 16.5 m."""
     model = AdaptiveCruise()
     v, gap = np.array([15.0, 15.0]), np.array([8.0, 8.0])
     got = model.acceleration(v, v + 20.0, gap, v, np.array([0.0, 16.5]))
@@ -130,7 +130,7 @@ def test_relief_spares_the_braking_for_a_short_gap() -> None:
 
 @pytest.mark.parametrize('model', MODELS, ids=NAMES)
 def test_drives_freely_at_the_desired_speed(model: CarFollowing) -> None:
-    """Nobody ahead: NaN as the leader's speed means nothing; limits hold on the way."""
+    """No leader: NaN as the leader's speed has no effect; limits hold on the way."""
     desired = np.array([8.0, 14.0, 30.0])
     start = np.array([0.0, 20.0, 29.0])
     none = np.full(3, np.inf)
@@ -146,7 +146,7 @@ def test_drives_freely_at_the_desired_speed(model: CarFollowing) -> None:
 
 @pytest.mark.parametrize('model', MODELS, ids=NAMES)
 def test_a_queue_starts_again(model: CarFollowing) -> None:
-    """Held while the leader stands, gone when it leaves."""
+    """The follower stands while the leader stands, and leaves when the leader leaves."""
     rest = np.zeros(1)
     waiting = model.acceleration(rest, np.full(1, 14.0), np.array([2.05]), rest)
     assert waiting[0] < 0.0
@@ -157,7 +157,7 @@ def test_a_queue_starts_again(model: CarFollowing) -> None:
 
 @pytest.mark.parametrize('model', MODELS, ids=NAMES)
 def test_the_steady_gap_is_the_desired_gap(model: CarFollowing) -> None:
-    """At the same speeds and that gap the interaction asks for nothing but the leader's speed."""
+    """At equal speeds and that gap the interaction only demands the leader's speed."""
     speed = np.array([3.0, 12.0, 25.0])
     gap = model.desired_gap(speed)
     np.testing.assert_allclose(gap, 2.0 + 1.5 * speed)

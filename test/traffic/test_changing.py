@@ -65,7 +65,7 @@ def test_a_change_follows_a_quintic_without_haste() -> None:
     assert np.nanmax(poses[:, 1]) < 0.35, 'no overshoot to speak of'
 
 
-def test_whoever_drives_on_a_lane_that_ends_merges() -> None:
+def test_an_agent_on_a_lane_that_ends_merges() -> None:
     run = support.Run(two_lanes(400.0), TrafficSpec(), 0, (),
                       [agent(1, 20.0, -3.5, 13.0)]).ticks(400)
     poses, speeds = run.series(0)
@@ -78,14 +78,14 @@ def test_whoever_drives_on_a_lane_that_ends_merges() -> None:
 
 
 def dense(cooperative: bool) -> support.Run:
-    """Let one merge from the end of a lane into a platoon with a time gap of 1.1 s."""
+    """Run an agent that merges from the end of a lane into a platoon with a time gap of 1.1 s."""
     platoon = [agent(i + 2, 200.0 - 17.0 * i, 0.0, 11.0) for i in range(11)]
     return support.Run(two_lanes(330.0), TrafficSpec(
         cooperative=cooperative, options={'time_gap': 1.1}), 0, (),
         [agent(1, 120.0, -3.5, 11.0), *platoon]).ticks(700)
 
 
-def test_others_make_room_for_who_has_to_merge() -> None:
+def test_others_make_room_for_an_agent_that_has_to_merge() -> None:
     with_courtesy, without = dense(True), dense(False)
     assert with_courtesy.overlaps() == [] and without.overlaps() == []
 
@@ -94,8 +94,8 @@ def test_others_make_room_for_who_has_to_merge() -> None:
         return 0.1 * inside[0] if len(inside) else np.inf
 
     assert merged_at(with_courtesy) < merged_at(without) - 2.0
-    # No shock wave: nobody in the platoon brakes hard (Hidas 2005), but for who leaves it to pass
-    # others on the lane that ends.
+    # No shock wave: no agent in the platoon brakes hard (Hidas 2005), except one that leaves it
+    # to pass others on the lane that ends.
     stays = np.nanmin(np.array(with_courtesy.poses)[:, 1:, 1], axis=0) > -1.0
     assert stays.sum() >= 9
     speeds = np.array(with_courtesy.speeds)[:, 1:][:, stays]
@@ -144,7 +144,7 @@ def test_swerves_are_shared_by_all_agents_of_a_lane(maps: Path) -> None:
 
 
 def stream(later: int, cooperative: bool) -> support.Run:
-    """Let somebody stand where the right lane ends, beside cars 45 m apart at 25 m/s."""
+    """Run an agent that stands where the right lane ends, beside cars 45 m apart at 25 m/s."""
     begins = [(365.0 - 45.0 * i, 0) for i in range(9)] + [(5.0, 18 * i + 18) for i in range(later)]
     cars = [support.driving(10 + i, [(x, 0.0, 0.0), (1100.0, 0.0, 0.0)], 25.0, first_k=k)
             for i, (x, k) in enumerate(begins)]
@@ -152,21 +152,21 @@ def stream(later: int, cooperative: bool) -> support.Run:
                        [agent(1, 390.0, -3.5, 0.0, 14.0), *cars])
 
 
-def test_somebody_stops_for_whoever_has_stood_at_the_end_of_a_lane() -> None:
+def test_a_car_stops_for_an_agent_that_has_stood_at_the_end_of_a_lane() -> None:
     run = stream(25, cooperative=True).ticks(400)
     assert run.overlaps() == []
     let_in = np.flatnonzero(run.series(0)[0][:, 1] > -1.0)
-    # Not before the patience of 3 s; whoever stops for it needs 13 s from 25 m/s.
+    # Not before the patience of 3 s; the car that stops for it needs 13 s from 25 m/s.
     assert 30 < let_in[0] < 200
-    # Nobody brakes harder for it than where somebody cuts in.
+    # No car brakes harder for it than for a vehicle that cuts in.
     speeds = np.array(run.speeds)[:, 1:]
     assert np.nanmin(np.diff(speeds, axis=0)) / 0.1 > -4.1
-    # Without courtesy nobody does: such gaps are too short to drive into from a stand.
+    # Without courtesy no car stops: such gaps are too short to enter from a stand.
     poses, _ = stream(25, cooperative=False).ticks(400).series(0)
     assert np.nanmax(poses[:, 1]) < -3.0
 
 
-def test_who_has_stood_long_goes_when_the_lane_is_free() -> None:
+def test_an_agent_that_has_stood_long_goes_when_the_lane_is_free() -> None:
     run = stream(0, cooperative=False).ticks(300)
     poses, speeds = run.series(0)
     last = run.series(9)[0][:, 0]
@@ -178,8 +178,8 @@ def test_who_has_stood_long_goes_when_the_lane_is_free() -> None:
 
 @pytest.mark.parametrize(('y', 'lane'), [(-0.4, 1), (-3.1, 2)])
 def test_a_change_that_comes_to_nothing_ends_in_the_nearer_lane(y: float, lane: int) -> None:
-    # Whoever got into the new lane and stood there for long was taken for one in the old lane, and
-    # drove on beside who had come into that.
+    # An agent that got into the new lane and stood there for long was once treated as in the old
+    # lane, and drove on beside a vehicle that had come into the new one.
     traffic = support.Run(two_lanes(), TrafficSpec(), 0, [], [agent(1, 50.0, y, 0.0)]).traffic
     agents, index = traffic._agents, traffic._graph.index
     agents.put(0, index[1], 50.0, y, (50.0, y, 0.0), 0.0)
@@ -192,11 +192,11 @@ def test_a_change_that_comes_to_nothing_ends_in_the_nearer_lane(y: float, lane: 
 
 
 @pytest.mark.slow
-def test_nobody_begins_a_change_where_a_junction_is_near_behind_a_short_lanelet() -> None:
+def test_no_change_begins_where_a_junction_is_near_behind_a_short_lanelet() -> None:
     """
     Lanes 1 and 2 end at x = 200; lanelets of 6 m lie between them and a junction.
 
-    Whoever overtakes does so well before the junction or behind it: with 15 m left at least.
+    Agents overtake well before the junction, with at least 15 m left, or behind it.
     """
     pair = {'adjacent_left_same_direction': True, 'adjacent_right_same_direction': True}
     lanes = []
@@ -213,7 +213,7 @@ def test_nobody_begins_a_change_where_a_junction_is_near_behind_a_short_lanelet(
     across = support.lane_strip(9, [(218.0, y) for y in np.linspace(-60.0, 60.0, 30)])
     begins = []
     for since in range(0, 60, 3):
-        # Somebody slow comes out of a drive, 25 m ahead.
+        # A slow vehicle comes out of a drive, 25 m ahead.
         run = support.Run(support.roads(*lanes, across), TrafficSpec(), 0,
                           [support.human(175.0 + 0.9 * since, -3.5, 0.0, 5.0, since)],
                           [agent(1, 150.0, -3.5, 9.0)]).ticks(250)

@@ -43,7 +43,7 @@ def test_right_of_way_at_a_signed_intersection(maps: Path, first: int, second: i
     assert conflicts.priority[row_of(graph, conflicts, second, first)] == -1, why
 
 
-def test_who_is_in_the_roundabout_goes_first(maps: Path) -> None:
+def test_vehicles_in_the_roundabout_go_first(maps: Path) -> None:
     graph, conflicts = built(maps / 'ZAM_Roundabout-1_1_T-1.xml')
     assert len(conflicts) == 8
     for arm in (10, 20, 30, 40):
@@ -73,20 +73,20 @@ def test_room_behind_a_merge_begins_where_the_ways_are_one() -> None:
     graph = LaneGraph(RoadNetwork(scenario.lanelet_network))
     conflicts = Conflicts(graph)
     row = row_of(graph, conflicts, 1, 2)
-    # The conflict lasts until both have left it, but from x = 100 - 0.8 / 0.2 on one is behind
+    # The conflict lasts until both have left it; from x = 100 - 0.8 / 0.2 on one is behind
     # the other.
     assert conflicts.merges[row] and conflicts.end[row] == pytest.approx(80.0, abs=1.0)
     leave = conflicts.table.leave[:, graph.index[1]]
     assert leave == pytest.approx([36.0, 36.0], abs=1.0)
 
 
-def test_without_signs_who_comes_from_the_right_goes_first() -> None:
+def test_without_signs_the_vehicle_from_the_right_goes_first() -> None:
     scenario = support.roads(
         support.straight_lane(1, 0.0, -100.0, 100.0),
         support.lane_strip(2, [(0.0, y) for y in np.linspace(-100.0, 100.0, 60)]))
     graph = LaneGraph(RoadNetwork(scenario.lanelet_network))
     conflicts = Conflicts(graph)
-    # Lanelet 2 drives north, and comes from the right of whoever drives east.
+    # Lanelet 2 leads north. Its traffic comes from the right of vehicles that drive east.
     assert conflicts.priority[row_of(graph, conflicts, 2, 1)] == 1
     assert conflicts.priority[row_of(graph, conflicts, 1, 2)] == -1
 
@@ -110,7 +110,7 @@ def test_a_left_turn_in_pieces_is_one() -> None:
     pieces = [pair for pair in met if pair[0] >= 10]
     assert {other for _, other in pieces} == {3, 4} and len(pieces) >= 4
     for pair in pieces:
-        # It yields to who comes towards it; who comes from the north is on its left.
+        # It yields to oncoming vehicles; vehicles from the north are on its left.
         assert met[pair] == (-1 if pair[1] == 3 else 1), pair
 
 

@@ -24,7 +24,7 @@ def one(value: float) -> Array:
 @pytest.mark.parametrize(('v_f', 'v', 'gap'), [(15.0, 15.0, 3.0), (15.0, 14.0, 6.0),
                                                (12.0, 12.5, -1.0)])
 def test_courtesy_opens_the_gap_in_its_time(v_f: float, v: float, gap: float) -> None:
-    """Integrate the constant deceleration: after D_t the gap is the needed one."""
+    """The constant deceleration, integrated over D_t, opens the gap to the needed one."""
     rules = CourtesyRules()
     b, yields = rules.courtesy_deceleration(one(v_f), one(gap), one(v), one(8.0), 1.0, 0.0)
     assert yields[0] and 0.0 < b[0] <= 2.5
@@ -37,7 +37,7 @@ def test_courtesy_opens_the_gap_in_its_time(v_f: float, v: float, gap: float) ->
 
 def test_asked_at_every_decision_courtesy_ends_smoothly() -> None:
     """
-    Follow the missing gap: x'' + 2 x' / D_t + 2 x / D_t^2 = 0 until t = pi D_t / 4.
+    The missing gap follows x'' + 2 x' / D_t + 2 x / D_t^2 = 0 until t = pi D_t / 4.
 
     That is x_0 exp(-t / D_t) (cos(t / D_t) + sin(t / D_t)); then b is 0 and the gap opens at the
     constant x' = -sqrt(2) x_0 / D_t exp(-pi / 4).
@@ -64,7 +64,7 @@ def test_asked_at_every_decision_courtesy_ends_smoothly() -> None:
     assert opened == pytest.approx(np.pi + 4.0, abs=0.1)
 
 
-def test_nobody_brakes_harder_for_others_than_the_own_limit() -> None:
+def test_no_agent_brakes_harder_for_others_than_its_own_limit() -> None:
     """Urgency raises it, aggressivity lowers it to nothing; beyond it nothing is done at all."""
     rules = CourtesyRules()
     hurry, temper = np.array([0.0, 1.0, 1.0, 1.0]), np.array([0.0, 0.0, 0.4, 1.0])
@@ -79,11 +79,11 @@ def test_nobody_brakes_harder_for_others_than_the_own_limit() -> None:
     _, yields = rules.courtesy_deceleration(v, np.full(4, -6.0), v, np.full(4, 10.0), hurry,
                                             temper)
     assert not yields.any()
-    # A gap that is wide enough asks for nothing, not even of the aggressive.
+    # A gap that is wide enough needs no braking, not even by an aggressive agent.
     b, yields = rules.courtesy_deceleration(v, np.full(4, 20.0), v, np.full(4, 10.0), hurry,
                                             temper)
     assert not yields.any() and (b == 0.0).all()
-    # Nobody stops for it.
+    # No agent stops for it.
     assert not rules.courtesy_deceleration(one(1.0), one(0.0), one(1.0), one(5.0), 1.0, 0.0)[1][0]
 
 
@@ -94,7 +94,7 @@ def test_relief_is_what_is_missing_and_fades() -> None:
     for _ in range(100):
         relief = fade_relief(relief, gap, desired, fading(0.1))
     np.testing.assert_allclose(relief, [19.5 / np.e, 0.0, 0.0])
-    # Once the gap is nearly open only the rest is left; nobody ahead, no relief.
+    # Once the gap is nearly open only the rest is left; without a leader there is no relief.
     left = fade_relief(relief, np.array([23.0, 1.0, 1.0]), desired, fading(0.1))
     np.testing.assert_allclose(left[0], 1.5)
     assert fade_relief(one(5.0), one(np.inf), one(24.5), fading(0.1))[0] == 0.0
@@ -102,10 +102,10 @@ def test_relief_is_what_is_missing_and_fades() -> None:
 
 def merge(cooperative: bool, merging_speed: float = 15.0) -> tuple[Array, float, float]:
     """
-    Let a vehicle merge into a platoon of ten at 15 m/s with gaps of 12 m, between two of them.
+    Merge a vehicle into a platoon of ten at 15 m/s with gaps of 12 m, between two of them.
 
     The platoon is in equilibrium: T = 10 m / 15 m/s. Without cooperation the vehicle goes into
-    the gap as it is, and everybody follows FS 3. With it the two behind the gap and the vehicle
+    the gap as it is, and all follow FS 3. With it the two behind the gap and the vehicle
     make room first, and it changes when the least gaps are there.
 
     :return: (11) accelerations at worst after the change, that of the courtesy before, and the
@@ -148,14 +148,14 @@ def merge(cooperative: bool, merging_speed: float = 15.0) -> tuple[Array, float,
         worst = np.minimum(worst, wanted)
         for _ in range(10):
             x, v = x + 0.01 * v + 0.5e-4 * wanted, np.maximum(v + 0.01 * wanted, 0.0)
-    # In the end everybody has the usual gap again.
+    # In the end every vehicle has the usual gap again.
     np.testing.assert_allclose(x[:-1] - x[1:] - LENGTH, 12.0, atol=0.3)
     return worst, before, changed_at
 
 
 def test_cooperation_spares_the_shock_wave() -> None:
     """
-    Compare the hardest braking with and without cooperation.
+    Cooperation lowers the hardest braking.
 
     Plainly gaps of 3.75 m instead of 12 m make FS 3 brake with lambda 8.25 / T = 4.95 m/s^2.
     """
@@ -173,7 +173,7 @@ def test_cooperation_spares_the_shock_wave() -> None:
 
 
 def test_cooperation_also_helps_a_slower_vehicle() -> None:
-    """At 14 m/s, into a gap that closes by 1 m/s, less is spared: the difference of speeds."""
+    """At 14 m/s, into a gap that closes by 1 m/s, it spares less: the speeds differ."""
     plain, _, _ = merge(cooperative=False, merging_speed=14.0)
     gentle, before, _ = merge(cooperative=True, merging_speed=14.0)
     assert plain.min() / min(gentle.min(), before) > 1.5

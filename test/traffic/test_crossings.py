@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Crossings: right of way, gaps, red lights, and nobody waits for ever."""
+"""Crossings: right of way, gaps, red lights, and no agent waits for ever."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ def coming(roads: RoadNetwork, number: int, start: int, goal: int, away: float,
 
 
 def passes_origin(poses: np.ndarray) -> int:
-    """Return the tick at which somebody is nearest to the middle of the junction."""
+    """Return the tick at which a vehicle is nearest to the middle of the junction."""
     return int(np.nanargmin(np.hypot(poses[:, 0], poses[:, 1])))
 
 
@@ -75,7 +75,7 @@ def test_agents_yield_to_a_human_on_the_priority_road(maps: Path) -> None:
     assert np.nanmin(speeds[:100]) < 8.0
 
 
-def test_agents_stop_for_a_human_who_ignores_the_right_of_way(maps: Path) -> None:
+def test_agents_stop_for_a_human_that_ignores_the_right_of_way(maps: Path) -> None:
     roads = network(maps)
     human = support.human(1.75, -75.0, 0.5 * np.pi, 13.0)
     run = support.Run(maps / NAME, TrafficSpec(), 0, [human], [
@@ -85,7 +85,7 @@ def test_agents_stop_for_a_human_who_ignores_the_right_of_way(maps: Path) -> Non
 
 
 @pytest.mark.parametrize('goal', [12, 22])
-def test_the_left_turn_waits_for_who_comes_towards_it(maps: Path, goal: int) -> None:
+def test_the_left_turn_waits_for_oncoming_traffic(maps: Path, goal: int) -> None:
     roads = network(maps)
     # Lanelet 15 turns left from arm 1 to arm 4, against 34 to arm 1 and 33 (left) to arm 2.
     run = support.Run(maps / NAME, TrafficSpec(), 0, (), [
@@ -96,7 +96,7 @@ def test_the_left_turn_waits_for_who_comes_towards_it(maps: Path, goal: int) -> 
         assert passes_origin(straight) < passes_origin(left)
 
 
-def test_four_who_arrive_at_once_without_signs_all_get_through() -> None:
+def test_four_agents_that_arrive_at_once_without_signs_all_get_through() -> None:
     lines = {i: [(-1.75 * np.sin(a) * 0.0 + np.cos(a) * r + 1.75 * np.sin(a),
                   np.sin(a) * r - 1.75 * np.cos(a)) for r in np.linspace(-120.0, 120.0, 97)]
              for i, a in enumerate(np.arange(4) * 0.5 * np.pi)}
@@ -133,7 +133,7 @@ def test_a_red_light_holds_until_it_is_green() -> None:
     assert np.isnan(poses[-1, 0]) or poses[-1, 0] > 150.0
 
 
-def test_who_starts_when_a_light_turns_yellow_stops_if_that_takes_less_than_hard_braking() -> None:
+def test_at_a_light_that_turns_yellow_an_agent_stops_unless_it_has_to_brake_hard() -> None:
     taken = set()
     for green in range(5, 60, 3):
         scenario = lane_with_a_light(((TrafficLightState.GREEN, green),
@@ -150,7 +150,7 @@ def test_who_starts_when_a_light_turns_yellow_stops_if_that_takes_less_than_hard
     assert taken == {False, True}
 
 
-def test_a_green_light_holds_nobody() -> None:
+def test_a_green_light_holds_no_agent() -> None:
     run = support.Run(lane_with_a_light(((TrafficLightState.GREEN, 1000),)), TrafficSpec(), 0,
                       (), one()).ticks(120)
     assert np.nanmin(run.series(0)[1]) > 9.5
@@ -174,7 +174,7 @@ def test_a_stop_sign_makes_everybody_stand_once() -> None:
     assert np.nanmax(poses[:, 0]) > 200.0
 
 
-def test_nobody_blocks_a_junction_behind_which_there_is_no_room() -> None:
+def test_no_agent_blocks_a_junction_behind_which_there_is_no_room() -> None:
     scenario = support.roads(
         support.straight_lane(1, 0.0, 0.0, 200.0),
         support.lane_strip(2, [(120.0, y) for y in np.linspace(-100.0, 100.0, 80)]))
@@ -186,7 +186,7 @@ def test_nobody_blocks_a_junction_behind_which_there_is_no_room() -> None:
     assert speeds[-1] == 0.0 and poses[-1, 0] + 2.25 < 118.25
 
 
-def test_who_stands_before_a_full_way_turns_off_after_a_while() -> None:
+def test_an_agent_before_a_full_way_turns_off_after_a_while() -> None:
     left = [(100.0, 0.0), (104.0, 0.6), (107.0, 3.0), (108.5, 7.0), (108.5, 60.0)]
     scenario = support.roads(
         support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2, 3]),
@@ -212,21 +212,21 @@ def test_a_busy_junction_never_locks_up(maps: Path, name: str) -> None:
         assert np.nanmean(speeds[begin:begin + 300]) > 3.0
 
 
-def test_nobody_stops_on_a_crossing_behind_who_will_stop_before_the_next() -> None:
-    """Whoever is ahead still drives when one asks, but halts before a junction that is taken."""
+def test_no_agent_stops_on_a_crossing_behind_a_leader_that_will_stop() -> None:
+    """The leader still drives at the check, but halts before a junction that is taken."""
     roads = support.roads(
         support.straight_lane(1, 0.0, 0.0, 112.0, successor=[4]),
         support.straight_lane(4, 0.0, 112.0, 200.0, predecessor=[1]),
         support.lane_strip(2, [(100.0, -60.0), (100.0, 60.0)]),
         support.lane_strip(3, [(125.0, -60.0), (125.0, 60.0)]))
-    # Stands across the second crossing.
+    # This vehicle stands across the second crossing.
     human = support.human(125.0, 0.0, np.pi / 2.0)
     run = support.Run(roads, TrafficSpec(), 0, [human], [
         support.driving(i, [(15.0 + 16.0 * i, 0.0, 0.0), (190.0, 0.0, 0.0)], 8.0)
         for i in range(5)]).ticks(400)
     last = run.poses[-1]
     assert (run.speeds[-1][np.isfinite(last[:, 0])] < 0.05).all()
-    # Who fits in between is there, the others wait before the first crossing.
+    # The agents that fit in between are there; the others wait before the first crossing.
     inside = np.abs(last[:, 0] - 100.0) < 0.5 * (4.5 + 1.8)
     assert not inside.any()
     assert (last[:, 0] > 104.0).any()

@@ -17,14 +17,14 @@ import traffic_support as support
 
 
 def behind_a_human(**spec: float) -> support.Run:
-    """Let an agent follow a human who stands, from 13 m/s; the human appears after 3 s."""
+    """Run an agent at 13 m/s towards a standing human that appears after 3 s."""
     lane = support.roads(support.straight_lane(1, 0.0, 0.0, 400.0))
     wreck = support.human(200.0, 0.0, 0.0, since=30)
     return support.Run(lane, TrafficSpec(**spec), 3, [wreck], [
         support.driving(1, [(20.0, 0.0, 0.0), (390.0, 0.0, 0.0)], 13.0)]).ticks(250)
 
 
-def test_who_reacts_late_brakes_as_much_later() -> None:
+def test_a_driver_that_reacts_late_brakes_as_much_later() -> None:
     quick, late = behind_a_human(), behind_a_human(reaction_time=0.8)
     brakes = [int(np.flatnonzero(np.diff(run.series(0)[1]) < -0.02)[0])
               for run in (quick, late)]
@@ -44,7 +44,7 @@ def test_imperfection_slows_by_half_of_its_share_and_repeats_with_the_seed() -> 
     assert lost == pytest.approx(0.45, abs=0.15)
 
 
-def test_only_who_ignores_lights_runs_a_red_one() -> None:
+def test_only_a_driver_that_ignores_lights_runs_a_red_one() -> None:
     crossed = []
     for share in (0.0, 1.0):
         car = support.driving(1, [(-150.0, -3.5, 0.0), (190.0, -3.5, 0.0)], 12.0)
@@ -62,7 +62,7 @@ def test_only_who_ignores_lights_runs_a_red_one() -> None:
 
 def chase(spec: TrafficSpec, *changes: tuple[int, TrafficChange], ticks: int = 120,
           seed: int = 3) -> support.Run:
-    """Let five cars follow a slow one on two lanes; changes come before the decision at a tick."""
+    """Run five cars behind a slow one on two lanes; changes come before the decision at a tick."""
     two = support.roads(
         support.straight_lane(1, 0.0, 0.0, 900.0, adjacent_left=2,
                               adjacent_left_same_direction=True),
@@ -78,7 +78,7 @@ def chase(spec: TrafficSpec, *changes: tuple[int, TrafficChange], ticks: int = 1
 
 
 def bits(run: support.Run, *numbers: int) -> bytes:
-    """Return all that was seen of some agents, of all without any."""
+    """Return the recorded motion of the given agents; of all agents if none are given."""
     chosen = list(numbers) or list(range(len(run.descriptions)))
     return np.array(run.poses)[:, chosen].tobytes() + np.array(run.speeds)[:, chosen].tobytes()
 
@@ -104,7 +104,7 @@ def test_a_change_of_all_is_as_if_the_game_said_so(given: dict[str, Any],
 
 
 def test_a_change_of_one_leaves_those_ahead_alone() -> None:
-    """Four seconds of distance instead of 1.5 s, for one who follows; back again later."""
+    """One follower keeps a headway of 4 s instead of 1.5 s, and goes back to 1.5 s later."""
     alone = TrafficSpec(lane_changes=False)
     free = chase(alone, ticks=500)
     timid = TrafficChange('o2', options={'time_gap': 4.0})
@@ -121,7 +121,7 @@ def test_a_change_of_one_leaves_those_ahead_alone() -> None:
 
 
 def test_desired_speeds_of_one_and_of_all() -> None:
-    """A speed whatever the limit; a share of it; all of them, who differ by as much as before."""
+    """A fixed speed; a share of the limit; for all agents, with the same spread as before."""
     lane = support.roads(support.straight_lane(1, 0.0, 0.0, 3000.0))
 
     def settled(*changes: TrafficChange) -> np.ndarray:
@@ -140,7 +140,7 @@ def test_desired_speeds_of_one_and_of_all() -> None:
                                (1.2 * limit, 12.0), atol=0.05)
     every = TrafficChange('all', speed_factor=1.5)
     np.testing.assert_allclose(settled(every), (13.5, 18.0), atol=0.05)
-    # The last word counts, and of all it counts for everybody.
+    # The last change counts, and a change of all counts for every agent.
     np.testing.assert_allclose(settled(TrafficChange('o1', desired_speed=3.0), every),
                                (13.5, 18.0), atol=0.05)
     np.testing.assert_allclose(settled(TrafficChange('all', desired_speed=8.0)), (8.0, 8.0),
@@ -148,7 +148,7 @@ def test_desired_speeds_of_one_and_of_all() -> None:
 
 
 def test_newcomers_drive_as_all_were_told() -> None:
-    """Arrivals of a flow, who come after it, at 6 m/s instead of 10 to 16 m/s."""
+    """Vehicles of a flow that arrive after the change drive at 6 m/s instead of 10 to 16 m/s."""
     lane = support.roads(support.straight_lane(1, 0.0, 0.0, 300.0))
     run = support.Run(lane, TrafficSpec(flow=900.0), 1).ticks(300)
     before = run.speeds[-1]
@@ -160,7 +160,7 @@ def test_newcomers_drive_as_all_were_told() -> None:
 
 
 def test_one_driver_begins_to_ignore_lights_and_one_to_yield_late(maps: Path) -> None:
-    """By an event in the middle of a run, as by shares from the start."""
+    """An event in the middle of a run has the effect of shares from the start."""
     car = support.driving(1, [(-150.0, -3.5, 0.0), (190.0, -3.5, 0.0)], 12.0)
     fronts = []
     for runs in (False, True):

@@ -57,7 +57,7 @@ class TakeOver(NamedTuple):
 
     @property
     def to_stable_s(self) -> float:
-        """Return the time from the request to the first stable second; NaN if one is missing [s]."""
+        """Return the time from request to first stable second; NaN if one is missing [s]."""
         return math.nan if self.request is None else self.stable_s - self.request.time_s
 
 

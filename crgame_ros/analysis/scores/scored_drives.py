@@ -72,7 +72,7 @@ class _Drives:
 
     def score(self, number: int, log: RunTrajectories
               ) -> tuple[NuplanScore | None, tuple[str, ...]]:
-        """Score the vehicle of a number over a log; without a score, the remarks say why."""
+        """Score the vehicle with this number over a log; without a score, remarks say why."""
         av = log.game.av(log.vehicles[number].id)
         problem = None if av is None else self._problems.get(av.planning_problem)
         expert = self._expert or recorded_expert(
