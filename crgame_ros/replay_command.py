@@ -164,7 +164,7 @@ def _file_name(planner: str, among: Sequence[str] | Mapping[str, Any]) -> str:
 
 def _table(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the lines of the comparison, in columns."""
-    from crgame_ros.analysis.replay_rows import HEAD, replay_rows
+    from crgame_ros.analysis.measure_command import HEAD, replay_rows
     rows = [HEAD, *replay_rows(found)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     for row in rows:

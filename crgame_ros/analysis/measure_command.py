@@ -3,7 +3,7 @@
 """`crgame measure`: print how critical a recorded run was and how people drove, also as JSON."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 import json
 from pathlib import Path
@@ -94,3 +94,30 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
             yield (f'  pet          {each["pet_s"]:9.2f} s      {each["second"]} after '
                    f'{each["first"]} at {each["entered_s"]:.1f} s'
                    f'{CRITICAL if each["pet_s"] < limits["pet_s"] else ""}')
+
+
+NEVER = '-'
+HEAD = ('planner', 'vehicle', 'gap [m]', 'ttc [s]', 'a_req [m/s^2]', 'distance [m]', 'tet [s]',
+        'contacts', 'human differs', 'others differ')
+
+
+def replay_rows(found: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """
+    Yield a row for each planner and vehicle, with the cells that `HEAD` names.
+
+    :param found: entries of `Alternative.as_dict`; the entry of the recorded run itself lacks the
+        comparison.
+    """
+    for each in found:
+        for vehicle_id, vehicle in each['criticality']['vehicles'].items():
+            worst = {name: f'{entry["value"]:.2f}' for name, entry in vehicle['worst'].items()
+                     if entry['unit'] != 's' or entry['value'] < TOLD_S}
+            touched = [item for item in each.get('contacts') or ()
+                       if vehicle_id in (item['vehicle'], item['with'])]
+            yield (
+                each['planner'], vehicle_id,
+                *(worst.get(name, NEVER) for name in ('gap', 'ttc', 'a_req', 'min_distance')),
+                f'{vehicle["tet_s"]:.1f}',
+                str(len(touched)) if each.get('contacts') is not None else NEVER,
+                *(NEVER if each.get(name) is None else f'from {each[name]:.1f} s'
+                  for name in ('human_differs_s', 'others_differ_s')))

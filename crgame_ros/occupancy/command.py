@@ -14,8 +14,7 @@ import time
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.occupancy.image import write_pgm
-from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, read_map_file
-from crgame_ros.occupancy.raster_spec import RasterSpec
+from crgame_ros.occupancy.map_file import INDEX_NAME, map_text, RasterSpec, read_map_file
 from crgame_ros.occupancy.rasterize import Raster
 from crgame_ros.occupancy.sources import tile_name
 import numpy as np

@@ -15,7 +15,7 @@ from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.outline import placed_polygon
-from crgame_ros.occupancy.raster_spec import RasterSpec
+from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.sources import MAX_TILES
 from crgame_ros.roads.surface import (
     lanelet_polygons,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the cockpit's server share: a backend that pumps, a listening server."""
+"""Shared helpers of the cockpit server's tests: a sending backend, a listening server."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
@@ -144,7 +144,7 @@ def in_loop(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
 
 
 async def wait_until(condition: Callable[[], bool], what: str) -> None:
-    """Wait for something that happens in this process."""
+    """Wait for a condition of this process to become true."""
     try:
         async with asyncio.timeout(PATIENCE_S):
             while not condition():
@@ -154,7 +154,7 @@ async def wait_until(condition: Callable[[], bool], what: str) -> None:
 
 
 async def next_text(socket: ClientWebSocketResponse, kind: str) -> dict[str, Any]:
-    """Wait for a text of a kind."""
+    """Wait for a text message of a kind."""
     async with asyncio.timeout(PATIENCE_S):
         async for message in socket:
             if message.type is WSMsgType.TEXT:
@@ -173,7 +173,7 @@ async def close_code(socket: ClientWebSocketResponse) -> int | None:
 
 
 async def raw_request(port: int, request: bytes) -> bytes:
-    """Send bytes as they are, which no library would, and read the answer to its end."""
+    """Send raw bytes, which no library would send, and read the answer to its end."""
     reader, writer = await asyncio.open_connection(HOST, port)
     writer.write(request)
     try:
@@ -186,7 +186,7 @@ async def raw_request(port: int, request: bytes) -> bytes:
 
 async def get(port: int, target: str, *headers: str, method: str = 'GET',
               host: str | None = None) -> tuple[int, bytes]:
-    """Ask for a target that is sent as it is; give the status and the whole answer."""
+    """Request a target that is sent unchanged; return the status and the whole answer."""
     lines = [f'{method} {target} HTTP/1.1', f'Host: {host or f"{HOST}:{port}"}',
              'Connection: close', *headers]
     answer = await raw_request(port, '\r\n'.join([*lines, '', '']).encode())

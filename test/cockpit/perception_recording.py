@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recording of an offline run whose AV perceives with two sensors, and what it perceived."""
+"""A recording of an offline run whose AV perceives with two sensors, and its perception."""
 
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -87,7 +87,7 @@ def record_perceiving(folder: Path, duration_s: float) -> tuple[Perceived, Path]
 
 
 def _request(result: OfflineResult, n: int) -> JointSeries:
-    """Ask of two points: all now, and a tenth of a second later, where they are now."""
+    """Make a request of two points: all now, and unmoved a tenth of a second later."""
     setup = result.setup
     names = [name for item in ('av0', 'hv0') for name in vehicle_joint_names(item)]
     names += [name for item in setup.obstacles.descriptions
@@ -130,7 +130,7 @@ def _scan(n: int, sensor: SensorSpec, scan: Any) -> bytes:
 
 
 def _grid() -> bytes:
-    """Make the map; its stamp is of another clock."""
+    """Make the map; its stamp comes from another clock."""
     stamp = samples.make('builtin_interfaces/msg/Time', 5, 0)
     header = samples.make('std_msgs/msg/Header', stamp, 'map')
     origin = samples.make(

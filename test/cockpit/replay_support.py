@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of offline runs in which something happens, and their frames read back."""
+"""Recordings of eventful offline runs, and their frames read back."""
 
 from collections.abc import Sequence
 import importlib.util
@@ -76,7 +76,7 @@ def plans(result: OfflineResult, offset_ns: int = 0, log_ns: int = START) -> lis
         stamp_ns, at_ns = offset_ns + n * STEP_NS, log_ns + n * STEP_NS
         hv, av = result.vehicle_states[n]
         objects = setup.obstacles.states_at(setup.scheduler.k(n)).poses
-        # The AV is in point 0 only; everybody else stands still, in these forecasts.
+        # In these forecasts the AV is in point 0 only, and all others stand still.
         first = np.concatenate(([*av[:3], 0.0], [*hv[:3], 0.0], objects.ravel()))
         later = np.concatenate((np.full(4, np.nan), first[4:]))
         positions = np.array([first, later, later])
@@ -91,7 +91,7 @@ def plans(result: OfflineResult, offset_ns: int = 0, log_ns: int = START) -> lis
 
 
 def happenings(log_ns: int = START) -> list[Message]:
-    """Make what a run of at least 11 s tells: a collision, refusals, a fired event and others."""
+    """Make the messages of a run of at least 11 s: a collision, refusals, events and others."""
     def status(topic: str, at: int, name: str, text: str, level: int = 0, **values: Any) -> None:
         found.append((topic, DIAGNOSTICS, log_ns + at * STEP_NS + 1_500_000, recorder.status(
             at * STEP_NS, name, text, level, **values)))
@@ -128,7 +128,7 @@ def record(folder: Path, messages: Sequence[Message]) -> Path:
 
 
 class Frames(NamedTuple):
-    """Frames by kind, each as (place in the chunks, header of five, the rest)."""
+    """Return frames by kind, each as (place in the chunks, header of five, the rest)."""
 
     states: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]
     objects: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who is let in: addresses, names, origins, tokens."""
+"""Access control: addresses, names, origins, tokens."""
 
 from crgame_ros.cockpit.access import Access, is_loopback, is_own_origin
 from crgame_ros.errors import InputError
@@ -36,7 +36,7 @@ def test_each_token_is_new() -> None:
 def test_the_address_carries_the_token() -> None:
     assert LOCAL.at_port(8003).url == 'http://127.0.0.1:8003/'
     assert OPEN.url.endswith(f':8000/?token={TOKEN}')
-    # What others can open, which 0.0.0.0 is not.
+    # Others can open this address; they cannot open 0.0.0.0.
     assert not any('0.0.0.0' in url for url in OPEN.urls)
     assert Access('192.0.2.7', 8000, TOKEN).url == f'http://192.0.2.7:8000/?token={TOKEN}'
     assert Access('::1', 80).url == 'http://[::1]:80/'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One client: order, slots, throttle, limits; and the messages it may send."""
+"""One client: order, slots, throttle, limits, and the messages that it may send."""
 
 import asyncio
 import json
@@ -36,7 +36,7 @@ class Wire:
         self.aborted += 1
 
     async def run(self, seconds: float = 0.01) -> None:
-        """Let the client send for a while."""
+        """Run the client's sender for a while."""
         task = asyncio.create_task(self.client.write(self))
         await asyncio.sleep(seconds)
         task.cancel()
@@ -94,10 +94,10 @@ async def test_state_is_throttled_to_the_mean_rate_and_the_last_one_is_sent() ->
         await asyncio.sleep(0.01)
     pumped_s = wire.times[-1] - wire.times[0]
     states = [item for item in wire.sent if item != b'objects']
-    # One at once, then one each 50 ms; a sleep is never shorter than asked for.
+    # One frame at once, then one every 50 ms; a sleep never ends early.
     assert pumped_s / 0.05 - 2 <= len(states) <= pumped_s / 0.05 + 2
     assert len(wire.sent) - len(states) == 41
-    # A pause: nothing comes any more, and what the throttle held back is the state that stays.
+    # A pause: no new frame comes, and the state that the throttle held back is the last one.
     await asyncio.sleep(0.1)
     assert [item for item in wire.sent if item != b'objects'][-1] == b'40'
     task.cancel()
@@ -138,7 +138,7 @@ async def test_a_connection_that_takes_nothing_is_given_up_one_that_is_slow_is_n
         now_s += 1.0
         wire.client.check_stall(now_s)
     assert not wire.aborted
-    # A ping that is added is no progress, a whole message that went through is.
+    # An added ping is no progress; a whole message that was sent is.
     wire.unsent += 2
     wire.client.check_stall(now_s + STALL_S - 0.1)
     assert not wire.aborted
@@ -159,7 +159,7 @@ def test_the_bucket_allows_the_burst_then_the_rate() -> None:
     assert sum(bucket.try_spend(100.0) for _ in range(2000)) == 800
 
 
-# As a page tells what it shows; numbers that are flags become booleans.
+# A page reports its picture in this form; numeric flags become booleans.
 MAP_VIEW = {'shown': 'map', 'inset': 0, 'plans': 1, 'mirrors': 0, 'bare': 1, 'software': 0,
             'width_px': 900.0, 'height_px': 500.0, 'ratio': 2.0, 'renderer': ''}
 GOOD: list[tuple[dict[str, Any], dict[str, Any]]] = [

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The cockpit opened to others: links, TLS, roles, and connections that are kept for nothing."""
+"""The cockpit opened to others: links, TLS, roles, and idle connections."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -31,7 +31,7 @@ openssl = pytest.mark.skipif(shutil.which('openssl') is None, reason='openssl is
 
 @asynccontextmanager
 async def opened(folder: Path) -> AsyncIterator[tuple[PumpBackend, Access, list[str]]]:
-    """Listen as --open-cockpit does, for one seat; give what was printed."""
+    """Listen as --open-cockpit does, for one seat; return the printed lines."""
     opening = Exposure(HOST, 0, links=True, private=folder)
     access, backend = opening.access(), PumpBackend()
     runner, port = await listen(create_app(backend, access, None), HOST, 0)
@@ -43,7 +43,7 @@ async def opened(folder: Path) -> AsyncIterator[tuple[PumpBackend, Access, list[
 
 
 def links_of(lines: list[str]) -> dict[str, str]:
-    """Return the links by what they are for."""
+    """Return the links by their purpose."""
     return {' '.join(line.split()[:-1]): line.split()[-1] for line in lines if '?token=' in line}
 
 
@@ -66,7 +66,7 @@ async def test_a_link_lets_one_browser_in_over_tls(tmp_path: Path) -> None:
         assert list(links) == ['to direct', 'to drive hv0', 'to watch']
         assert all(url.startswith(f'https://{HOST}:{access.port}/?token=')
                    for url in links.values())
-        # The printed fingerprint is that of what the server shows, by another program's count.
+        # Another program computes the same fingerprint of the server's certificate as was printed.
         shown = subprocess.run(
             ['openssl', 'x509', '-noout', '-fingerprint', '-sha256', '-in',
              str(tmp_path / 'certificate.pem')], capture_output=True, text=True, check=True)
@@ -82,7 +82,7 @@ async def test_a_link_lets_one_browser_in_over_tls(tmp_path: Path) -> None:
                 assert word in cookie
         async with anna.get(f'{access.url}', ssl=anna.trusted) as answer:
             assert answer.status == 200
-        # Her own link leads her in again; anybody else is told why not.
+        # The driver's own link admits the driver again; others get the reason of the refusal.
         async with anna.get(links['to drive hv0'], ssl=anna.trusted) as answer:
             assert answer.status == 200
         async with other.get(links['to drive hv0'], ssl=other.trusted) as answer:
@@ -117,7 +117,7 @@ async def test_the_server_decides_what_a_role_may_do(tmp_path: Path) -> None:
         assert (await ask('to drive hv0', **claim))['ok']
         assert 'only a driver can take a seat' in (await ask('to watch', **claim))['text']
         assert 'you are a director' in (await ask('to direct', **claim))['text']
-        # Nobody gets more by asking for it, and whoever wants less gets less.
+        # A client cannot gain rights by asking for them; a client that asks for fewer gets fewer.
         assert 'spectator' in (await ask('to watch', type='role', role='all'))['text']
         assert 'spectator' in (await ask('to direct', type='role', role='watch'))['text']
         assert not (await ask('to direct', **reset))['ok']
@@ -196,7 +196,7 @@ def test_a_token_on_this_machine_too() -> None:
 
 def test_all_addresses_are_those_that_others_can_open() -> None:
     found = reachable_addresses('0.0.0.0')
-    # As the kernel routes to another network, where there is one; nothing is sent.
+    # The kernel's route to another network, if there is one; nothing is sent.
     probe = subprocess.run(['hostname', '-I'], capture_output=True, text=True, check=False)
     own = [item for item in probe.stdout.split() if ':' not in item]
     assert set(own) <= set(found) or found == ('127.0.0.1',)
@@ -215,7 +215,7 @@ async def test_connections_that_ask_nothing_are_ended_and_bounded(
         await next_text(joined, 'hello')
         idle = [await asyncio.open_connection(HOST, running.port) for _ in range(60)]
         for _, writer in idle[::2]:
-            # A request that never ends is no request.
+            # A request that never ends is dropped.
             writer.write(b'GET / HTTP/1.1\r\nHost: ')
         for reader, writer in idle:
             try:
@@ -223,7 +223,7 @@ async def test_connections_that_ask_nothing_are_ended_and_bounded(
             except ConnectionError:
                 pass
             writer.close()
-        # A page whose connection is in use stays, and others get in again.
+        # A page with a used connection stays, and others can connect again.
         await asyncio.sleep(0.8)
         await joined.send_json({'type': 'ping', 't': 1})
         await next_text(joined, 'pong')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The binary frames: each number where the page looks for it."""
+"""The binary frames: each number is where the page reads it."""
 
 import math
 import time
@@ -72,7 +72,7 @@ def test_predictions_without_their_columns_are_refused() -> None:
 
 
 def test_a_state_costs_little_of_a_cycle() -> None:
-    # 100 Hz leave 10 ms; the best of many is what the code costs, not what the machine does.
+    # 100 Hz leave 10 ms. The best of many runs measures the code and not the machine's load.
     rows = np.random.default_rng(0).random((10, 13))
     best = min(_seconds(rows) for _ in range(2000))
     assert best < 20e-6
@@ -84,8 +84,8 @@ def _seconds(rows: np.ndarray) -> float:
     return time.perf_counter() - start
 
 
-def test_a_prediction_of_nobody() -> None:
-    """An AV that is alone is told of nobody: eight numbers, and no more."""
+def test_a_prediction_of_no_vehicle() -> None:
+    """The prediction frame of an AV that is alone has eight numbers only."""
     frame = np.frombuffer(encode_prediction(0, 10, 1, 0.1, 1, (), np.empty((0, 31, 3))))
     assert frame.tolist() == [4.0, 0.0, 10.0, 1.0, 0.1, 1.0, 31.0, 0.0]
 
@@ -105,7 +105,7 @@ def test_an_estimate_has_pose_rates_and_covariance() -> None:
         encode_estimate(2, 15, 1, 0.15, 3, row[1:])
 
 
-def test_seen_lists_columns_and_may_list_nobody() -> None:
+def test_seen_lists_columns_and_may_be_empty() -> None:
     assert numbers(encode_seen(0, 10, 1, 0.1, 1, [0, 1, 7])) == [7, 0, 10, 1, 0.1, 1, 3, 0, 1, 7]
     assert numbers(encode_seen(0, 10, 1, 0.1, 1, ())) == [7, 0, 10, 1, 0.1, 1, 0]
 

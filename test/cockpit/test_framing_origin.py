@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which origins may be named as the one that shows the page within its own."""
+"""The origins that are accepted for a page that frames the cockpit's page."""
 
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
@@ -22,6 +22,6 @@ def test_an_origin_is_written_as_browsers_do(text: str, origin: str) -> None:
     'http://a:65536', 'http://a:', 'http://-a', 'http://a..b', 'http://[127.0.0.1]',
     'http://[::1', 'http://[:::1]', 'null', 'http://a,http://b', 'http://a\nX: b', 'data:a'])
 def test_whatever_else_is_refused(text: str) -> None:
-    """It becomes a part of a header, which must not say more than one origin."""
+    """The value becomes part of a header, which must name one origin only."""
     with pytest.raises(InputError, match='is no origin'):
         read_origin(text)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All clients: what a new one is given, what is sent to whom, what JSON cannot hold."""
+"""All clients: the first messages of a new one, recipients, and values beyond JSON."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ import pytest
 
 
 class Sink:
-    """Takes everything a client is sent."""
+    """Keeps all messages that are sent to a client."""
 
     def __init__(self) -> None:
         self.texts: list[dict[str, Any]] = []
@@ -39,7 +39,7 @@ def _refuse(name: str) -> None:
 
 
 async def received(client: Client) -> Sink:
-    """Return everything that waits for a client."""
+    """Return all messages that wait for a client."""
     sink = Sink()
     task = asyncio.create_task(client.write(sink))
     await asyncio.sleep(0.005)
@@ -128,7 +128,7 @@ async def test_a_client_that_leaves_is_told_of_at_once_and_once() -> None:
         closing, breaking = await running.join(), await running.join()
         await next_text(breaking, 'hello')
         await closing.close()
-        # The server's farewell comes after it has told the backend.
+        # The server tells the backend first and sends its close frame afterwards.
         assert running.backend.gone == ['c1']
         breaking._response.connection.transport.abort()
         await wait_until(lambda: len(running.backend.gone) == 2, 'the second')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The library over HTTP: what is listed, how a game begins, what may be uploaded and chosen."""
+"""The library over HTTP: the list, previews of games, uploads and choices."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -156,7 +156,7 @@ async def test_an_upload_is_kept_listed_and_previewed(tmp_path: Path) -> None:
         assert item['id'] == content['id'] and item['kind'] == 'upload'
         assert item['title'] == 'scriptalert("é")/script ../../my file'
         assert (await preview(running, content['id']))[0] == 200
-        # The same again is the same.
+        # The same file again is the same entry.
         assert await upload(running, CUT_IN) == (200, content)
     # The server chose its name.
     assert [path.name for path in (tmp_path / 'uploads').iterdir()] == [item['name']]
@@ -185,7 +185,7 @@ async def test_uploads_and_nothing_else_are_deleted(tmp_path: Path) -> None:
 
 @pytest.mark.exhaustive
 @in_loop
-async def test_a_preview_that_nobody_waits_for_is_ended(tmp_path: Path) -> None:
+async def test_an_abandoned_preview_is_ended(tmp_path: Path) -> None:
     reader = JobProcess(READER, 'scenario')
     async with with_library(tmp_path, reader=reader) as running:
         first = await entry(running, 'cut_in.yaml')
@@ -196,7 +196,7 @@ async def test_a_preview_that_nobody_waits_for_is_ended(tmp_path: Path) -> None:
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(0.5):
                 await preview(running, first)
-        # Its page has gone: the next one need not wait until the time is over.
+        # Its page has gone: the next request need not wait for the timeout.
         assert (await preview(running, await entry(running, 'roundabout.yaml')))[0] == 200
     assert process.returncode is not None
 
@@ -261,7 +261,7 @@ async def test_a_choice_becomes_a_game_that_the_backend_is_given(tmp_path: Path)
     chosen, own = load_game(path), load_game(SCENARIOS / 'cut_in.yaml')
     assert chosen.humans[0].driver == 'cockpit'
     assert chosen.avs is not None and chosen.avs[0].planner == 'constant-velocity'
-    # The rest is the game's own, and its scenario is found from anywhere.
+    # The rest is unchanged, and its scenario is found from any folder.
     assert (chosen.title, chosen.seed, chosen.humans[0].spawn, chosen.timing) == (
         own.title, own.seed, own.humans[0].spawn, own.timing)
     assert build_setup(chosen).loaded.xml_text.encode() == CUT_IN
@@ -324,7 +324,7 @@ async def test_frames_go_on_while_a_scenario_is_read(tmp_path: Path) -> None:
             await asyncio.sleep(0.01)
             longest_s = max(longest_s, loop.time() - start_s)
         assert (await reading)[0] == 200
-        # Read in the loop itself, it would be one gap: a driver's keys would wait.
+        # Reading in the event loop would make one gap: a driver's keys would wait.
         assert longest_s < 0.5 * (loop.time() - begin_s)
 
 
@@ -340,7 +340,7 @@ async def test_a_scenario_that_takes_too_long_is_given_up_and_the_next_is_read(
         reader._timeout_s = 0.001
         status, content = await preview(running, first)
         assert status == 400 and 'takes more than 0.001 s to read' in content['error']
-        # The answer that was not waited for is not taken for that of the next.
+        # An abandoned answer is not taken for the answer to the next request.
         reader._timeout_s = PATIENCE_S
         _, content = await preview(running, second)
         assert content['scene']['benchmark_id'] == 'ZAM_Roundabout-1_1_T-1'
@@ -391,7 +391,7 @@ async def test_a_folder_that_is_gone_or_holds_anything_is_no_error(tmp_path: Pat
 
 @in_loop
 async def test_a_scenario_that_takes_much_of_the_processor_is_given_up(tmp_path: Path) -> None:
-    """Its process is ended, and with it what it has read; another reads the next one."""
+    """Its process is ended together with its data; another process reads the next scenario."""
     (tmp_path / 'slow.py').write_text(
         'from crgame_ros.cockpit import job_loop\n'
         'def spin(path):\n'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A live node and a replay make the same frames of the same messages, and refuse the same."""
+"""A live node and a replay make the same frames of the same messages and refuse the same."""
 
 from array import array
 from typing import Any
@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message
 
 
 class Both(list[tuple[str, Any, Any]]):
-    """Messages of a run as both libraries decode them: topic, rclpy's, rosbags'."""
+    """Return messages of a run as both libraries decode them: topic, rclpy's, rosbags'."""
 
     def __init__(self, bag: Any) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ def _made(frames: MessageFrames, topic: str, message: Any) -> list[Frame | None]
 
 
 def test_both_libraries_messages_give_the_same_frames(both: Both) -> None:
-    """Byte by byte, of every message of a run; each kind but plans is among them."""
+    """The frames of every message agree byte by byte; all kinds but plans occur."""
     live, replayed = both.frames(), both.frames()
     slots = set()
     for topic, first, second in both:
@@ -85,7 +85,7 @@ def _spoiled(message: Any, how: str) -> Any:
 
 @pytest.mark.parametrize('how', ['joints', 'positions', 'points', 'many'])
 def test_what_is_no_plan_or_request_is_refused(both: Both, how: str) -> None:
-    """One for another vehicle, a row too short, none at all, and too many."""
+    """Refused are plans for another vehicle, with a short row, no rows, or too many rows."""
     frames, kind = both.frames(), type(both.first('/av0/plan_request'))
     plan = kind(joint_names=[f'av0/{name}' for name in ('x', 'y', 'yaw', 'steering')])
     point = type(both.first('/av0/plan_request').points[0])
@@ -95,7 +95,7 @@ def test_what_is_no_plan_or_request_is_refused(both: Both, how: str) -> None:
     assert frames.plan(place, 'av0', plan).slot == 'plan:1'
     with pytest.raises(InputError):
         frames.plan(place, 'av0', _spoiled(plan, how))
-    # A request is spoiled in a copy: others read it too.
+    # The test spoils a copy of the request, as other tests read the original.
     whole = both.first('/av0/plan_request')
     request = kind(header=whole.header, joint_names=list(whole.joint_names), points=[
         point(positions=item.positions, velocities=item.velocities) for item in whole.points])

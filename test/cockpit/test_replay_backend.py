@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings as the page gets them: every state to the last bit, in pieces, with what happened."""
+"""Recordings as the page gets them: every state to the last bit, in chunks, with events."""
 
 import asyncio
 from collections.abc import Iterator
@@ -54,7 +54,7 @@ def parked() -> OfflineResult:
 
 @pytest.fixture(scope='module')
 def bag(parked: OfflineResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Record the run with all that happens in it."""
+    """Record the run with all its events."""
     return record(tmp_path_factory.mktemp('replay') / 'bag',
                   [*recorder.messages(parked), *plans(parked), *happenings()])
 
@@ -76,7 +76,7 @@ def _states(bag: Path) -> dict[int, Any]:
 
 def test_every_state_is_that_of_the_message(bag: Path, backend: ReplayBackend,
                                             parked: OfflineResult) -> None:
-    """Positions to the last bit, at each of the 1201 steps; commands are those consumed."""
+    """Positions agree to the last bit at each of the 1201 steps; commands are those consumed."""
     info = backend.info()
     assert (info['chunks'], info['chunk_s'], info['duration_s']) == (3, 5.0, DURATION_S)
     frames = read_frames(*map(backend.chunk, range(3)))
@@ -91,10 +91,10 @@ def test_every_state_is_that_of_the_message(bag: Path, backend: ReplayBackend,
         np.testing.assert_array_equal(rows[:, :3], joints[0][:, :3])
         np.testing.assert_array_equal(rows[:, :8], vehicles_from_joints(*joints))
     commands = np.array([body[1:].reshape(2, 13)[:, 8:] for _, _, body in frames.states])
-    # Of an AV nothing but the lights that its plans show.
+    # An AV's row has no command but the lights that its plans set.
     assert np.isnan(commands[0]).all() and np.isnan(commands[:, 1, :4]).all()
     assert np.all(commands[1:, 1, 4] == 0.0)
-    # Whether one is to be put back is no part of a frame.
+    # The flag that asks to put a vehicle back is no part of a frame.
     np.testing.assert_array_equal(commands[1:, 0], parked.commands[1:, 0, :5])
 
 
@@ -113,7 +113,7 @@ def test_ticks_are_those_of_the_run_log(bag: Path, backend: ReplayBackend) -> No
 
 
 def test_plans_come_when_they_arrived(backend: ReplayBackend, parked: OfflineResult) -> None:
-    """A plan made for tick n is behind the state n + 3, and has the poses that were sent."""
+    """A plan made for tick n follows the state n + 3 and has the poses that were sent."""
     frames = read_frames(backend.chunk(0))
     steps = {place: int(head[2]) for place, head, _ in frames.states}
     assert len(frames.plans) == 50
@@ -129,7 +129,7 @@ def test_plans_come_when_they_arrived(backend: ReplayBackend, parked: OfflineRes
 
 
 def test_predictions_are_of_the_others(backend: ReplayBackend, parked: OfflineResult) -> None:
-    """Everybody who is there but the AV that asked, by the columns of the scene."""
+    """A prediction holds all present vehicles but the requesting AV, by the scene's columns."""
     _, head, body = read_frames(backend.chunk(0)).predictions[7]
     assert head[2] == 70
     asking, length, count = body[:3].astype(int)
@@ -142,7 +142,7 @@ def test_predictions_are_of_the_others(backend: ReplayBackend, parked: OfflineRe
 
 
 def test_a_chunk_can_be_shown_alone(backend: ReplayBackend) -> None:
-    """It begins with the objects, the prediction and the plan of before, then the first state."""
+    """It begins with the previous objects, prediction and plan, then the first state."""
     frames = read_frames(backend.chunk(1))
     assert frames.states[0][1][2] == 500
     first = frames.states[0][0]
@@ -152,7 +152,7 @@ def test_a_chunk_can_be_shown_alone(backend: ReplayBackend) -> None:
 
 
 def test_chunks_are_built_when_asked_for(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few are kept, each comes out the same again, and only its part of the file is read."""
+    """Few chunks are kept, a rebuilt one is equal, and only its part of the file is read."""
     monkeypatch.setattr(replay_chunks, 'CHUNK_S', 0.5)
     backend = ReplayBackend(bag)
     try:
@@ -179,7 +179,7 @@ def test_chunks_are_built_when_asked_for(bag: Path, monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_recordings_of_ros2_bag(tmp_path: Path, parked: OfflineResult, backend: ReplayBackend,
                                 storage: str) -> None:
-    """What `ros2 bag record` writes gives the same frames."""
+    """Recordings written by `ros2 bag record` give the same frames."""
     messages = [*recorder.messages(parked), *plans(parked), *happenings()]
     messages.sort(key=lambda message: message[2])
     other = ReplayBackend(recorder.rosbag2(tmp_path / 'bag', messages,
@@ -192,7 +192,7 @@ def test_recordings_of_ros2_bag(tmp_path: Path, parked: OfflineResult, backend: 
 
 
 def test_recording_that_was_cut_off(tmp_path: Path, parked: OfflineResult, bag: Path) -> None:
-    """What is whole is shown, up to the last state in it, and a notice says so."""
+    """The intact part is shown, up to its last state, and a notice says so."""
     folder = record(tmp_path / 'bag', [*recorder.messages(parked), *plans(parked)])
     (folder / 'metadata.yaml').unlink()
     file = folder / 'bag_0.mcap'
@@ -213,7 +213,7 @@ def test_recording_that_was_cut_off(tmp_path: Path, parked: OfflineResult, bag: 
 
 
 def test_each_run_of_a_recording(tmp_path: Path, parked: OfflineResult) -> None:
-    """Two runs between resets, each with its own scene, times and states; the last is first."""
+    """Two runs between resets have their own scenes, times and states; the last is first."""
     second = drive(CUT_IN, 1.5, seed=2)
     offset_ns = 50_000_000_000
     folder = record(tmp_path / 'bag', [
@@ -242,7 +242,7 @@ def test_each_run_of_a_recording(tmp_path: Path, parked: OfflineResult) -> None:
 
 
 def test_what_happened(backend: ReplayBackend) -> None:
-    """Marks at the steps that the messages name; a flood of refusals is one."""
+    """Marks are at the steps that the messages name; a flood of refusals makes one mark."""
     events = [(e['n'], e['k'], e['kind'], e['subject'], e['count'])
               for e in backend.info()['events']]
     assert events == [(453, 45, 'collision', 'hv0', 1), (610, 61, 'trigger', 'barrier', 1),
@@ -253,7 +253,7 @@ def test_what_happened(backend: ReplayBackend) -> None:
 
 
 def test_documents_hold_from_their_step_on(backend: ReplayBackend) -> None:
-    """The page can take any time by itself: each entry is whole."""
+    """Each entry is complete, so the page can use any time on its own."""
     documents = backend.info()['documents']
     assert documents['signals'] == [[0.0, {'k': 0, 'states': {'7': 'red'}}],
                                     [3.0, {'k': 30, 'states': {'7': 'green'}}]]
@@ -270,7 +270,7 @@ def test_documents_hold_from_their_step_on(backend: ReplayBackend) -> None:
 
 
 def test_outline_is_every_fifth_state(backend: ReplayBackend) -> None:
-    """Plots get the whole run at once, 0.05 s apart, with the same values."""
+    """Plots get the whole run at once, every 0.05 s, with the same values."""
     outline = read_frames(backend.outline()).states
     assert [int(head[2]) for _, head, _ in outline] == list(range(0, STEPS + 1, 5))
     states = {int(head[2]): body for _, head, body in read_frames(
@@ -280,7 +280,7 @@ def test_outline_is_every_fifth_state(backend: ReplayBackend) -> None:
 
 
 def test_lost_states_are_marked(tmp_path: Path, parked: OfflineResult) -> None:
-    """Nothing is invented for a gap, and the time line shows it."""
+    """A gap is not filled, and the time line shows it."""
     lost = range(START + 3_001_000_000, START + 3_401_000_000)
     folder = record(tmp_path / 'bag', [
         m for m in recorder.messages(parked) if m[0] != '/vehicles/state' or m[2] not in lost])
@@ -295,7 +295,7 @@ def test_lost_states_are_marked(tmp_path: Path, parked: OfflineResult) -> None:
 
 
 def test_plans_that_are_none_are_passed_over(tmp_path: Path, parked: OfflineResult) -> None:
-    """A planner may have sent anything; the run can be shown all the same."""
+    """A run with malformed plans can still be shown."""
     broken = [('/av0/plan', TRAJECTORY, START + 205_000_000, recorder.joints(
         200_000_000, ['x'], [1.0], [1.0], [1.0]))]
     backend = ReplayBackend(record(tmp_path / 'bag', [
@@ -307,7 +307,7 @@ def test_plans_that_are_none_are_passed_over(tmp_path: Path, parked: OfflineResu
 
 
 def test_progress_is_told_when_it_takes_long(bag: Path) -> None:
-    """A clock that goes a second at each look: a line every third look, with the share done."""
+    """With a clock of one second per read, every third read gives a line with the share done."""
     times = iter(range(1000))
     said: list[str] = []
     backend = open_replay(bag, None, said.append, lambda: float(next(times)))
@@ -323,7 +323,7 @@ def test_progress_is_told_when_it_takes_long(bag: Path) -> None:
     ('nowhere', 'no such file or folder'), ('text.mcap', 'no MCAP file'),
     ('empty', 'no recording in this folder')])
 def test_what_is_no_recording(tmp_path: Path, name: str, message: str) -> None:
-    """One line, exit code 2, nothing started."""
+    """The command prints one line, exits with code 2 and starts nothing."""
     (tmp_path / 'text.mcap').write_text('hello')
     (tmp_path / 'empty').mkdir()
     done = subprocess.run(
@@ -335,7 +335,7 @@ def test_what_is_no_recording(tmp_path: Path, name: str, message: str) -> None:
 
 
 def test_replay_goes_with_no_game() -> None:
-    """What would be ignored is refused."""
+    """Options that a replay would ignore are refused."""
     done = subprocess.run([sys.executable, '-m', 'crgame_ros.launcher.main', '--replay', 'bag',
                            '--duration', '3'], capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
@@ -346,7 +346,7 @@ def test_replay_goes_with_no_game() -> None:
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['int', 'term'])
 def test_command_serves_until_it_is_told_to_stop(bag: Path, tmp_path: Path,
                                                  number: signal.Signals) -> None:
-    """The folder of a run will do; it prints an address that works, and ends with 0."""
+    """A run's folder is enough; the command prints a working address and ends with 0."""
     (tmp_path / 'run').mkdir()
     (tmp_path / 'run' / 'bag').symlink_to(bag)
     process = subprocess.Popen(
@@ -366,7 +366,7 @@ def test_command_serves_until_it_is_told_to_stop(bag: Path, tmp_path: Path,
 
 
 def test_requests(bag: Path) -> None:
-    """What is not there is 404; a page cannot steer a recording."""
+    """A missing resource gives 404; a page cannot control a recording."""
     async def ask() -> None:
         access = Access('127.0.0.1', 0)
         runner, port = await listen(create_app(ReplayBackend(bag), access, None), '127.0.0.1', 0)
@@ -399,7 +399,7 @@ def test_requests(bag: Path) -> None:
 
 
 def test_recording_without_states(tmp_path: Path, parked: OfflineResult) -> None:
-    """There is nothing to show, and the message says what is missing."""
+    """Such a recording is refused, and the message says what is missing."""
     folder = record(tmp_path / 'bag', [m for m in recorder.messages(parked)
                                        if m[0] != '/vehicles/state'])
     with pytest.raises(InputError, match='no state of the run is in it'):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The criticality of a recording as the page gets it: as it was told, or measured from the run."""
+"""The criticality of a recording as the page gets it: recorded, or measured from the run."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ from world_support import served  # noqa: E402, I100 - importable from here on
 
 FloatArray = NDArray[np.float64]
 DURATION_S = 4.0
-# Of a frame: kind, epoch, n, k, t and the number of rows.
+# Header of a frame: kind, epoch, n, k, t and the number of rows.
 HEAD = 6
 
 
@@ -44,7 +44,7 @@ def parked() -> OfflineResult:
 
 @pytest.fixture(scope='module')
 def rows(parked: OfflineResult) -> dict[int, FloatArray]:
-    """Measure the run beside the code under test, by step."""
+    """Measure the run by step, independently of the code under test."""
     found: dict[int, FloatArray] = {}
     measure_log(trajectories_of(parked), on_tick=lambda it: found.update(
         {it.n: criticality_rows(it, 0, it.n)}))
@@ -66,7 +66,7 @@ def _frames(data: bytes) -> dict[int, FloatArray]:
 
 
 def _asked(bag: Path) -> dict[int, FloatArray]:
-    """Ask the server for the criticality of a recording's run, as the page does."""
+    """Request the criticality of a recording's run from the server, as the page does."""
     with served(ReplayBackend(bag, 0)) as server:
         answers = []
         for _ in range(2):
@@ -77,7 +77,7 @@ def _asked(bag: Path) -> dict[int, FloatArray]:
 
 
 def _told(rows: dict[int, FloatArray], *more: tuple[str, FloatArray]) -> list[Message]:
-    """Make messages of rows, and of others with labels of their own."""
+    """Make messages of rows, and further ones with other labels."""
     kind = 'std_msgs/msg/Float64MultiArray'
     return [(CRITICALITY_TOPIC, kind, START + n * STEP_NS + 5,
              recorder.cycle_rows(COLUMNS, found)) for n, found in rows.items()] + [
@@ -87,10 +87,10 @@ def _told(rows: dict[int, FloatArray], *more: tuple[str, FloatArray]) -> list[Me
 
 def test_of_each_vehicle_the_most_critical_values_go_out(
         rows: dict[int, FloatArray], parked: OfflineResult, tmp_path: Path) -> None:
-    """Measured by the server, where nobody recorded any: value by value, and to whom."""
+    """Without recorded rows the server measures each value and names the other vehicle."""
     bag = record(tmp_path / 'bag', recorder.messages(parked))
     found = _asked(bag)
-    # One step more: the recording holds its first state, too.
+    # One step more, as the recording also holds its first state.
     assert found.keys() == {n for n, block in rows.items() if len(block)}
     checked = 0
     for n, block in found.items():
@@ -107,7 +107,7 @@ def test_of_each_vehicle_the_most_critical_values_go_out(
 def test_recorded_rows_are_shown_as_they_were_told(rows: dict[int, FloatArray],
                                                    parked: OfflineResult,
                                                    tmp_path: Path) -> None:
-    """Even where the run says something else; what somebody else sends is passed over."""
+    """Recorded rows count even if the run differs; rows of another sender are ignored."""
     changed = {n: block.copy() for n, block in rows.items()}
     for block in changed.values():
         block[:, COLUMNS.index('min_distance')] += 1000.0
@@ -122,7 +122,7 @@ def test_recorded_rows_are_shown_as_they_were_told(rows: dict[int, FloatArray],
 
 
 def test_a_run_that_is_not_there_is_said(parked: OfflineResult, tmp_path: Path) -> None:
-    """As for all else of a replay."""
+    """The refusal is that of all other requests to a replay."""
     bag = record(tmp_path / 'bag', recorder.messages(parked))
     with served(ReplayBackend(bag, 0)) as server, pytest.raises(HTTPError) as refusal:
         urlopen(f'{server.address}api/replay/criticality?epoch=7', timeout=30)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an AV perceived in a recorded run, as the page gets it."""
+"""An AV's perception in a recorded run, as the page gets it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +15,7 @@ import pytest
 
 DURATION_S = 6.0
 FloatArray = NDArray[np.float64]
-# Whatever was sent as float32.
+# Tolerance of values that were sent as float32.
 SINGLE = 1e-5
 
 
@@ -61,7 +61,7 @@ def test_estimates_are_those_of_every_step(backend: ReplayBackend,
 
 def test_scans_begin_where_the_sensor_was(backend: ReplayBackend,
                                           recorded: tuple[Perceived, Path]) -> None:
-    """Every scan of both sensors, with the pose that perception scanned from."""
+    """Every scan of both sensors has the pose from which perception scanned."""
     perceived = recorded[0]
     found = {(SENSORS[int(frame[6])].name, int(frame[2])): frame
              for chunk in (0, 1) for frame in frames(backend.chunk(chunk))
@@ -87,13 +87,13 @@ def test_who_is_seen_is_who_was_in_the_request(backend: ReplayBackend,
     for n, frame in found.items():
         assert frame[5:7].tolist() == [1, len(frame) - 7]
         assert {ids[int(column)] for column in frame[7:]} == perceived.seen[n // 10]
-    # The run shows something: not everybody is seen, and not always the same.
+    # The run is a useful case: some vehicles are unseen, and the set of the seen changes.
     assert len({frozenset(seen) for seen in perceived.seen}) > 3
     assert max(map(len, perceived.seen)) < len(ids)
 
 
 def test_a_chunk_can_be_shown_alone(backend: ReplayBackend) -> None:
-    """It begins with the map, the last request, estimate, and the last scan of each sensor."""
+    """It begins with the map, the last request and estimate, and each sensor's last scan."""
     found = frames(backend.chunk(1))
     first = next(place for place, frame in enumerate(found) if frame[0] == FrameKind.STATE)
     carried = {(int(frame[0]), int(frame[6]) if frame[0] == FrameKind.SCAN else 0): int(frame[2])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Status and alarms, from what the nodes say."""
+"""Status and alarms, made from the nodes' messages."""
 
 from collections.abc import Mapping
 
@@ -25,13 +25,13 @@ def _begun() -> RunStatus:
 
 
 def test_collision_and_road_are_alarms_while_they_last() -> None:
-    """Each by its own kind, with what was hit and when it began."""
+    """Each alarm has its kind, the object that was hit and its start."""
     status = _begun()
     values = {'collision': 'true', 'road_compliance': 'false', 'hit': 'av0,o12', 'n': '70',
               'stop': 'false'}
     _take(status, 'hv0/drivability', 2, 'collision', values, 0.7)
     _take(status, 'hv0/drivability', 2, 'collision', values, 1.7)
-    # What is repeated is no change, of which pages would be told at once.
+    # A repeated message is no change; pages would hear of a change at once.
     assert status.verdicts == 1
     assert status.alarms_document()['active'] == [
         {'id': 'collision:hv0', 'kind': 'collision', 'subject': 'hv0',
@@ -55,7 +55,7 @@ def test_checks_that_are_off_give_no_alarm() -> None:
 
 
 def test_plans_and_planner() -> None:
-    """Counts of the simulation and times of the planner join in one row; braking is an alarm."""
+    """One row has the simulation's counts and the planner's times; braking is an alarm."""
     status = _begun()
     _take(status, 'sim_node: av0 plans', 2, 'no plan: braking', {
         'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
@@ -73,7 +73,7 @@ def test_plans_and_planner() -> None:
 
 
 def test_tracking_errors_of_tracked_avs() -> None:
-    """Now and at worst, by their names; an AV that follows perfectly has none."""
+    """Each has its present and worst errors by name; an AV that follows perfectly has none."""
     status = _begun()
     errors = {f'{when}{name}_error': str(value) for value, (when, name) in enumerate(
         (when, name) for when in ('', 'worst_') for name in ('lane', 'lateral', 'along',
@@ -88,7 +88,7 @@ def test_tracking_errors_of_tracked_avs() -> None:
 
 
 def test_late_traffic_is_an_alarm_until_it_is_not_told_for_two_seconds() -> None:
-    """Nobody tells that agents are in time again."""
+    """The alarm must expire by itself, as no message says that agents are in time again."""
     status = _begun()
     for t in (1.0, 2.5):
         _take(status, 'sim_node: traffic', 1, 'agents are 2 scenario steps late',
@@ -106,7 +106,7 @@ def test_late_traffic_is_an_alarm_until_it_is_not_told_for_two_seconds() -> None
 
 
 def test_lost_driver_and_lost_device() -> None:
-    """A silent seat shows at the seat and as an alarm; a device's own words come with it."""
+    """A silent seat is shown at the seat and as an alarm, with the device's own message."""
     status = _begun()
     _take(status, 'sim_node: hv0 seat', 1, 'driver lost', {'losses': '1'}, 5.0)
     assert status.document()['seats_lost'] == {'hv0': True}
@@ -119,7 +119,7 @@ def test_lost_driver_and_lost_device() -> None:
 
 
 def test_recording() -> None:
-    """Its size while it goes, its last words when it fails; a new run doesn't hide a failure."""
+    """It shows its size, or its last message if it fails; a new run doesn't hide a failure."""
     status = _begun()
     assert status.document()['recording']['state'] == 'none'
     _take(status, 'recorder_node: recording', 0, 'recording into bag',
@@ -133,7 +133,7 @@ def test_recording() -> None:
 
 
 def test_timing_numbers() -> None:
-    """Strings become numbers, what is no number null; skipped frames are an alarm."""
+    """Strings become numbers, other values null; skipped frames are an alarm."""
     status = _begun()
     _take(status, 'timesync_node: table I', 1, 'late', {
         'mean_step_error_ms': '0.05', 'real_time_ratio_min': 'nan', 'frame_skipping': 'True'}, 4.0)
@@ -148,14 +148,14 @@ def test_timing_numbers() -> None:
 
 
 def test_run_state() -> None:
-    """What sim_node says of itself."""
+    """The run state is the one that sim_node publishes."""
     status = _begun()
     _take(status, 'sim_node: run', 0, 'paused', {'real_time_factor': '0.5'}, 0.0)
     assert (status.document()['run'], status.document()['real_time_factor']) == ('paused', 0.5)
 
 
 def test_others_are_ignored() -> None:
-    """Vehicles of another game and nodes nobody knows change nothing."""
+    """Messages of another game's vehicles and of unknown nodes change nothing."""
     status = _begun()
     before = status.document()
     for name in ('sim_node: av9 plans', 'my_node: hello', 'planner_node: av9', ''):
@@ -164,7 +164,7 @@ def test_others_are_ignored() -> None:
 
 
 def test_vehicles_that_take_no_part_leave_nothing() -> None:
-    """Nor do those of the game before: a peer that makes names up would fill the memory."""
+    """Unknown and former vehicles are not stored: a peer's made-up names could fill the memory."""
     status = _begun()
     values = {'collision': 'true', 'road_compliance': 'false', 'hit': 'av0'}
     for name in ('hv1/drivability', '/drivability', 'hv0/x/drivability',
@@ -180,7 +180,7 @@ def _verdict(status: RunStatus, vehicle: str, hit: str, off_road: bool, t: float
 
 
 def test_contacts_and_departures_are_kept_until_the_next_run() -> None:
-    """Each once, also where both vehicles tell of it; again when it has been over."""
+    """Each is kept once, even if both vehicles report it, and again after it has ended."""
     status = _begun()
     _verdict(status, 'hv0', 'av0', False, 1.0)
     _verdict(status, 'av0', 'hv0', False, 1.0)
@@ -198,7 +198,7 @@ def test_contacts_and_departures_are_kept_until_the_next_run() -> None:
 
 
 def test_the_end_of_a_run_leaves_no_alarm_but_a_failed_recording() -> None:
-    """What stood then is its result; drivers that fall silent afterwards are nobody's worry."""
+    """The result keeps its last state; drivers that fall silent afterwards raise no alarm."""
     status = _begun()
     _verdict(status, 'hv0', 'av0', True, 1.0)
     _take(status, 'recorder_node: recording', 2, 'disk full', {}, 1.0)
@@ -214,7 +214,7 @@ def test_the_end_of_a_run_leaves_no_alarm_but_a_failed_recording() -> None:
 
 
 def test_a_recording_that_is_done_says_so() -> None:
-    """Its size stays to be seen."""
+    """Its size stays visible."""
     status = _begun()
     _take(status, 'recorder_node: recording', 0, 'recorded', {
         'messages': '12', 'bytes': '2500000', 'closed': 'True'}, 1.0)
@@ -223,7 +223,7 @@ def test_a_recording_that_is_done_says_so() -> None:
 
 
 def test_a_silent_simulation_is_no_end_that_it_told_itself() -> None:
-    """The page tells the two apart."""
+    """The page distinguishes a silent simulation from one that reported its end."""
     status = _begun()
     _take(status, 'sim_node: run', 0, 'running', {}, 2.0)
     status.lose()
@@ -234,7 +234,7 @@ def test_a_silent_simulation_is_no_end_that_it_told_itself() -> None:
 
 
 def test_a_contact_that_stops_a_driver_is_counted_once() -> None:
-    """Told by the event alone, by the event and then a verdict, and by a verdict and then it."""
+    """The contact comes as event alone, as event then verdict, or as verdict then event."""
     status = _begun()
     stops = [FiredEvent.contact('hv0', 'av0', 70, 7), FiredEvent.put_back('hv0', 200, 20),
              FiredEvent.contact('hv0', 'av0', 500, 50), FiredEvent.contact('hv0', 'o12', 900, 90)]
@@ -244,7 +244,7 @@ def test_a_contact_that_stops_a_driver_is_counted_once() -> None:
     status.add_events(stops[:2], 0.01)
     assert status.contacts == [{'vehicle': 'hv0', 'with': 'av0', 't': 70 * 0.01}]
     assert status.verdicts == 1
-    # The AV drives on against it.
+    # The AV keeps pushing against the vehicle.
     _take(status, 'av0/drivability', 2, 'collision', touches, 0.9)
     _take(status, 'av0/drivability', 0, 'valid', free, 2.0)
     assert len(status.contacts) == 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Past runs over HTTP: what is listed, told, sent, compared, shown again and deleted."""
+"""Past runs over HTTP: list, details, downloads, comparison, replay and deletion."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -36,7 +36,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def make_run(folder: Path, bag: Path) -> Path:
-    """Put a finished run into a folder."""
+    """Write a finished run into a folder."""
     shutil.copytree(bag, folder / 'bag')
     (folder / 'game.yaml').write_text(json.dumps(
         {'scenario': str(folder / 'x.xml'), 'title': TITLE}))
@@ -160,7 +160,7 @@ async def test_only_runs_that_are_over_are_deleted_and_only_their_own_files(
         names = [run['name'] for run in (await running.json('/api/runs'))['runs']]
     assert names == ['now/run_3']
     assert not other.exists()
-    # What somebody else put there stays, and so do the session and its other runs.
+    # Foreign files stay, as do the session and its other runs.
     assert [path.name for path in (session / 'run_2').iterdir()] == ['notes.txt']
     assert {path.name for path in session.iterdir()} == {'.started', 'run_2', 'run_3'}
 

@@ -37,7 +37,7 @@ def document_of(setup: Setup, **changes: Any) -> dict[str, Any]:
                                     real_time_factor=1.0))
     game = parse_game_document(json.dumps(text | changes))
     document = scene_document(setup.loaded, setup.descriptions, game)
-    # What a browser would read: refuses NaN and infinities.
+    # Parsed as in a browser, which refuses NaN and infinities.
     read: dict[str, Any] = json.loads(json.dumps(document, allow_nan=False))
     return read
 
@@ -52,7 +52,7 @@ def line(flat: list[float]) -> shapely.LineString:
 
 
 def check_against_file(document: dict[str, Any], setup: Setup) -> None:
-    """Every lanelet, vehicle and object is there, where the file has it."""
+    """Check that every lanelet, vehicle and object is at its place of the file."""
     network = setup.loaded.scenario.lanelet_network
     assert [entry['id'] for entry in document['lanelets']] == \
         [lanelet.lanelet_id for lanelet in network.lanelets]
@@ -111,7 +111,7 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
 def test_what_sounds_and_what_does_not_is_told() -> None:
     setup = build_setup(load_game(scenarios_directory() / 'two_avs.yaml'))
     assert document_of(setup)['sound'] == 'on'
-    # Of a recording that is older than the key.
+    # The recording is older than the key.
     assert document_of(setup, sound=None)['sound'] == 'on'
     setup = replace(setup, game=replace(setup.game, sound='none'), humans=tuple(
         replace(human, vehicle=replace(human.vehicle, powertrain='electric'))
@@ -131,7 +131,7 @@ def test_the_reach_of_an_avs_sensors_is_told() -> None:
     vehicles = document_of(build_setup(game))['vehicles']
     assert vehicles[1]['perception'] == {
         'localisation': True, 'sensors': ['front', 'rear'], 'range': 120.0}
-    # One that sees everything has no reach.
+    # A sensor that sees everything has no range.
     assert vehicles[2]['perception'] == {'localisation': False, 'sensors': [], 'range': None}
 
 
@@ -158,7 +158,7 @@ def test_gaps_are_narrow_holes_between_lanelets_and_nothing_of_them() -> None:
     surfaces = shapely.union_all([
         shapely.Polygon(np.concatenate((x.left_vertices[:, :2], x.right_vertices[::-1, :2])))
         for x in setup.loaded.scenario.lanelet_network.lanelets])
-    # Four left turns each leave slits beside the lanes that they cross.
+    # Four left turns leave slits beside the lanes that they cross.
     assert len(gaps) >= 4
     for gap in gaps:
         assert gap.buffer(-0.4).is_empty
@@ -186,13 +186,13 @@ def test_lights_and_stop_lines_lie_at_their_lanes(shared_scenarios: Path) -> Non
 def test_lights_say_for_which_movement_they_are(shared_scenarios: Path) -> None:
     setup = published(shared_scenarios, 'USA_Lanker-1_3_T-1')
     told = {light['id']: light['direction'] for light in document_of(setup)['lights']}
-    # As the file has it.
+    # The value of the file.
     assert told[11522] == 'left' and set(told.values()) == {
         'left', 'right', 'all', 'straightRight'}
 
 
-def test_signs_say_where_to_whom_and_what(shared_scenarios: Path) -> None:
-    """A sign's readers drive its way."""
+def test_signs_have_a_place_readers_and_a_meaning(shared_scenarios: Path) -> None:
+    """The vehicles that a sign applies to drive in its direction."""
     setup = published(shared_scenarios / 'more', 'OSC_Overtake-1_1_T-1')
     document = document_of(setup)
     lanelets = {entry['id']: entry for entry in document['lanelets']}
@@ -200,13 +200,13 @@ def test_signs_say_where_to_whom_and_what(shared_scenarios: Path) -> None:
     assert signs[1]['kind'] == 'HIGHWAY_EXIT' and signs[1]['value'] == ''
     assert signs[2]['kind'] == 'MAX_SPEED' and float(signs[2]['value']) * 3.6 == pytest.approx(60)
     assert (signs[2]['x'], signs[2]['y'], signs[2]['virtual']) == (138.168, 6173.77, False)
-    # OSC is none of commonroad-io's countries.
+    # commonroad-io has no country OSC.
     assert document['country'] == 'ZAM'
     for sign in document['signs']:
         headings = [
             math.atan2(y, x) for number in sign['lanelets'] for x, y in np.diff(np.reshape(
                 lanelets[number]['center'], (-1, 2)), axis=0)]
-        # Vertices that were dropped turned the line by little.
+        # The dropped vertices turned the line by a small angle.
         assert any(math.cos(sign['yaw'] - heading) > 0.99 for heading in headings) \
             or not sign['lanelets']
 
@@ -223,7 +223,7 @@ def test_a_sign_says_no_more_than_fits_on_a_plate() -> None:
 def test_light_and_air_are_the_games_else_the_scenarios() -> None:
     setup = build_setup(load_game(scenarios_directory() / 'fog.yaml'))
     assert document_of(setup)['environment'] == {'light': 'day', 'visibility': 80.0}
-    # What was recorded before games knew of it says nothing.
+    # Older recordings do not have the key.
     assert document_of(setup, environment=None)['environment'] == {
         'light': 'day', 'visibility': 30_000.0}
 
@@ -246,7 +246,7 @@ def test_heights_keep_as_true_as_the_ground_plan(tmp_path: Path) -> None:
             heights = np.array(entry[f'{side}_z'])
             assert heights == pytest.approx([height(x) for x in xs], abs=1e-3)
             lanelet = setup.loaded.scenario.lanelet_network.find_lanelet_by_id(entry['id'])
-            # What drives knows of no height.
+            # Vehicles have no height.
             true = getattr(lanelet, f'{side}_vertices')
             assert true.shape[1] == 2 and len(xs) < len(true)
             order = np.argsort(xs)
@@ -257,7 +257,7 @@ def test_heights_keep_as_true_as_the_ground_plan(tmp_path: Path) -> None:
 
 
 def test_circular_goal_has_its_radius(tmp_path: Path) -> None:
-    """A goal's circle is as large as the file says: commonroad-io's own outline is half of it."""
+    """A goal's circle has the file's radius; commonroad-io's own outline has half of it."""
     text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
     start = text.index('<goalState>')
     start = text.index('<position>', start)

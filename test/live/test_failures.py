@@ -27,7 +27,7 @@ def _check_loss(cycles: CycleTable, last_n: int) -> None:
     heard = int(np.flatnonzero(numbers == last_n)[0])
     # The cycle may have begun a little before it was due: its time has a resolution of one step.
     assert actual[falling] - actual[heard] > SILENCE_S - STEP_NS / 1e9
-    # A command may be late on a busy machine; it counts at most twice the silence longer.
+    # A command may be late on a busy machine; it never holds longer than three such silences.
     assert actual[falling - 1] - actual[heard] < 3 * SILENCE_S
     assert np.all(throttle[heard:falling] == THROTTLE)
     released = falling + int(np.flatnonzero(throttle[falling:] == 0.0)[0])

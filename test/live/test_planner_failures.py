@@ -97,7 +97,7 @@ def test_killed_planner_is_started_again_and_used(run: Run) -> None:
     peer.forget()
     peer.wait_until(lambda: peer.messages['/<av>/plan'], 'a plan of the successor')
     peer.wait_until(lambda: len(peer.statuses('sim_node: av0 plans')) > 1, 'two reports')
-    # No plan may be older than a tick and its answer, where every one is answered.
+    # If each request is answered, no plan may be older than a tick and the time to answer.
     peer.wait_until(lambda: float(run.counters()['age_ms']) < 300.0, 'a fresh plan')
     assert launcher.says(r'\[planner_node_av0\] .*planner idm is ready')
     assert not _stands(peer, 'av0')
@@ -152,7 +152,7 @@ def _answer(run: Run, rogue: Publisher, lie: Callable[[NDArray[np.float64]], NDA
 @pytest.mark.exhaustive
 def test_lies_of_a_planner_are_refused_with_the_reason(run: Run) -> None:
     """
-    NaN, a start elsewhere, a jump, 90 m/s, a wrong stamp: each is named, and the good plan stays.
+    Each bad plan (NaN, another start, a jump, 90 m/s, a wrong stamp) is named; the good one stays.
 
     The real planner is frozen, so that the plans of another node answer the open requests. Its
     last plan reaches 3 s: the open request is repeated after 1 s, a refused one after 0.1 s.
@@ -171,7 +171,7 @@ def test_lies_of_a_planner_are_refused_with_the_reason(run: Run) -> None:
         assert reason in peer.statuses('sim_node: av0 plan refused')[-1][0].message
     refusals = peer.statuses('sim_node: av0 plan refused')
     assert len(refusals) == len(reasons)
-    # Each took a tick at least, and the AV is still on the plan from before.
+    # Each refusal took a tick at least, and the AV still follows the plan from before.
     run.wait_for_steps(STEPS_PER_TICK)
     assert _followed(good, peer.states('av0')) >= len(reasons)
     assert peer.states('av0')[-1, 4] > 5.0

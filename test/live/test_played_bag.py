@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recording that is played in a loop, first from its middle: every node begins anew."""
+"""A recording is played in a loop, first from its middle: every node begins anew."""
 
 from collections.abc import Iterator
 import os
@@ -24,7 +24,7 @@ from visualization_msgs.msg import Marker
 DURATION_S = 4.0
 # Where the third round begins: without documents, which are known from the second.
 OFFSET_S = 0.5
-# Those who listen, with their parameters; what they publish is not played.
+# The listening nodes, with their parameters; the topics that they publish are not played.
 NODES = {'marker_node': (), 'timesync_node': (), 'map_node': (), 'drivability_node': (),
          'criticality_node': (),
          'perception_node': ('vehicle:=av0',), 'planner_node': ('vehicle:=av0',),
@@ -39,12 +39,12 @@ HEARD = ('/markers', '/criticality', ('/<v>/drivability', 'av0'), ('/<av>/plan_r
 
 class Played(NamedTuple):
     """
-    What came of a recording that was played from its middle, as a whole, and from `OFFSET_S` on.
+    Results of a recording that was played from its middle, as a whole, and from `OFFSET_S` on.
 
-    :ivar peer: heard everything.
+    :ivar peer: it received all messages.
     :ivar begun: how many messages of each topic had come when each round began.
     :ivar pages: scenes that the page had got by then.
-    :ivar lines: what each node said.
+    :ivar lines: output of each node.
     :ivar codes: how each node ended.
     """
 
@@ -56,7 +56,7 @@ class Played(NamedTuple):
     codes: dict[str, int]
 
     def stamps_s(self, topic: str, index: int) -> list[float]:
-        """Return the stamps of what came in one of the rounds [s]."""
+        """Return the stamps of the messages of one of the rounds [s]."""
         ends = [*self.begun[1:], {name: len(found) for name, found in self.peer.messages.items()}]
         heard = self.peer.messages[topic][self.begun[index].get(topic, 0):
                                           ends[index].get(topic, 0)]
@@ -120,8 +120,8 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
         yield Played(folder, peer, begun, scenes, lines, codes)
 
 
-def test_nobody_dies_or_complains(played: Played) -> None:
-    """Each node is the process it was, and ended in good order; no error was said."""
+def test_no_node_dies_or_complains(played: Played) -> None:
+    """Each node stays the same process and ends in good order; no error is reported."""
     assert played.codes == dict.fromkeys(NODES, 0)
     wrong = [line for found in played.lines.values() for line in found
              if 'ERROR' in line or 'Traceback' in line or 'error' in line.lower()]
@@ -130,13 +130,13 @@ def test_nobody_dies_or_complains(played: Played) -> None:
 
 @pytest.mark.parametrize('node', ['marker_node', 'timesync_node', 'recorder_node'])
 def test_without_documents_it_is_told_once_why_nothing_happens(played: Played, node: str) -> None:
-    """From its middle on a recording has none; 2 s later that is said."""
+    """From its middle on a recording has no documents; 2 s later that is reported."""
     told = [line for line in played.lines[node] if '/scenario/game' in line]
     assert len(told) == 1 and '--start-offset' in told[0]
 
 
 def test_markers_are_deleted_and_drawn_anew(played: Played) -> None:
-    """Dark without documents, then the scene of each round, within a second."""
+    """Without documents there are no markers; then each round's scene comes within a second."""
     messages = played.peer.messages['/markers']
     first, second, third = (count.get('/markers', 0) for count in played.begun)
     assert first == second == 0
@@ -160,9 +160,9 @@ def _offset_s(played: Played) -> float:
 def test_verdicts_perception_and_plans_begin_anew(played: Played, topic: str,
                                                   within_s: float) -> None:
     """
-    In the third round as in the second they begin within a second and go to the end.
+    In the second and the third round they begin within a second and go to the end.
 
-    A planner is loaded when a game names it for the first time, which takes it more than that.
+    A planner is loaded when a game names it for the first time, which takes more than a second.
     """
     offset_s = _offset_s(played)
     assert played.stamps_s(topic, 0) == []
@@ -194,10 +194,10 @@ def test_each_round_is_a_recording_of_its_own(played: Played) -> None:
         assert log.ks[0] - original.ks[0] <= 10.0 * offset_s + 1.0
         assert abs(int(log.ks[-1] - original.ks[-1])) <= 1
         for topic in ('/vehicles/state', '/timing/cycle'):
-            # Of a busy machine some may be missing where publisher and reader had not met.
+            # On a busy machine some may be missing from before publisher and subscriber were matched.
             assert counts[topic] >= (DURATION_S - offset_s) * 100 * 0.95
 
 
 def test_the_page_gets_the_scene_again(played: Played) -> None:
-    """It forgets what it has shown, and goes on with the steps of the new round."""
+    """The page drops the old scene, and goes on with the steps of the new round."""
     assert played.scenes[-1] > played.scenes[-2] >= 0

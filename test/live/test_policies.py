@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A policy that was trained by the example drives the AV of a live run, another one a human."""
+"""A policy trained by the example drives the AV of a live run, another one the human."""
 
 from collections.abc import Iterator
 import json
@@ -56,7 +56,7 @@ def test_every_plan_of_the_policy_is_followed(run: Launcher) -> None:
 
 def test_the_recording_names_the_policy_and_holds_what_it_did(run: Launcher) -> None:
     log = read_trajectories(run.out / 'bag')
-    # Both were there in time.
+    # Both were ready in time.
     assert not run.says('starting without')
     vehicles = [item.id for item in log.vehicles]
     human = log.vehicle_states[:, vehicles.index('hv0')]

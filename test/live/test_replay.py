@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded human again: offline to the last bit, and live against another planner."""
+"""A recorded human is replayed: offline to the last bit, and live against another planner."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ STEP_NS = 10_000_000
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Record the cut-in live, at twice its pace."""
+    """Record the cut-in live, at twice the pace."""
     folder = tmp_path_factory.mktemp('replay') / 'run'
     with Launcher([CUT_IN, '--duration', DURATION_S, '--real-time-factor', 2],
                   folder) as launcher:
@@ -71,7 +71,7 @@ def test_recorded_human_is_reproduced_offline_to_the_last_bit(recorded: Path) ->
     """
     With the recorded commands and intervals, every published state comes out again exactly.
 
-    Not so with the nominal interval: the measured ones differ from it, and only they are right.
+    The nominal interval gives other states: only the measured intervals are right.
     """
     published = _published(recorded / 'bag', 'hv0')
     assert sorted(published) == list(range(STEPS + 1))
@@ -82,11 +82,11 @@ def test_recorded_human_is_reproduced_offline_to_the_last_bit(recorded: Path) ->
     result = run_offline(setup, duration_s=DURATION_S, drivers=drivers, intervals_s=intervals_s)
     live = np.array([published[n] for n in range(STEPS + 1)])
     assert np.array_equal(_joints(result), live)
-    # It steers: the lateral motion is not the trivial one of a straight road.
+    # The human steers: the lateral motion is not the trivial one of a straight road.
     assert np.abs(live[-1, 0, 2] - live[0, 0, 2]) > 0.01
     nominal = run_offline(setup, duration_s=DURATION_S, drivers=drivers)
     assert not np.array_equal(_joints(nominal), live)
-    # Clipping carries over, so that the sum of the intervals is the simulated time but for jitter.
+    # Clipped time carries over: the intervals sum up to the simulated time but for jitter.
     assert intervals_s.sum() == pytest.approx(DURATION_S, abs=0.1)
     again = run_offline(setup, duration_s=DURATION_S, drivers=drivers, intervals_s=intervals_s)
     assert again.state_hash == result.state_hash != nominal.state_hash
@@ -94,7 +94,7 @@ def test_recorded_human_is_reproduced_offline_to_the_last_bit(recorded: Path) ->
 
 @contextmanager
 def _busy_machine() -> Iterator[None]:
-    """Keep two cores at work beside the graph, at the same priority."""
+    """Keep two cores busy beside the graph, at the same priority."""
     workers = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(2)]
     try:
         yield
@@ -134,16 +134,16 @@ def test_recorded_human_drives_live_against_another_planner(recorded: Path,
     assert np.array_equal(first.column('dt_eff_s'), intervals[:STEPS])
     # The loop itself ran over other intervals than were integrated.
     assert not np.array_equal(first.column('step_error_s'), second.column('step_error_s')[:STEPS])
-    # After the recording nobody is there: 0.45 s later, at r_p- = 2.2 /s, the brake is on.
+    # After the recording the seat is empty: 0.45 s later, at r_p- = 2.2 /s, the brake is on.
     assert commands[STEPS + 50, :2].tolist() == [0.0, pytest.approx(0.15)]
-    # What it differed by from the clock is made up for.
+    # Its difference from the clock is made up for.
     assert intervals.sum() == pytest.approx(0.01 * len(intervals), abs=0.1)
     before, after = (_published(path, 'hv0') for path in (bag, again))
     assert sorted(after) == list(range(len(intervals) + 1))
     assert all(np.array_equal(before[n], after[n]) for n in range(STEPS + 1))
-    # The simulation repeats it: no node speaks for the seat.
+    # The simulation repeats the recording: no node drives the seat.
     assert 'driver_node_hv0' not in dict(launcher.started)
-    # The other planner keeps its speed, whatever the human does; IDM had accelerated.
+    # The other planner keeps its speed, whatever the human does; IDM accelerated.
     before, after = (_published(path, 'av0') for path in (bag, again))
     assert after[200][1, 0] == pytest.approx(after[0][1, 0], abs=1e-6)
     assert before[200][1, 0] > before[0][1, 0] + 0.5

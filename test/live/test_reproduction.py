@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The live part of `crgame reproduce`: table I from a graph, and its recorded human again."""
+"""The live part of `crgame reproduce`: table I from a graph, and its human replayed."""
 
 from pathlib import Path
 

@@ -88,7 +88,7 @@ def _check_outputs(out: Path, benchmark_id: str, *more: str) -> None:
 def test_a_run_leaves_its_outputs(finished: Launcher) -> None:
     """Bag with metadata, scenario, timing, game and report; the nodes start once and all end."""
     _check_outputs(finished.out, BENCHMARK_ID, 'report.html')
-    # The report comes after everything that nobody can make up for.
+    # The report comes last: all other files cannot be made later.
     assert finished.text.index('/timing.json') < finished.text.index('writing ')
     assert {name for name, _ in finished.started} == NODES
     assert len(finished.started) == len(NODES)
@@ -106,13 +106,13 @@ def live_criticality(finished: Launcher) -> NDArray[np.float64]:
 
 
 def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> None:
-    """Each recorded row, to the last bit; and the node tells of each vehicle."""
+    """Each recorded row is the same to the last bit; the node has rows of each vehicle."""
     live = live_criticality(finished)
     with BagReader(finished.out / 'bag') as reader:
         told = {status.name for item in reader.decoded(['/diagnostics'])
                 for status in item.message.status}
     first, last = int(live[0, 1]), int(live[-1, 1])
-    # Without a gap; how soon it begins and how far it gets is a matter of the machine.
+    # There is no gap; its first and last row depend on the machine.
     assert sorted(set(live[:, 1].tolist())) == list(range(first, last + 1, STEPS_PER_TICK))
     assert np.isfinite(live[:, COLUMNS.index('min_distance')]).all()
     blocks: list[NDArray[np.float64]] = []
@@ -128,7 +128,7 @@ def test_criticality_is_the_same_live_and_from_the_bag(finished: Launcher) -> No
 
 @pytest.mark.clock
 def test_criticality_begins_within_a_second(finished: Launcher) -> None:
-    """Its subscriptions know the simulation by then; none waits for it, as for planners."""
+    """Its subscriptions are matched by then; no run waits for it, unlike for planners."""
     live = live_criticality(finished)
     assert live[0, 1] <= 1.0 / DT_S
     assert live[-1, 1] == STEPS
@@ -136,7 +136,7 @@ def test_criticality_begins_within_a_second(finished: Launcher) -> None:
 
 @pytest.mark.exhaustive
 def test_the_human_drives_live_against_another_planner(finished: Launcher, tmp_path: Path) -> None:
-    """In real time, recorded; the human does what it did, to the last bit."""
+    """In real time, with a recording; the human repeats its motion to the last bit."""
     assert main(['replay', str(finished.out), '--planner', 'constant-velocity', '--live',
                  '--headless', '--out', str(tmp_path / 'out')]) == 0
     recorded, found = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
@@ -148,14 +148,14 @@ def test_the_human_drives_live_against_another_planner(finished: Launcher, tmp_p
 
 
 def test_the_timing_report_has_table_one(finished: Launcher) -> None:
-    """`timing.json` has CRG's table I and what the plans did, with plausible numbers."""
+    """`timing.json` has CRG's table I and the counts of plans, with plausible numbers."""
     report = json.loads((finished.out / 'timing.json').read_text())
     assert set(report) >= TABLE_I
     assert set(report['real_time_ratio']) == {'final', 'mean', 'min'}
     assert report['gaps'] == 0
     plans = report['planners']['av0']
     assert set(plans) >= PLANS
-    # One request a tick at most, the one of k0 included; nobody refuses our own planner.
+    # One request a tick at most, the one of k0 included; no plan of our own planner is refused.
     assert 0 < plans['accepted'] <= STEPS // STEPS_PER_TICK + 1
     assert plans['refused'] == 0
     assert plans['latency_ms']['p50'] > 0.0
@@ -196,7 +196,7 @@ def test_no_step_is_missing_in_the_recording(finished: Launcher) -> None:
             table = CycleTable.from_message(label, item.message.data)
             numbers += table.column('n').tolist()
             throttle += table.commands('hv0')[:, 0].tolist()
-    # The driver is awaited: its key counts from the first cycle on, by CRG's 1.8/s.
+    # The run waits for the driver: its key counts from the first cycle on, by CRG's 1.8/s.
     assert throttle[0] == pytest.approx(1.8 * 0.01, abs=1e-6)
     assert numbers == list(range(1, STEPS + 1))
     assert sorted(_poses(finished.out / 'bag')) == list(range(STEPS + 1))
@@ -206,7 +206,7 @@ def test_the_scenario_is_valid_and_true_to_the_recording(finished: Launcher) -> 
     """
     The XML obeys CommonRoad's schema, and every k is within 1 mm of the recorded motion.
 
-    The human has been where the file says when the intervals of his own cycles summed up to k.
+    The human was at the file's position when the intervals of his own cycles summed up to k.
     """
     path = finished.out / f'{BENCHMARK_ID}.xml'
     schema = Path(commonroad.__file__).parent.joinpath(
@@ -271,7 +271,7 @@ def test_terminate_ends_a_bare_scenario(shared_scenarios: Path, tmp_path: Path) 
     """
     `--scenario` alone runs: a human is placed, the AV gets a planner; SIGTERM ends it well.
 
-    Also the compiled packages of the reactive planner, which tell of every object that is left.
+    So do the compiled packages of the reactive planner, which report each object that is left.
     """
     with Launcher(['--scenario', shared_scenarios / 'USA_US101-4_1_T-1.xml',
                    '--planner', 'reactive'], tmp_path / 'run') as launcher:

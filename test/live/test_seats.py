@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Seats in a running graph: taken from the script, from the planner, and given back."""
+"""Seats in a running graph are taken from the script or the planner, and given back."""
 
 from collections.abc import Callable, Iterator
 import json
@@ -34,7 +34,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
 
 @pytest.fixture
 def peer(running: Peer) -> Iterator[Peer]:
-    """Leave the seats as every test finds them, also if it fails."""
+    """Return the peer, and restore the seats after a test, also if it fails."""
     yield running
     for seat, own in (('hv0', 'game'), ('av0', 'planner')):
         if _seats(running)[seat]['source'] != own:
@@ -42,7 +42,7 @@ def peer(running: Peer) -> Iterator[Peer]:
 
 
 def _seats(peer: Peer) -> dict[str, dict[str, str]]:
-    """Return what /seats says now."""
+    """Return the newest content of /seats."""
     peer.listen()
     return json.loads(peer.messages['/seats'][-1].data) if peer.messages['/seats'] else {}
 
@@ -57,7 +57,7 @@ class Taker:
         self._commands: Publisher = peer.publisher('/<v>/driver_command', seat)
 
     def order(self, source: str, then: str) -> None:
-        """Order a source and wait until /seats names what follows from it."""
+        """Order a source and wait until /seats names the resulting one."""
         self._orders.publish(String(data=json.dumps({'seat': self.seat, 'source': source})))
         self.peer.wait_until(
             lambda: _seats(self.peer).get(self.seat, {}).get('source') == then,
@@ -84,10 +84,10 @@ def _last(taker: Taker, column: int, value: float) -> bool:
 
 
 def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
-    """The vehicle obeys who has the seat, and nobody else; its own driver falls silent."""
+    """The vehicle obeys the holder of the seat only; its own driver falls silent."""
     taker = Taker(peer, 'hv0')
     assert _seats(peer)['hv0'] == {'source': 'game', 'driver': _seats(peer)['hv0']['driver']}
-    # Before the order nobody listens to a stranger.
+    # Before the order no node listens to a stranger.
     peer.forget()
     taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 20, 'twenty cycles')
     assert np.all(taker.consumed()[:, :2] == (THROTTLE, 0.0))
@@ -98,7 +98,7 @@ def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
     taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 50
                and np.all(taker.consumed()[-50:, :2] == (0.0, 0.25)),
                'fifty cycles of nothing but that brake')
-    # Neither the script's pedal nor anybody else's, ever.
+    # No other pedal was ever obeyed, not the script's either.
     assert np.all(taker.consumed()[5:, 0] == 0.0)
     spoken = [message.header.frame_id for message in peer.messages['/<v>/driver_command']]
     assert 'game' not in spoken[10:]
@@ -108,10 +108,10 @@ def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
 
 @pytest.mark.exhaustive
 def test_an_av_is_taken_over_and_given_back(peer: Peer) -> None:
-    """It obeys the person, its planner goes on being asked, and drives on afterwards."""
+    """The AV obeys the driver; its planner still gets requests, and drives on afterwards."""
     taker = Taker(peer, 'av0')
     peer.wait_until(lambda: len(peer.messages['/timing/cycle']), 'a cycle')
-    # Nobody's pedals and wheel; its lights are those of its plan.
+    # There are no pedals and no steering wheel; its lights are those of its plan.
     assert np.isnan(taker.consumed()[-1, :4]).all()
     taker.order('tester', 'tester')
     taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who took over')
@@ -129,13 +129,13 @@ def test_an_av_is_taken_over_and_given_back(peer: Peer) -> None:
     rows = peer.states('av0')
     ways = np.hypot(np.diff(rows[:, 1]), np.diff(rows[:, 2]))
     steps = np.diff(rows[:, 0]) * 1e-9
-    # No jump at the give-back: each way is that of the speeds around it, within 2 cm.
+    # No jump at the give-back: each way agrees with the speeds around it within 2 cm.
     assert np.all(np.abs(ways - 0.5 * (rows[1:, 4] + rows[:-1, 4]) * steps) < 0.02)
 
 
 @pytest.mark.clock
-def test_a_taker_who_falls_silent_is_braked(peer: Peer) -> None:
-    """The watchdog of the seat holds for whoever sits in it: released, then 0.15 of the brake."""
+def test_a_silent_taker_is_braked(peer: Peer) -> None:
+    """The seat's watchdog holds for every driver: pedals released, then 0.15 of the brake."""
     taker = Taker(peer, 'hv0')
     taker.order('tester', 'tester')
     taker.hold(DriverCommand(throttle=0.5), lambda: _last(taker, 0, 0.5), 'half the throttle')
@@ -147,7 +147,7 @@ def test_a_taker_who_falls_silent_is_braked(peer: Peer) -> None:
 
 
 def test_orders_that_make_no_sense_change_nothing(peer: Peer) -> None:
-    """No such seat, no such source, no JSON: /seats stays, the run goes on."""
+    """After an unknown seat, an unknown source or no JSON /seats stays and the run goes on."""
     before = _seats(peer)
     orders = peer.publisher('/seats/order')
     for text in ('{', '[]', '{"seat": "hv9", "source": "x"}', '{"seat": "hv0", "source": 7}',
@@ -161,7 +161,7 @@ def test_orders_that_make_no_sense_change_nothing(peer: Peer) -> None:
 
 @pytest.mark.exhaustive
 def test_seats_outlive_a_reset(peer: Peer) -> None:
-    """Who drives goes on driving in the next epoch."""
+    """A driver keeps the seat in the next epoch."""
     taker = Taker(peer, 'hv0')
     taker.order('tester', 'tester')
     epoch = peer.games[-1].epoch

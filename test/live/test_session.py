@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A graph with a page stays when a run has ended, until somebody ends it."""
+"""A graph with a page stays when a run has ended, until it is ended by hand."""
 
 import json
 from pathlib import Path
@@ -56,7 +56,7 @@ def _settled(page: PageClient) -> dict[str, Any]:
             if key != 'measured_factor'}
 
 
-def test_a_game_that_nobody_drove_one_that_ends_and_the_same_again(tmp_path: Path) -> None:
+def test_an_undriven_game_one_that_ends_and_the_same_again(tmp_path: Path) -> None:
     """All nodes live on after the end; the page's orders but reset are refused; 0 at the end."""
     for driver in ('cockpit', 'idle'):
         (tmp_path / f'{driver}.yaml').write_text(GAME.replace('DRIVER', driver))
@@ -80,7 +80,7 @@ def test_a_game_that_nobody_drove_one_that_ends_and_the_same_again(tmp_path: Pat
             time.sleep(LOOK_S)
             assert _settled(page) == status
             started = dict(launcher.started)
-            # The driver's node of a human whom nobody drives in the first game came later.
+            # The driver node of the human that is not driven in the first game came later.
             assert all(is_node(pid) for pid in started.values()) and 'driver_node_hv0' in started
             for action in ('start', 'pause', 'step', 'stop'):
                 reply = page.request('control', action=action)

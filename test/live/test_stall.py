@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A real stall of the simulation: the file of the run is as if there had been none."""
+"""After a real stall of the simulation the file of the run is as without it."""
 
 from pathlib import Path
 import time
@@ -14,12 +14,12 @@ from steady_game import write_steady_game
 
 pytestmark = pytest.mark.clock
 
-# Beyond what machines stall by themselves, below the threshold of a drift reset [s].
+# Longer than usual stalls of a machine, below the threshold of a drift reset [s].
 STALL_S = 0.11
 
 
 def test_positions_agree_with_speeds_through_a_stall(tmp_path: Path) -> None:
-    """Stopped three times while the human drives at 26 m/s: within 0.1 m/s in every tick."""
+    """Stopped three times with the human at 26 m/s, they agree within 0.1 m/s in every tick."""
     with Launcher([write_steady_game(tmp_path), '--duration', 5], tmp_path / 'run') as launcher:
         launcher.wait_for('the run has begun|recording into')
         time.sleep(2.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trials in the live graph: each is whole or comes again, whatever is killed meanwhile."""
+"""Trials in the live graph: each is complete or repeated, whatever process is killed."""
 
 import asyncio
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ DURATION_S = 2.5
 
 
 class Participant:
-    """A session that goes on in a thread, and a person who drives in it."""
+    """A session that goes on in a thread, and a participant that drives in it."""
 
     def __init__(self, folder: Path) -> None:
         settings = {'duration': DURATION_S, 'game': str(scenarios_directory() / 'cut_in.yaml')}
@@ -73,7 +73,7 @@ class Participant:
                    f'{item} to be {phase}; it is {self.drives.state}')
 
     def begin(self, item: str) -> None:
-        """Take the seat of a trial that is ready, and say so."""
+        """Claim the seat of a trial that is ready, and confirm to be ready."""
         self.wait_for(DrivePhase.READY, item)
         graph = self.drives._graph
         assert graph is not None
@@ -95,7 +95,7 @@ class Participant:
         return self._page
 
     def stands(self) -> None:
-        """Assert that a trial does not begin by itself under who is in its seat."""
+        """Assert that a trial does not begin by itself when its seat is taken."""
         time.sleep(1.0)
         assert self.page.documents['status']['run'] == 'paused'
         assert self.page.documents['status']['n'] == 0
@@ -111,7 +111,7 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str,
     with Participant(folder) as person:
         person.begin('main/1')
         person.wait_for(DrivePhase.DRIVING, 'main/1')
-        # The launcher's power goes: its nodes end with it.
+        # The launcher is killed: its nodes end with it.
         os.kill(person.graphs[-1], signal.SIGKILL)
         person.begin('main/1')
         person.begin('main/2')
@@ -154,7 +154,7 @@ def test_each_trial_is_finished_once_or_skipped(journal: list[dict[str, Any]]) -
     reasons = [entry['reason'] for entry in journal if entry['entry'] == 'aborted']
     assert 'killed' in reasons[0]
     assert reasons[1] == 'a telephone rang'
-    # Whoever else can reach the graph has made no half a trial.
+    # No other client of the graph has made half a trial.
     assert reasons[3:] == ['the run was stopped by hand', 'the run was started again by hand']
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded take-over again, offline: the human to the last bit, the AV by the same hands."""
+"""A take-over is replayed offline: the human to the last bit, the AV by the same commands."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -39,12 +39,12 @@ class Recorded(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """How long it was [s]."""
+        """Duration of the run [s]."""
         return len(self.commands) * STEP_NS * 1e-9
 
     @property
     def driven(self) -> NDArray[np.intp]:
-        """Cycles in which somebody drove av0."""
+        """Cycles in which av0 was driven by hand."""
         return np.flatnonzero(np.isfinite(self.commands[:, 0]))
 
 
@@ -64,7 +64,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recorded]:
 
 
 def _drive(page: PageClient, seat: str, keys: list[int], steps: int) -> None:
-    """Take a seat, hold keys for so many steps and give it back, with the pedals let go."""
+    """Claim a seat, hold keys for so many steps, release them and give the seat back."""
     wait_until(lambda: page.documents.get('status', {}).get('run') == 'running', 'the run')
     page.hold_keys(seat, keys)
     assert page.request('claim', seat=seat)['ok']
@@ -106,10 +106,10 @@ def _joints(result: OfflineResult, vehicle: str) -> NDArray[np.float64]:
 
 
 def test_the_human_is_reproduced_to_the_last_bit(recorded: Recorded) -> None:
-    """Whoever sat in the seat: script, browser, script again; every published state."""
+    """Every published state is the same under script, browser and script again."""
     live, again = _published(recorded.folder / 'bag', 'hv0'), _joints(_replayed(recorded), 'hv0')
     assert len(live) == len(recorded.commands) + 1 and np.array_equal(live, again)
-    # What the browser did is in it: the script alone goes elsewhere.
+    # The browser's input is in it: the script alone drives elsewhere.
     script = run_offline(build_setup(load_game(recorded.folder / 'game.yaml')),
                          duration_s=recorded.duration_s)
     assert np.hypot(*(_joints(script, 'hv0')[-1, 0, :2] - live[-1, 0, :2])) > 1.0
@@ -117,10 +117,10 @@ def test_the_human_is_reproduced_to_the_last_bit(recorded: Recorded) -> None:
 
 def test_the_take_over_is_repeated(recorded: Recorded) -> None:
     """
-    In the same cycles, by the same commands; before and after, its planner has the AV.
+    The same cycles have the same commands; before and after, its planner drives the AV.
 
     Live, plans arrive some steps late, so that the AV enters the take-over elsewhere than in
-    lockstep: from there on what its driver does to its speed is the same.
+    lockstep: from there on its driver changes its speed by the same amount.
     """
     driven = recorded.driven
     assert len(driven) > 100 and np.all(np.diff(driven) == 1)
@@ -140,7 +140,7 @@ def test_the_take_over_is_repeated(recorded: Recorded) -> None:
 
 
 def test_live_it_is_repeated_too(recorded: Recorded, tmp_path: Path) -> None:
-    """By the recording alone: who drove what, in the same cycles, and the human's very states."""
+    """The recording alone repeats each driver's cycles and commands, and the human's states."""
     with Launcher(['--driver', f'replay:{recorded.folder / "bag"}', '--duration',
                    f'{recorded.duration_s:.2f}'], tmp_path / 'run') as launcher:
         assert launcher.wait() == 0, launcher.text
@@ -156,7 +156,7 @@ def test_live_it_is_repeated_too(recorded: Recorded, tmp_path: Path) -> None:
 
 
 def _sources(bag: Path) -> list[str]:
-    """Read who has driven av0, one after the other."""
+    """Read the drivers of av0, one after the other."""
     with BagReader(bag) as reader:
         told = [json.loads(item.message.data)['av0']['source']
                 for item in reader.decoded(['/seats'])]
@@ -164,7 +164,7 @@ def _sources(bag: Path) -> list[str]:
 
 
 def test_the_command_line_does_the_same_twice(recorded: Recorded) -> None:
-    """`crgame offline GAME --driver replay:BAG`: one state hash, that of the runner."""
+    """`crgame offline GAME --driver replay:BAG` has one state hash, that of the runner."""
     hashes = set()
     for _ in range(2):
         process = subprocess.run(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Events that change agents, in their own process: the bits of offline, and after a restart."""
+"""Events change agents in their own process: the same bits as offline, also after a restart."""
 
 from pathlib import Path
 
@@ -22,14 +22,14 @@ import yaml
 
 pytestmark = pytest.mark.clock
 
-# Seconds after the start at which somebody presses the button, and traffic_node is killed.
+# Seconds after the start at which the button is pressed, and traffic_node is killed.
 PRESSED_S, KILLED_S = 2.5, 6.0
 RESUMED = 'going on at k'
 CRAWL = 3.0
 
 
 def write_game(folder: Path) -> Path:
-    """Write a game of traffic alone: one agent hurries after 1 s; a button lets all crawl."""
+    """Write a game of traffic alone: one agent speeds up after 1 s; a button slows all agents."""
     values = yaml.safe_load((SCENARIOS / 'intersection.yaml').read_text())
     values |= {
         'scenario': str(SCENARIOS / values['scenario']), 'duration': 600, 'humans': [],
@@ -58,14 +58,14 @@ def told(bag: Path, scheduler: ScenarioScheduler) -> dict[int, NDArray[np.float6
 
 def test_agents_obey_events_to_the_same_bits_and_after_a_restart(tmp_path: Path) -> None:
     """
-    As published until it is killed they are offline's, run with the events as recorded.
+    Until the node is killed the states equal those offline with the recorded events.
 
-    The process that comes after it knows from /scenario/events alone that everybody crawls.
+    The process that replaces it knows from /scenario/events alone that all agents are slow.
     """
     game = write_game(tmp_path)
     with Launcher([game], tmp_path / 'run') as launcher, \
             Peer(launcher.domain, '/clock', '/scenario/game', '/traffic/agents') as peer:
-        # On a busy machine a run starts without its traffic; the one after it does not.
+        # On a busy machine the first run starts without its traffic; the next one has it.
         peer.wait_until(lambda: peer.messages['/traffic/agents'], 'agents')
         assert peer.call('/sim/reset').success
         peer.wait_until(lambda: len(peer.games) > 1 and peer.n > 0, 'another run')
@@ -73,7 +73,7 @@ def test_agents_obey_events_to_the_same_bits_and_after_a_restart(tmp_path: Path)
         peer.wait_until(lambda: peer.n > 100 * PRESSED_S, 'some seconds')
         peer.publisher('/trigger').publish(String(data='crawl'))
         peer.wait_until(lambda: peer.n > 100 * KILLED_S, 'some seconds more')
-        # It may have said so before: on a busy machine it is late at the start of a run.
+        # It may have reported this before: on a busy machine it is late at the start of a run.
         times = launcher.text.count(RESUMED)
         launcher.kill('traffic_node')
         peer.wait_until(lambda: launcher.text.count(RESUMED) > times, 'agents that go on')
@@ -81,7 +81,7 @@ def test_agents_obey_events_to_the_same_bits_and_after_a_restart(tmp_path: Path)
         while peer.n <= back + 300:
             peer.listen_for(0.1)
             if launcher.text.count(RESUMED) > times:
-                # On a busy machine it was late, and stood again.
+                # On a busy machine it was late, and the agents stood again.
                 back, times = peer.n, launcher.text.count(RESUMED)
         assert peer.call('/sim/stop').success
         assert launcher.wait() == 0, launcher.text
@@ -99,14 +99,14 @@ def test_agents_obey_events_to_the_same_bits_and_after_a_restart(tmp_path: Path)
             assert agents[k][1].tobytes() == offline.object_velocities[k, columns].tobytes(), k
             compared += 1
     assert compared > 10 * KILLED_S - 10
-    # Both did something.
+    # Both events had an effect.
     speed = np.hypot(*np.moveaxis(offline.object_velocities[:, columns, :2], -1, 0))
     hurrying = [item.id for item in setup.traffic.descriptions].index('t1')
     free = run_offline(build_setup(load_game(game)), duration_s=0.9)
     assert np.array_equal(free.object_poses[:10], offline.object_poses[:10], equal_nan=True)
     assert speed[fired[1].k, hurrying] > np.nanmax(speed[10, hurrying]) + 2.0
     assert np.nanmedian(speed[-1]) < np.nanmedian(speed[fired[1].k]) - 2.0
-    # Without the event they would be at 4.5 m/s, 3 s after the stand of who hears nothing.
+    # Without the event they would be at 4.5 m/s, 3 s after they stood without news.
     last = np.hypot(*agents[max(agents)][1][:, :2].T)
     assert max(agents) >= (back + 290) // 10
     assert CRAWL - 1.0 < np.nanmax(last) < CRAWL + 1.0

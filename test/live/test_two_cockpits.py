@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two cockpits on one graph: they agree on who has which seat."""
+"""Two cockpits on one graph: they agree on the holder of each seat."""
 
 from collections.abc import Iterator
 import os
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.exhaustive
 
 @pytest.fixture
 def cockpits(tmp_path: Path) -> Iterator[tuple[str, str]]:
-    """Start a graph with its cockpit, and a second one beside it; give both addresses."""
+    """Start a graph with its cockpit, and a second one beside it; return both addresses."""
     with Launcher([SCENARIOS / 'merge.yaml', '--driver', 'cockpit'], tmp_path / 'run',
                   headless=False) as launcher:
         first = launcher.page
@@ -45,8 +45,8 @@ def cockpits(tmp_path: Path) -> Iterator[tuple[str, str]]:
             reader.join()
 
 
-def test_who_was_first_has_the_seat_at_both(cockpits: tuple[str, str]) -> None:
-    """Claimed at one, it is held at the other; given back, it is free; one drives at a time."""
+def test_the_first_has_the_seat_at_both(cockpits: tuple[str, str]) -> None:
+    """A seat claimed at one is held at the other; given back, it is free; only one drives."""
     with PageClient(cockpits[0]) as anna, PageClient(cockpits[1]) as bert:
         for client, name in ((anna, 'Anna'), (bert, 'Bert')):
             client.send({'type': 'name', 'name': name})
@@ -57,7 +57,7 @@ def test_who_was_first_has_the_seat_at_both(cockpits: tuple[str, str]) -> None:
         assert not bert.request('release', seat='hv0')['ok']
         assert anna.request('release', seat='hv0')['ok']
         wait_until(lambda: bert.seat('hv0')['holder'] is None, 'a free seat')
-        # At the same time: exactly one of them has it in the end, and both know who.
+        # Both claim at the same time: exactly one has it in the end, and both know which.
         replies: list[bool] = []
         threads = [threading.Thread(target=lambda client=client: replies.append(
             client.request('claim', seat='hv0')['ok'])) for client in (anna, bert)]

@@ -30,7 +30,7 @@ LIGHTS = """  - {from: 0.0, to: 0.6, hold: [left_indicator]}
   - {from: 0.5, to: 1.0, hold: [right_indicator]}
   - {from: 0.8, to: 1.2, hold: [horn]}
 """
-# What the script says, second by second of those at which it changes.
+# The lights of the script, by the seconds at which they change.
 SAID = [('left', False), ('hazard', False), ('right', False), ('right', True), ('off', True),
         ('off', False)]
 
@@ -48,7 +48,7 @@ def _game(folder: Path, name: str, keys: str) -> Path:
 
 
 def test_lights_are_recorded_and_change_no_motion(tmp_path: Path) -> None:
-    """The topic tells each change; cycles and export say the same; hashes stay equal."""
+    """The topic has each change; cycles and export agree with it; hashes stay equal."""
     path = _game(tmp_path, 'lit', KEYS + LIGHTS)
     lit, dark = (run_offline(build_setup(load_game(each)), duration_s=SECONDS)
                  for each in (path, _game(tmp_path, 'dark', KEYS)))
@@ -70,7 +70,7 @@ def test_lights_are_recorded_and_change_no_motion(tmp_path: Path) -> None:
 
     cycles = read_cycles(bag)
     lights = cycles.commands('hv0')[:, 4]
-    # The planner asks for them: each request says what they are at its time.
+    # The planner asks for them: each request has their state at its time.
     log = read_trajectories(bag)
     shown = dict(zip(cycles.column('n').tolist(), lights.tolist(), strict=True))
     with BagReader(bag) as reader:

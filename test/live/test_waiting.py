@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run whose driver sits in the browser waits for them: at first, and after every reset."""
+"""A run with a driver in the browser waits for them at the start and after every reset."""
 
 from collections.abc import Iterator
 import json
@@ -11,9 +11,9 @@ from live_support import Launcher, SCENARIOS, wait_until
 from page_client import PageClient, STATE
 import pytest
 
-# What the human of the merge starts with [m/s].
+# Initial speed of the human of the merge [m/s].
 SPEED = 16.0
-# So long a run that must not begin is looked at [s]: 50 of its cycles.
+# A run that must not begin is watched for this long [s]: 50 of its cycles.
 LOOK_S = 0.5
 
 
@@ -56,7 +56,7 @@ def stands(page: PageClient, run: str) -> None:
 
 
 def test_start_waits_for_hands_and_so_does_a_reset(page: PageClient) -> None:
-    """An empty seat, a seat without hands, hands; a reset under those very hands goes on."""
+    """It waits at an empty seat and without hands on; a reset with the same hands on goes on."""
     stands(page, 'paused')
     reply = page.request('control', action='start')
     assert reply['ok'] and reply['text'] == 'waiting for the driver of hv0'
@@ -83,7 +83,7 @@ def test_start_waits_for_hands_and_so_does_a_reset(page: PageClient) -> None:
 
 @pytest.mark.exhaustive
 def test_a_pause_in_the_run_ends_without_hands(page: PageClient) -> None:
-    """Only the beginning waits: a paused run goes on, and its car brakes by itself."""
+    """Only the start waits: a paused run goes on, and its car brakes by itself."""
     assert page.request('claim', seat='hv0')['ok']
     page.hold_keys('hv0', [0, 0, 0, 0])
     assert page.request('control', action='start')['ok']
@@ -100,7 +100,7 @@ def test_a_pause_in_the_run_ends_without_hands(page: PageClient) -> None:
 
 @pytest.mark.exhaustive
 def test_a_game_chosen_later_waits_too(page: PageClient) -> None:
-    """And the order to start, given while it is loading, is not lost."""
+    """A start that is ordered during loading is not lost."""
     with urllib.request.urlopen(f'{page.page}api/scenarios', timeout=10) as answer:
         folders = json.load(answer)['folders']
     chosen = next(entry for folder in folders for entry in folder['entries']

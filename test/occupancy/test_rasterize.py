@@ -12,8 +12,8 @@ import sys
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.occupancy.command import write_map
+from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.occupancy import OccupancyGrid
-from crgame_ros.occupancy.raster_spec import RasterSpec
 from crgame_ros.occupancy.rasterize import draw, Raster
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.roads.boundary import RoadBoundary
@@ -322,7 +322,7 @@ import os, sys, time
 from pathlib import Path
 from crgame_ros.occupancy import command as occupancy_command
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.occupancy.raster_spec import RasterSpec
+from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster
 
 def progress(done, total):

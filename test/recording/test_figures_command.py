@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from crgame_ros.analysis.pictures.figure_run import FigureRun
-from crgame_ros.analysis.pictures.followed_plans import read_followed_plans
+from crgame_ros.analysis.pictures.scene_frame import read_followed_plans
 from crgame_ros.cli import main
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints

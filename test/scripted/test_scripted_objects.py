@@ -13,8 +13,7 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.schema.reading import read
-from crgame_ros.scripted.object_bicycle import follow
-from crgame_ros.scripted.objects import ScriptedObjects
+from crgame_ros.scripted.objects import follow, ScriptedObjects
 from crgame_ros.traffic.car_following import IntelligentDriver
 from crgame_ros.vehicle.idm_model import IdmParameters
 import numpy as np

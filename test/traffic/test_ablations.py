@@ -31,7 +31,7 @@ from crgame_ros.traffic.car_following import AdaptiveCruise
 
 
 class Free(AdaptiveCruise):
-    """A model that sees no leader."""
+    """Sees nobody."""
 
     name = 'free'
 

@@ -65,7 +65,7 @@ def test_asked_at_every_decision_courtesy_ends_smoothly() -> None:
 
 
 def test_no_agent_brakes_harder_for_others_than_its_own_limit() -> None:
-    """Urgency raises it, aggressivity lowers it to nothing; beyond it nothing is done at all."""
+    """Urgency raises the limit, aggressivity lowers it to 0; no agent brakes beyond it."""
     rules = CourtesyRules()
     hurry, temper = np.array([0.0, 1.0, 1.0, 1.0]), np.array([0.0, 0.0, 0.4, 1.0])
     np.testing.assert_allclose(rules.deceleration_limit(hurry, temper), [1.0, 2.5, 1.5, 0.0])
@@ -157,7 +157,7 @@ def test_cooperation_spares_the_shock_wave() -> None:
     """
     Cooperation lowers the hardest braking.
 
-    Plainly gaps of 3.75 m instead of 12 m make FS 3 brake with lambda 8.25 / T = 4.95 m/s^2.
+    Without it, gaps of 3.75 m instead of 12 m make FS 3 brake with lambda 8.25 / T = 4.95 m/s^2.
     """
     plain, _, _ = merge(cooperative=False)
     gentle, before, changed_at = merge(cooperative=True)

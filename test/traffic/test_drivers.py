@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Drivers who react late, fail a little, or ignore lights; and who drive otherwise when told."""
+"""Drivers that react late, are imperfect or ignore lights; changes of drivers in a run."""
 
 from pathlib import Path
 from typing import Any
@@ -96,7 +96,7 @@ def bits(run: support.Run, *numbers: int) -> bytes:
 ], ids=lambda given: '-'.join(given))
 def test_a_change_of_all_is_as_if_the_game_said_so(given: dict[str, Any],
                                                    changed: dict[str, Any]) -> None:
-    """Before the first decision it gives the same bits, and they are others than without it."""
+    """Before the first decision a change gives the same bits, which differ from a run without."""
     plain = {key: value for key, value in given.items() if key == 'model'}
     said = chase(TrafficSpec(**given))
     told = chase(TrafficSpec(**plain), (0, TrafficChange('all', **changed)))

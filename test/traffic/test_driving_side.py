@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Left-hand traffic: a mirrored map is driven as the mirror image, to the same rules mirrored."""
+"""Left-hand traffic: agents drive a mirrored map as the mirror image, by the mirrored rules."""
 
 from pathlib import Path
 
@@ -60,7 +60,7 @@ def test_a_mirrored_junction_has_the_same_priorities(maps: Path, name: str, sign
     assert not driving_side(original).keeps_left and driving_side(image).keeps_left
     left = priorities(image)
     assert left == right and {-1, 1} <= set(left.values())
-    # Read as if it were driven on the right some would have to yield that must not.
+    # With driving on the right some lanelets would have to yield that must not.
     graph = LaneGraph(RoadNetwork(image.lanelet_network))
     as_right = Conflicts(graph)
     wrong = sum(left[graph.ids[a], graph.ids[as_right.lane[b]]] != p for a, b, p in zip(
@@ -82,7 +82,7 @@ def test_without_signs_and_neighbours_the_country_decides(country: str, right_fi
     scenario.scenario_id.country_id = country
     side = driving_side(scenario)
     assert side.keeps_left is (country not in ('DEU', 'ZAM'))
-    # Lanelet 2 drives north, and comes from the right of whoever drives east.
+    # Lanelet 2 leads north. Its traffic comes from the right of vehicles that drive east.
     assert priorities(scenario)[2, 1] == (1 if right_first else -1)
 
 

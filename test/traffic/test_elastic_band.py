@@ -84,12 +84,12 @@ def test_lanes_without_anything_in_the_way_are_exactly_straight() -> None:
 ], ids=['middle', 'edge', 'long', 'row', 'narrows', 'slalom'])
 @pytest.mark.parametrize('speed', [5.0, 14.0, 25.0])
 def test_the_clearance_is_kept(found: Obstacles, speed: float) -> None:
-    """Measured with boxes moved along the reference, not with its own constraints."""
+    """Boxes moved along the reference keep it, as measured without the band's own constraints."""
     bands = one_lane(ElasticBand(), found, speed=speed)
     assert len(bands.blocked_s) == 0
     assert np.abs(bands.d).max() > 0.3
     assert least_distance(bands, found) >= 0.49
-    # It stays in the space it may use, and on the centre line where nothing is near.
+    # The band stays in its free space, and on the centre line away from obstacles.
     assert bands.d.max() <= 5.25 - 0.5 * WIDTH + 0.02
     assert bands.d.min() >= -(1.75 - 0.5 * WIDTH) - 0.02
     if speed == 5.0:
@@ -104,7 +104,7 @@ def test_swerves_are_comfortable_at_the_speed_of_the_lane() -> None:
         assert np.abs(bands.curvature).max() * speed ** 2 <= 1.1 * 2.4 / 1.2 ** 2
         np.testing.assert_allclose(
             bands.slope[0, 1:-1], (bands.d[0, 2:] - bands.d[0, :-2]) / 2.0, atol=1e-12)
-        # Summed up twice the curvature is the offset again.
+        # The curvature, summed twice, is the offset again.
         again = np.cumsum(np.cumsum(bands.curvature[0])) + bands.d[0, 0] * np.arange(2, S + 2)
         np.testing.assert_allclose(again[:-1], bands.d[0, 1:], atol=1e-9)
 
@@ -127,7 +127,7 @@ def test_a_lane_without_room_is_blocked_at_the_near_edge() -> None:
 
 
 def test_less_than_the_wanted_clearance_is_taken_before_the_lane_is_blocked() -> None:
-    """Room for 0.3 m: passed with 0.3 m; room for 0.1 m: blocked; unless 0.5 m is a must."""
+    """Room for 0.3 m: passed with 0.3 m, or blocked if 0.5 m is a must; for 0.1 m: blocked."""
     for room, blocked in ((0.3, False), (0.1, True)):
         # Between the right edge of the way at 2 m and an obstacle that begins at 2 - 2 - room.
         found = obstacles((0, 150.0, -0.5 - room, 2.5, 0.5))
@@ -144,7 +144,7 @@ def test_less_than_the_wanted_clearance_is_taken_before_the_lane_is_blocked() ->
     (0.0, 5.0, 4.0, 1.0), (1.6, 9.0, 1.75, -1.0)])
 def test_the_nearer_side_is_taken_then_the_one_with_more_room(
         d: float, left: float, right: float, side: float) -> None:
-    """A tie of both goes to the left."""
+    """With equal room on both sides the band goes left."""
     bands = one_lane(ElasticBand(), obstacles((0, 150.0, d, 2.0, 0.5)), left=left, right=right)
     assert np.sign(bands.d[0, 150]) == side
     # The band bulges a little between the points where it touches.
@@ -153,7 +153,7 @@ def test_the_nearer_side_is_taken_then_the_one_with_more_room(
 
 @pytest.mark.slow
 def test_the_band_has_the_least_energy() -> None:
-    """Let scipy solve the bounded least squares min |d - m^2 d''| with low <= d <= high."""
+    """scipy solves the bounded least squares min |d - m^2 d''|, low <= d <= high, equally."""
     rng = np.random.default_rng(7)
     n = 160
     for _ in range(12):
@@ -174,7 +174,7 @@ def test_the_band_has_the_least_energy() -> None:
 
 
 def test_a_slalom_too_tight_for_a_car_is_blocked_where_it_is() -> None:
-    """Over 30 m it is driven; over 9 m it bends more than a turning circle: one blocks."""
+    """Over 30 m agents drive it; over 9 m it bends more than a turning circle: one blocks."""
     for distance, blocked in ((30.0, False), (9.0, True)):
         found = obstacles((0, 100.0, -1.0, 0.2, 0.8), (0, 100.0 + distance, 3.0, 0.2, 2.2))
         bands = one_lane(ElasticBand(), found, speed=8.0)
@@ -205,7 +205,7 @@ def test_ends_stay_on_the_centre_line_and_what_cannot_be_bent_is_blocked() -> No
 
 
 def test_random_obstacles_are_avoided_or_the_lane_is_blocked() -> None:
-    """300 cases of up to 6 boxes: bends and clearances of whatever is not blocked hold."""
+    """300 cases of up to 6 boxes: lanes that are not blocked keep the bends and clearances."""
     rng = np.random.default_rng(11)
     band = ElasticBand()
     passed = 0
@@ -255,7 +255,7 @@ def test_what_is_too_tight_for_the_widest_is_left_to_cars() -> None:
 
 
 def test_the_same_question_has_the_same_answer() -> None:
-    """Bit for bit, asked again, by a new band, and after another question in between."""
+    """Bit for bit: asked again, by a new band, and after another question in between."""
     first, second = obstacles((0, 150.0, 0.0, 2.0, 0.8)), obstacles((0, 160.0, 0.0, 2.0, 0.8))
     band = ElasticBand()
     answers = [one_lane(band, found).d for found in (first, first, second, first)]

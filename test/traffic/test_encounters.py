@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who is really in the way, and how hard one brakes for that; checked with shapely."""
+"""Which vehicles are in the way, and how hard agents brake for them; checked with shapely."""
 
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
@@ -24,7 +24,7 @@ def crossing(angle: float) -> LaneGraph:
 
 
 def meeting(graph: LaneGraph, places: list[float], speeds: list[float]) -> Agents:
-    """Put a car into each of the lanes, so far from the crossing."""
+    """Make a car in each of the lanes, at the given distances from the crossing."""
     agents = Agents([ObjectDescription(f't{i}', 'car', Role.TRAFFIC, support.CAR)
                      for i in range(2)])
     for i, (place, speed) in enumerate(zip(places, speeds, strict=True)):
@@ -53,7 +53,7 @@ def touch(agents: Agents, braking: float, room: float) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize('angle', [1.57, 2.3, -0.9, 3.0])
 def test_nothing_is_braked_for_that_passes(angle: float) -> None:
-    """A hundred meetings at a crossing: what is braked is what parts the two, no harder."""
+    """100 meetings at a crossing: the braking separates the two, and is no harder than needed."""
     graph, rng = crossing(angle), np.random.default_rng(5)
     following = np.full((1, 2), -1, dtype=np.int64)
     passed = parted = 0
@@ -65,7 +65,7 @@ def test_nothing_is_braked_for_that_passes(angle: float) -> None:
             passed += 1
             assert not touch(agents, 0.0, 0.0)
             continue
-        # It is close at least, and what is done helps, as far as anything does.
+        # It is at least close, and the braking helps as far as any braking does.
         assert touch(agents, 0.0, 1.2 * BESIDE)
         if braking not in (8.0, FIRMEST):
             parted += 1
@@ -74,8 +74,8 @@ def test_nothing_is_braked_for_that_passes(angle: float) -> None:
     assert passed > 20 and (parted > 0 or abs(angle) > 2.9)
 
 
-def test_nobody_brakes_for_who_comes_to_the_road_when_one_has_passed() -> None:
-    """A pedestrian 8 m ahead who walks towards the road gets there 1.5 s later."""
+def test_no_agent_brakes_for_a_pedestrian_that_arrives_after_it() -> None:
+    """A pedestrian 8 m ahead that walks towards the road gets there 1.5 s later."""
     road = support.roads(support.straight_lane(1, 0.0, 0.0, 300.0))
     hardest = []
     for beside in (4.5, 1.5):
@@ -101,7 +101,7 @@ def test_a_pedestrian_far_ahead_is_waited_for_gently() -> None:
 
 
 def test_creeping_up_needs_no_emergency() -> None:
-    """Below the standstill gap the law alone would brake with 8 m/s^2 from walking speed."""
+    """Below the gap at standstill the law alone would brake with 8 m/s^2 from walking speed."""
     road = support.roads(support.straight_lane(1, 0.0, 0.0, 300.0))
     leader = support.human(57.0, 0.0, 0.0, 0.4)
     car = support.driving(1, [(51.5, 0.0, 0.0), (290.0, 0.0, 0.0)], 1.0)

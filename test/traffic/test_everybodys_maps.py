@@ -16,11 +16,11 @@ from traffic_drive import drive
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 # Lights with arrows, and without an intersection; narrow bends; vehicles that are recorded close
-# together; a time step of 0.2 s. Not all maps hold: docs/measurements.md tells which do not.
+# together; a time step of 0.2 s. Not all maps pass: docs/measurements.md lists the others.
 MAPS = ('USA_Lanker-1_3_T-1', 'DEU_Flensburg-10_1_T-1', 'OSC_PedestrianCollision-1_1_T-1',
         'more/DEU_Starnberg-1_1_T-1', 'more/GRL_Nuuk-6', 'more/BRA_SantaRita-1',
         'more/ESP_Toledo-7_5_T-1', 'more/C-DEU_MONAMerge-2_1_T-299', 'more/DEU_Gar-1_1_T-1')
-# Recorded vehicles of this length take ways on which they cannot but leave the road [m].
+# Recorded vehicles of this length take ways on which they have to leave the road [m].
 TOO_LONG = 6.5
 SECONDS = 25.0
 
@@ -37,7 +37,7 @@ def verdict(name: str, spec: TrafficSpec, seconds: float, seed: int = 0,
 
 
 def never(found: Verdict) -> list[str]:
-    """List what must not happen: overlaps (not there at placing), red lines, off the road."""
+    """List the faults: overlaps (except from placing), red lines crossed, off the road."""
     return [f'{x.at_s:.1f} s {x.what}: {" and ".join(x.ids)} {x.note}' for x in found.events
             if x.what in ('overlap', 'red', 'unexplained') or (
                 x.what == 'off road' and float(x.note.split()[-2]) < TOO_LONG)]
@@ -45,19 +45,19 @@ def never(found: Verdict) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', MAPS)
-def test_nobody_collides_runs_a_light_or_leaves_the_road(name: str) -> None:
+def test_no_agent_collides_runs_a_light_or_leaves_the_road(name: str) -> None:
     found = verdict(name, TrafficSpec(recorded='reactive', agents=40, flow=400.0), SECONDS)
-    # It is dense, and it drives.
+    # The traffic is dense, and it moves.
     assert found.mean_agents > 6.0 and found.mean_speed > 0.5
     assert never(found) == []
-    # Comfortable is 2.0 m/s^2; the rest is for what drives a bend a little to the inside.
+    # 2.0 m/s^2 is comfortable; the rest is for agents that cut a bend a little.
     assert found.lateral_p99 <= LATERAL_P99
 
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-def test_nobody_stands_for_good_where_a_ramp_ends() -> None:
-    # Whoever waits at the end of the ramp for somebody who stands behind it in the queue does so
+def test_no_agent_stands_for_good_where_a_ramp_ends() -> None:
+    # An agent that waits at the end of the ramp for one that stands behind it in the queue does so
     # from 15 s on: for more than 90 s in this time.
     found = verdict('ZAM-Ramp-1_1-T-1', TrafficSpec(agents=30, flow=900.0), 110.0, 1, False)
     assert never(found) == []
@@ -82,7 +82,7 @@ def test_dense_towns_go_on_without_a_jam_for_good(name: str, seed: int, seconds:
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_full_roundabout_stays_open(maps: Path) -> None:
-    # Entered by everybody before whom there is room it is full after a minute, all around.
+    # Every agent with room ahead enters, so it is full all around after a minute.
     driven = drive(maps / 'ZAM_Roundabout-1_1_T-1.xml', TrafficSpec(agents=40, flow=400.0),
                    150.0, 2)
     found = judge(driven.history, JudgedRoads(driven.scenario.scenario.lanelet_network))

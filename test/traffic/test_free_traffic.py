@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Free traffic on maps of every kind: nobody hits anybody, whatever the map is like."""
+"""Free traffic on maps of every kind: agents hit nothing on any of them."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ MAPS = ('ZAM_Merge-1_1_T-1.xml', 'ZAM_Intersection-1_1_T-1.xml', 'ZAM_Roundabout
 @pytest.mark.slow
 @pytest.mark.parametrize('name', MAPS)
 @pytest.mark.parametrize('seed', [0, 1])
-def test_nobody_hits_anybody_in_dense_traffic(maps: Path, name: str, seed: int) -> None:
+def test_no_agent_hits_another_in_dense_traffic(maps: Path, name: str, seed: int) -> None:
     run = support.Run(maps / name, TrafficSpec(agents=25, flow=500.0), seed).ticks(400)
     assert run.overlaps() == []
     present = np.isfinite(np.array(run.poses)[:, :, 0])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Traffic as a whole: what detectors count on a circular road is what the closed forms say."""
+"""Traffic as a whole: detectors on a circular road count what the closed forms predict."""
 
 from pathlib import Path
 import sys
@@ -33,9 +33,9 @@ def test_measured_speeds_and_flows_are_those_of_the_equilibrium(model: str) -> N
     np.testing.assert_allclose(found.speed[congested], expected[congested], rtol=2e-3, atol=0.02)
     # A car alone drives as fast as it wants to.
     assert found.speed[0] == pytest.approx(LIMIT, rel=2e-3)
-    # Nobody is created or lost: flow = density * mean speed.
+    # No agent is created or lost: flow = density * mean speed.
     np.testing.assert_allclose(found.flow, found.density * found.speed, rtol=5e-3)
-    # The more there are the slower, and most cars pass where the road is neither full nor free.
+    # More cars are slower, and the flow peaks where the road is neither full nor free.
     assert (np.diff(found.speed[congested]) < 0.0).all()
     assert 0 < int(np.argmax(found.flow)) < len(COUNTS) - 1
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The judge of traffic finds what is wrong in hand-made states, and nothing in clean ones."""
+"""The judge of traffic finds the faults in hand-made states, and none in clean ones."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -49,7 +49,7 @@ def seen(*tracks: FloatArray, sizes: Sequence[tuple[float, float]] = (), others:
 
 def along(points: Sequence[tuple[float, float]], speed: float, seconds: float,
           start: float = 0.0) -> FloatArray:
-    """Drive along a polyline at a speed; whoever comes to its end is gone."""
+    """Drive along a polyline at a speed; vehicles that reach its end disappear."""
     line = shapely.LineString(points)
     s = start + speed * DT * np.arange(round(seconds / DT) + 1)
     place = shapely.get_coordinates(shapely.line_interpolate_point(line, s))
@@ -67,7 +67,7 @@ def standing(x: float, y: float, seconds: float, yaw: float = 0.0) -> FloatArray
 
 @pytest.fixture(scope='module')
 def straight() -> JudgedRoads:
-    """Two lanes of 3.5 m along x, 200 m, the second 0.3 m apart; a third piece follows."""
+    """Make two lanes of 3.5 m along x, 200 m, 0.3 m apart; a third piece follows."""
     return JudgedRoads(roads(
         straight_lane(1, 0.0, 0.0, 200.0, adjacent_left=2, adjacent_left_same_direction=True),
         straight_lane(2, 3.8, 0.0, 200.0, adjacent_right=1, adjacent_right_same_direction=True),
@@ -154,13 +154,13 @@ def test_a_red_line_counts_for_the_movement_that_is_driven(named: bool) -> None:
     assert red_lines(seen(waits, light=red), lanes) == []
 
 
-def test_who_could_not_stop_is_told_apart() -> None:
+def test_a_vehicle_that_could_not_stop_is_told_apart() -> None:
     lanes = JudgedRoads(junction(True).lanelet_network)
     turning = along(LEFT, 8.0, 20.0, 4.0)
     # 5.75 m before the line, less 0.8 m: 6.5 m/s^2.
     late = ['green'] * 60 + ['redYellow'] * 141
     assert [x.what for x in red_lines(seen(turning, light=late), lanes)] == ['red unavoidable']
-    # Yellow told it in time.
+    # Yellow announced it in time.
     told = ['green'] * 20 + ['yellow'] * 40 + ['red'] * 141
     assert [x.what for x in red_lines(seen(turning, light=told), lanes)] == ['red']
 
@@ -214,7 +214,7 @@ def test_stands_are_explained_by_lights_queues_and_humans_only() -> None:
     assert stands(seen(creeps, light=none), lanes) == []
 
 
-def test_a_queue_behind_the_junction_explains_who_waits_before_it() -> None:
+def test_a_queue_behind_the_junction_explains_a_wait_before_it() -> None:
     lanes = JudgedRoads(junction(True).lanelet_network)
     none = ['green'] * 1201
     # Lane 8 crosses lane 2 up to x = 19.75. The first of the queue behind it creeps on, and
@@ -225,7 +225,7 @@ def test_a_queue_behind_the_junction_explains_who_waits_before_it() -> None:
         second = standing(rear + 2.25, 0.0, 120.0)
         found = stands(seen(waits, second, moving + (rear - 24.0, 0.0, 0.0), light=none), lanes)
         assert [i for x in found for i in x.ids] == expected
-    # It went left in the end: who stands straight on was not in its way.
+    # It went left in the end: the vehicle that stands straight on was not in its way.
     left = np.concatenate((np.tile(along(LEFT, 8.0, 0.0, 55.0), (1100, 1)),
                            along(LEFT, 8.0, 10.0, 55.0)))
     found = stands(seen(left, standing(26.25, 0.0, 120.0)[:len(left)], moving[:len(left)],
@@ -244,7 +244,7 @@ def test_lateral_acceleration_is_that_of_a_circle() -> None:
 
 
 def braking(cut_in: bool) -> History:
-    """Brake from 20 m/s with 6 m/s^2 behind a slow one that has been there, or cuts in."""
+    """Brake from 20 m/s with 6 m/s^2 behind a slow car that was there before, or cuts in."""
     speed = np.concatenate((np.full(51, 20.0), np.maximum(20.0 - 0.6 * np.arange(1, 101), 8.0)))
     x = np.concatenate(([0.0], np.cumsum(speed[1:] * DT)))
     me = np.column_stack((x, np.zeros((151, 2))))

@@ -33,7 +33,7 @@ def random_changes(count: int) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def test_coefficients_solve_the_six_conditions() -> None:
-    """Let numpy solve the 6 x 6 system for y, y', y'' at 0 and at L."""
+    """numpy solves the 6 x 6 system for y, y', y'' at 0 and at L to the same coefficients."""
     offset, slope, curvature, target, length = random_changes(50)
     got = quintic(offset, slope, curvature, target, length)
     for i, big_l in enumerate(length):
@@ -50,7 +50,7 @@ def test_coefficients_solve_the_six_conditions() -> None:
 
 
 def test_evaluation_is_the_polynomial_up_to_its_end() -> None:
-    """Compare with numpy's polynomials; behind the end the path stays in the lane's centre."""
+    """It equals numpy's polynomials; behind the end the path stays in the lane's centre."""
     offset, slope, curvature, target, length = random_changes(20)
     p = quintic(offset, slope, curvature, target, length)
     for i in range(20):
@@ -61,7 +61,7 @@ def test_evaluation_is_the_polynomial_up_to_its_end() -> None:
 
 
 def test_the_greatest_lateral_acceleration_has_its_closed_form() -> None:
-    """10 / sqrt(3) W v^2 / L^2 = 5.7735 W v^2 / L^2 against a fine sampling."""
+    """A fine sampling gives 10 / sqrt(3) W v^2 / L^2 = 5.7735 W v^2 / L^2."""
     zero = np.zeros(1)
     p = quintic(zero, zero, zero, np.array([3.5]), np.array([80.0]))
     sampled = Polynomial(p[0]).deriv(2)(np.linspace(0.0, 80.0, 200001))
@@ -98,7 +98,7 @@ def test_gaps_need_more_where_the_one_behind_is_faster_and_less_in_a_hurry() -> 
 
 def accepted(lead_gap: float, follow_gap: float, hurry: float = 0.0, follow_speed: float = 20.0,
              lead_speed: float = 20.0) -> bool:
-    """Ask for a change at 20 m/s, with the braking that the ACC would answer with."""
+    """Return whether a change at 20 m/s is accepted, with the braking of the ACC."""
     model, v = AdaptiveCruise(), np.array([20.0])
     lead, follow = np.array([lead_gap]), np.array([follow_gap])
     return bool(GapAcceptance().accepts(
@@ -115,12 +115,12 @@ def test_changes_are_made_into_gaps_that_are_wide_enough() -> None:
     assert accepted(25.0, 25.0) and not accepted(24.0, 40.0) and not accepted(40.0, 24.0)
     assert not accepted(-3.0, nobody) and not accepted(nobody, -3.0)
     assert accepted(18.0, 18.0, hurry=1.0) and not accepted(16.0, 40.0, hurry=1.0)
-    # Somebody coming from behind much faster is waited for.
+    # The agent waits for a follower that is much faster.
     assert accepted(nobody, 40.0) and not accepted(nobody, 40.0, follow_speed=30.0)
     assert not accepted(35.0, nobody, lead_speed=10.0)
 
 
-def test_nobody_there_needs_no_speed() -> None:
+def test_an_absent_vehicle_needs_no_speed() -> None:
     """A NaN as the speed of absent vehicles changes nothing."""
     v, nobody, unknown = np.array([20.0]), np.array([np.inf]), np.array([np.nan])
     assert GapAcceptance().accepts(v, nobody, unknown, nobody, unknown, unknown, unknown).all()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Drivers who see late that they have to yield: they brake hard, and still yield."""
+"""Drivers that see late that they have to yield: they brake hard, and still yield."""
 
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,12 @@ import pytest
 import traffic_support as support
 
 LATE = CrossingRules().late
-# What agents brake with for a line that they see in time [m/s^2].
+# The agents' deceleration for a line that they see in time [m/s^2].
 IN_TIME = 1.6
 
 
 def towards_a_human(maps: Path, share: float) -> support.Run:
-    """Let an agent come out of the side road at 12 m/s, and a human along the main road."""
+    """Run an agent out of the side road at 12 m/s, and a human along the main road."""
     path = maps / 'ZAM_Intersection-1_1_T-1.xml'
     roads = RoadNetwork(load_scenario(path).scenario.lanelet_network)
     start = roads.pose_on(21, roads.line(21).length - 50.0)
@@ -38,7 +38,7 @@ def braking(run: support.Run) -> NDArray[np.float64]:
 
 
 def test_braking_begins_as_late_as_hard_braking_allows(maps: Path) -> None:
-    """From 12 m/s over v^2 / 2b: 45 m before the line with 1.6 m/s^2, and 16 m with 4.5."""
+    """From 12 m/s by v^2 / 2b: 45 m before the line with 1.6 m/s^2, and 16 m with 4.5 m/s^2."""
     in_time, late = (towards_a_human(maps, share) for share in (0.0, 1.0))
     assert in_time.overlaps() == late.overlaps() == []
     way = []
@@ -63,7 +63,8 @@ def test_an_av_with_the_right_of_way_meets_them(shared_scenarios: Path) -> None:
     """
     A recorded car comes to a real junction which the AV crosses first, having the right of way.
 
-    It lets the AV go either way, but brakes 2.7 times as hard for it, and is 0.9 m/s faster
+    It yields to the AV in both cases. As a late yielder it brakes 2.7 times as hard and is 0.9 m/s
+    faster
     halfway. Without the AV it just drives.
     """
     def speeds(**given: Any) -> NDArray[np.float64]:
@@ -75,7 +76,7 @@ def test_an_av_with_the_right_of_way_meets_them(shared_scenarios: Path) -> None:
         return np.asarray(np.hypot(*result.object_velocities[:, column, :2].T))
 
     in_time, late, alone = speeds(share=0.0), speeds(share=1.0), speeds(share=1.0, avs=())
-    # It gets behind another one in the first 2 s.
+    # It gets behind another car in the first 2 s.
     hardest = [float(-np.diff(speed[20:]).min() / 0.1) for speed in (in_time, late)]
     assert hardest[0] == pytest.approx(IN_TIME, abs=0.1)
     assert LATE - 0.5 < hardest[1] < LATE
@@ -83,7 +84,7 @@ def test_an_av_with_the_right_of_way_meets_them(shared_scenarios: Path) -> None:
     assert in_time[-1] < 0.1 and late[-1] < 0.1 and alone[-1] > 5.0
 
 
-def test_who_meets_nobody_drives_as_everybody(shared_scenarios: Path) -> None:
+def test_a_late_yielder_alone_drives_like_any_other(shared_scenarios: Path) -> None:
     """Alone over the junctions of a real town, from the side of one: the same bits."""
     path = shared_scenarios / 'ZAM_Tjunction-1_42_T-1.xml'
     roads = RoadNetwork(load_scenario(path).scenario.lanelet_network)
@@ -98,9 +99,9 @@ def test_who_meets_nobody_drives_as_everybody(shared_scenarios: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['more/DEU_TestIntersectionInteract-3_1_T-1',
                                   'more/DEU_AAH1-2_76900_T-7049'])
-def test_in_dense_traffic_they_brake_hard_and_touch_nobody(shared_scenarios: Path,
-                                                           name: str) -> None:
-    """At priority signs of real junctions; who sees them in time never brakes so hard there."""
+def test_in_dense_traffic_they_brake_hard_and_touch_no_vehicle(shared_scenarios: Path,
+                                                               name: str) -> None:
+    """At priority signs of real junctions; drivers that see them in time never brake so hard."""
     hard = []
     for share in (0.0, 1.0):
         spec = TrafficSpec(agents=20, flow=400.0, late_yielders=share)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who is in which lane: what is left out early makes no difference."""
+"""Which body is in which lane: leaving out far bodies early makes no difference."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ MAPS = ('DEU_Flensburg-10_1_T-1', 'DEU_Guetersloh-36_1_T-1', 'USA_Lanker-1_3_T-1
 
 
 def scattered(graph: LaneGraph, count: int) -> Bodies:
-    """Put bodies of all sizes and headings beside lanes, from right in them to 7 m away."""
+    """Make bodies of all sizes and headings beside lanes, from inside them to 7 m away."""
     rng = np.random.default_rng(3)
     lane = rng.integers(len(graph), size=count)
     poses = graph.poses(lane, rng.uniform(-3.0, 1.0, count) + graph.length[lane] * rng.random(
@@ -37,7 +37,7 @@ def scattered(graph: LaneGraph, count: int) -> Bodies:
 def test_bodies_left_out_beside_straight_lanes_are_not_in_them(name: str,
                                                                shared_scenarios: Path,
                                                                ) -> None:
-    """With the angle by which lanes turn unknown everything is looked at closely."""
+    """If the angle by which lanes turn is unknown, every body is checked closely."""
     graph = LaneGraph(RoadNetwork(load_scenario(
         shared_scenarios / f'{name}.xml').scenario.lanelet_network))
     cells = LaneCells(graph).table

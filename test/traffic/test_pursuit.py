@@ -56,7 +56,7 @@ def test_motion_is_that_of_the_single_track_model() -> None:
 
 
 def test_braking_ends_at_rest_after_the_braking_distance() -> None:
-    """v^2 / (2 a), not a step more, never backwards; standing agents stay."""
+    """They stop after v^2 / (2 a), without a step more or backwards; standing agents stay."""
     speed, braking = np.array([10.0, 0.37, 0.0, 0.0]), np.array([-3.0, -8.0, -8.0, 0.0])
     distance = np.array([100.0 / 6.0, 0.37 ** 2 / 16.0, 0.0, 0.0])
     x, y, yaw, zero = (np.zeros(4) for _ in range(4))

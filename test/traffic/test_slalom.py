@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Agents of all sizes drive past what stands at the edges of a road, seen with shapely alone."""
+"""Agents of all sizes drive past obstacles at the edges of a road, judged by shapely alone."""
 
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
@@ -23,8 +23,8 @@ def test_a_slalom_is_driven_with_clearance(size: tuple[float, float], spacing: f
     """
     Obstacles of 1 m x 1 m reach into the lane from its right and its left in turn.
 
-    A band for 2.55 m keeps 0.5 m, of which cutting it may take 0.1 m; a body that is longer than a
-    truck of 8 m takes a little more.
+    A band for 2.55 m keeps 0.5 m. Cutting the band may take 0.1 m of it; a body that is longer
+    than a truck of 8 m takes a little more.
     """
     sides = [1 if i % 2 else -1 for i in range(4)]
     posts = [support.human(120.0 + spacing * i, side * (0.5 * width - reach + 0.5), 0.0,

@@ -63,14 +63,14 @@ def test_arrivals_come_at_the_given_flow() -> None:
     assert run.overlaps() == []
 
 
-def test_whoever_reaches_the_end_of_the_map_is_gone_for_a_tick_at_least() -> None:
+def test_an_agent_at_the_end_of_the_map_is_absent_for_a_tick_at_least() -> None:
     run = support.Run(one_lane(), TrafficSpec(flow=1800.0, capacity=6, truck_share=0.0),
                       1).ticks(700)
     poses = np.array(run.poses)
     present = np.isfinite(poses[:, :, 0])
     assert poses[present][:, 0].max() <= LANE + 2.25 + 1.5
     jumps = np.abs(np.diff(poses[:, :, 0], axis=0))
-    # Nobody jumps back to the start: a slot is absent in between.
+    # No agent jumps back to the start: its slot is absent in between.
     assert np.nanmax(jumps) < 3.0
     assert (present[1:] & ~present[:-1]).sum() > 6
 
@@ -110,7 +110,7 @@ def test_an_adopted_recording_waits_until_its_place_is_free(maps: Path) -> None:
     assert run.overlaps() == []
 
 
-def test_who_can_become_an_agent(maps: Path) -> None:
+def test_which_recordings_can_become_agents(maps: Path) -> None:
     roads = RoadNetwork(load_scenario(maps / 'ZAM_Intersection-1_1_T-1.xml')
                         .scenario.lanelet_network)
     drive = np.array([(-100.0 + i, -1.75, 0.0) for i in range(50)])
@@ -166,8 +166,8 @@ def test_a_restart_goes_on_from_what_was_seen(maps: Path) -> None:
     assert np.nanmax(steps) < 3.0
 
 
-def test_nobody_arrives_into_a_jam() -> None:
-    """Behind a wreck at the road's end the queue doesn't reach back to its beginning."""
+def test_no_agent_arrives_into_a_jam() -> None:
+    """Behind a wreck at the road's end the queue doesn't reach back to the road's beginning."""
     wreck = support.human(LANE - 10.0, 0.0, 0.0, kind='parkedVehicle')
     run = support.Run(one_lane(), TrafficSpec(flow=1800.0, truck_share=0.0), 3, [wreck])
     poses = run.ticks(2400).poses[-1]

@@ -31,7 +31,7 @@ RED = (TrafficLightState.RED, TrafficLightState.RED_YELLOW)
 
 
 class Crossing(NamedTuple):
-    """Somebody's front over a stop line; for how many steps a light of its way has been red."""
+    """A front that crosses a stop line; for how many steps a light of its way has been red."""
 
     movement: str
     k: int
@@ -40,7 +40,7 @@ class Crossing(NamedTuple):
 
 def crossings(scenario: Scenario, run: support.Run) -> list[Crossing]:
     """
-    Find who drove over which stop line with what movement, by the file and shapely alone.
+    Find the agents that crossed stop lines, and their movements, by the file and shapely alone.
 
     The movement is that of the file's successor whose area the front gets into next.
     """
@@ -84,11 +84,11 @@ def _red_since(light: TrafficLight, k: int) -> int:
 
 
 @pytest.mark.exhaustive
-def test_nobody_crosses_on_red_where_left_turns_begin_straight() -> None:
+def test_no_agent_crosses_on_red_where_left_turns_begin_straight() -> None:
     path = SHARED / 'USA_Lanker-1_3_T-1.xml'
     scenario = load_scenario(path).scenario
     run = support.Run(path, TrafficSpec(agents=50, flow=400.0), 0).ticks(1200)
-    # Those whom a red light finds too near to halt when the run begins are none of its matter.
+    # Agents too near to halt for a red light when the run begins don't count.
     found = [x for x in crossings(scenario, run) if x.k > 20]
     by_movement = {m: sum(x.movement == m for x in found) for m in ('left', 'straight', 'right')}
     # In two minutes the lights of left turns are green for 17 + 12 s, twice those of most others.
@@ -165,7 +165,7 @@ def test_the_way_decides_where_movements_share_their_first_lanelet(
                               ([1, 2, 5, 8], np.inf, 48.0)):
         assert halt(graph, scenario, red_left, ids) == left, ids
         assert halt(graph, scenario, red_others, ids) == others, ids
-    # Who doesn't see that far yet halts for either.
+    # An agent that doesn't see that far yet halts for either.
     assert halt(graph, scenario, red_left, [1, 2]) == halt(graph, scenario, red_others, [1, 2])
 
 
@@ -186,7 +186,7 @@ def test_the_names_of_the_file_go_before_the_geometry() -> None:
     (((TrafficLightState.GREEN, 60), (TrafficLightState.INACTIVE, 40)), True),
     (((TrafficLightState.RED, 20), (TrafficLightState.GREEN, 80)), True),
     (((TrafficLightState.RED, 40), (TrafficLightState.GREEN, 60)), False)], ids=str)
-def test_a_green_arrow_frees_only_who_would_wait_for_ever(
+def test_a_green_arrow_frees_only_agents_that_would_wait_for_ever(
         own: tuple[tuple[TrafficLightState, int], ...], waits: bool) -> None:
     everybody, arrow = light(50), light(51, TrafficLightDirection.LEFT)
     everybody.traffic_light_cycle = TrafficLightCycle([
@@ -203,7 +203,7 @@ def test_a_green_arrow_frees_only_who_would_wait_for_ever(
 @pytest.mark.parametrize(('shown', 'speed', 'stops', 'halts'), [
     ('red', 8.0, False, True), ('redYellow', 8.0, False, True), ('yellow', 8.0, False, True),
     ('green', 8.0, False, False), ('inactive', 8.0, False, False),
-    # v^2 / (2 d) over 48 m: 3.3 m/s^2 is hard for yellow unless one stops already, 6.5 for red.
+    # v^2 / (2 d) over 48 m: 3.3 m/s^2 is hard for yellow unless it stops already, 6.5 for red.
     ('yellow', 18.0, False, False), ('yellow', 18.0, True, True), ('yellow', 20.0, True, False),
     ('red', 19.5, False, True), ('red', 20.5, False, False), ('red', 20.5, True, True),
     ('red', 27.0, True, False),
@@ -221,7 +221,7 @@ def test_lights_count_where_their_lanelet_or_stop_line_has_them() -> None:
     red, way = {50: 'red'}, [1, 2, 3, 6]
     assert halt(*fork(light(50), line=True), red, way) == 38.0, 'at the stop line, x = 90'
     assert halt(*fork(light(50), on=2), red, way) == 60.0, 'at the end of lanelet 2, x = 112'
-    # On the first lanelet of a junction one halts before it, not at its far side.
+    # With the light on a junction's first lanelet agents halt before it, not at its far side.
     first = fork(light(50), on=3, names={'straight': {3}})
     first[1].lanelet_network.intersections[0].incomings[0].incoming_lanelets = {2}
     assert halt(LaneGraph(RoadNetwork(first[1].lanelet_network)), first[1], red, way) == 60.0

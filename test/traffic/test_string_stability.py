@@ -20,7 +20,7 @@ def pulse(time: float) -> float:
 
 
 def platoon(model: AdaptiveCruise) -> tuple[Array, Array]:
-    """Decide at 10 Hz, move at 100 Hz; give accelerations and speeds (decisions, vehicles)."""
+    """Decide at 10 Hz, move at 100 Hz; return accelerations and speeds (decisions, vehicles)."""
     speed = np.full(FOLLOWERS + 1, SPEED)
     gap = model.desired_gap(speed[1:])
     desired = np.full(FOLLOWERS, 40.0)
@@ -68,7 +68,7 @@ def test_the_answer_of_one_follower_is_a_first_order_lag() -> None:
 
 
 def test_speed_drops_grow_where_h_is_too_great() -> None:
-    """With h = 3 T, beyond T + lambda T^2 / 2, the last slow down more than the first."""
+    """With h = 3 T, beyond T + lambda T^2 / 2, the last vehicles slow down more than the first."""
     model = AdaptiveCruise(h=4.5)
     assert model.h > model.time_gap + 0.5 * model.gain * model.time_gap ** 2
     _, speeds = platoon(model)

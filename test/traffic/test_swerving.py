@@ -18,7 +18,7 @@ LIMIT = 2.0
 
 
 def standing(*rows: tuple[int, float, float, float, float]) -> Entries:
-    """Collect (lane, rear, front, low, high) of things that stand."""
+    """Collect (lane, rear, front, low, high) of standing obstacles."""
     columns = np.array(rows, dtype=float).reshape(-1, 5).T
     count = len(rows)
     values = {name: np.zeros(count) for name in Entries._fields}
@@ -37,7 +37,7 @@ def planned(*rows: tuple[int, float, float, float, float], width: float = 6.0,
 
 
 def driven(d: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Let a bicycle of 4.8 m wheelbase steer along offsets; rear axles (N, 2) and headings."""
+    """Steer a bicycle of 4.8 m wheelbase along offsets; return rear axles (N, 2), headings."""
     x = y = yaw = steering = 0.0
     found = []
     while x < 280.0:

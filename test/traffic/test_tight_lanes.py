@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which lanes are too tight for whom; what is on the road is checked by the judge's own area."""
+"""Which lanes are too tight for which vehicles; the judge's own area says what is on the road."""
 
 from pathlib import Path
 
@@ -70,6 +70,6 @@ def test_a_recorded_truck_swings_out_where_its_way_is_too_tight(shared_scenarios
     roads = JudgedRoads(driven.scenario.scenario.lanelet_network)
     events, away = off_road(driven.history, roads)
     assert [x.ids for x in events if x.what == 'off road'] == []
-    # It is there, and takes all the room that it has.
+    # The truck is present, and uses all the room that it has.
     truck = driven.history.ids.index('o30')
     assert 0.05 < away[:, truck].max() < 0.2

@@ -19,7 +19,7 @@ MERGE, CROSSING = 'ZAM_Merge-1_1_T-1.xml', 'ZAM_Intersection-1_1_T-1.xml'
 
 
 class FreeDriving(CarFollowing):
-    """Drives as if nobody were ahead: car following taken away."""
+    """A model without car following: it drives as if no vehicle were ahead."""
 
     name = 'free'
 
@@ -68,7 +68,7 @@ def follower(x: float, speed: float) -> list[Adopted]:
     return [made]
 
 
-def test_an_agent_stops_behind_a_human_who_stands() -> None:
+def test_an_agent_stops_behind_a_standing_human() -> None:
     human = support.human(200.0, 0.0, 0.0)
     run = support.Run(one_lane(), TrafficSpec(), 0, [human], follower(20.0, 13.0)).ticks(400)
     poses, speeds = run.series(0)
@@ -89,7 +89,7 @@ def test_an_agent_follows_a_human_at_the_constant_time_gap() -> None:
     assert ahead - poses[-1, 0] - 4.5 == pytest.approx(17.0, abs=0.5)
 
 
-def test_an_agent_brakes_for_a_human_who_cuts_in() -> None:
+def test_an_agent_brakes_for_a_human_that_cuts_in() -> None:
     human = support.human(60.0, 0.0, 0.0, 8.0, since=20)
     run = support.Run(one_lane(), TrafficSpec(), 0, [human], follower(15.0, 13.0)).ticks(120)
     assert run.overlaps() == []
@@ -97,7 +97,7 @@ def test_an_agent_brakes_for_a_human_who_cuts_in() -> None:
     assert speeds[20] > 12.5 and speeds[60] < 10.0
 
 
-def test_an_agent_stops_for_a_pedestrian_who_walks_into_its_lane(maps: Path) -> None:
+def test_an_agent_stops_for_a_pedestrian_that_walks_into_its_lane(maps: Path) -> None:
     walker = support.human(100.0, -4.5, 0.5 * np.pi, 1.4, since=20, kind='pedestrian',
                            shape=Shape.circle(0.35))
     run = support.Run(one_lane(), TrafficSpec(), 0, [walker], follower(45.0, 13.0)).ticks(160)
@@ -108,7 +108,7 @@ def test_an_agent_stops_for_a_pedestrian_who_walks_into_its_lane(maps: Path) -> 
     assert poses[-1, 0] > 110.0, 'it goes on when the pedestrian has left'
 
 
-def test_a_pedestrian_beside_the_road_stops_nobody() -> None:
+def test_a_pedestrian_beside_the_road_stops_no_agent() -> None:
     walker = support.human(100.0, -4.0, 0.0, 1.4, kind='pedestrian', shape=Shape.circle(0.35))
     run = support.Run(one_lane(), TrafficSpec(), 0, [walker], follower(20.0, 13.0)).ticks(100)
     assert run.series(0)[1].min() > 12.0

@@ -69,7 +69,7 @@ def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
 
 @pytest.mark.slow
 def test_who_comes_while_another_compiles_waits_for_it(tmp_path: Path) -> None:
-    """It says so, lets the other have processor time, and then compiles nothing itself."""
+    """It reports this, leaves processor time to the other, and then compiles nothing itself."""
     with (tmp_path / 'compiling.lock').open('a') as lock, \
             subprocess.Popen(['sleep', '600']) as other:
         fcntl.flock(lock, fcntl.LOCK_EX)

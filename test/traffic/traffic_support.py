@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Running traffic in tests, and looking for overlaps independently of its own geometry."""
+"""Run traffic in tests, and find overlaps independently of its own geometry."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ SUBSTEPS = 10
 
 @dataclass
 class Actor:
-    """Somebody else who drives straight on at a given speed, or stands, from a pose."""
+    """Another road user that drives straight on from a pose at a given speed, or stands."""
 
     description: ObjectDescription
     pose: tuple[float, float, float]

@@ -9,8 +9,7 @@ import re
 
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.pictures.critical_moments import critical_moments, Moment, Touch
-from crgame_ros.analysis.pictures.followed_plans import read_followed_plans
-from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.pictures.scene_frame import FrameScene, read_followed_plans
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.progress import Progress

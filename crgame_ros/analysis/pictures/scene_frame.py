@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene of a run at one moment from above, as data for all renderers of frames."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import math
+from pathlib import Path
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
@@ -12,7 +13,6 @@ from crgame_ros.analysis.pictures.figure_style import (
     object_colour,
     vehicle_styles,
 )
-from crgame_ros.analysis.pictures.followed_plans import FollowedPlan
 from crgame_ros.analysis.pictures.frame_window import (
     all_poses,
     footprints,
@@ -23,6 +23,7 @@ from crgame_ros.analysis.pictures.frame_window import (
 )
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.recording.recorded_plans import read_plans
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.roads.surface import (
     lanelet_polygons,
@@ -36,10 +37,62 @@ from numpy.typing import NDArray
 import shapely
 
 FloatArray = NDArray[np.float64]
-
 # Tolerance of simplified lines; smaller bends are not visible [m].
 SIMPLIFIED = 0.03
 _SOLID = (LineMarking.SOLID, LineMarking.BROAD_SOLID)
+# Duration of the trace behind each driven vehicle [s].
+TRACE_S = 2.0
+# Time between the dots on plans [s].
+DOTS_S = 0.5
+# Shorter bodies have no front mark [m].
+SHOWS_FRONT = 2.5
+# Corners of the mark at the front of a vehicle, in lengths and widths.
+_FRONT = np.array(((0.12, 0.32), (0.38, 0.0), (0.12, -0.32)))
+
+
+class FollowedPlan(NamedTuple):
+    """
+    A plan of an AV.
+
+    :param start_s: time since the start of the run at which it was available [s]
+    :param stamp_s: time since the start of the run of its first pose [s]
+    :param poses: (S, 3) of the rear axle in frame map, scenario steps apart.
+    """
+
+    start_s: float
+    stamp_s: float
+    poses: NDArray[np.float64]
+
+
+def read_followed_plans(bag: Path, log: RunTrajectories,
+                        progress: Callable[[float], object] | None = None
+                        ) -> dict[str, tuple[FollowedPlan, ...]]:
+    """
+    Read the plans of each AV; empty where they were not recorded.
+
+    The recording does not show which plans the engine accepted: refused ones are included.
+
+    :param log: log of the same run.
+    :param progress: called with the share of the recording read so far, 0 to 1.
+    :raises InputError: as `read_plans`.
+    """
+    scheduler = log.game.scheduler
+    found: dict[str, list[FollowedPlan]] = {av.id: [] for av in log.game.avs}
+    for recorded in read_plans(bag, log.game.epoch, progress):
+        av = log.game.av(recorded.av)
+        if recorded.plan is None or recorded.k is None or av is None:
+            continue
+        stamp_s = (recorded.stamp_ns - scheduler.clock_offset_ns) * 1e-9
+        # The run waits for the first answer; another one to the same request has no latency.
+        waited_s = 0.0 if stamp_s == 0.0 or math.isnan(recorded.latency_s) \
+            else recorded.latency_s * log.game.real_time_factor
+        start_s = stamp_s + waited_s
+        known = found[av.id]
+        if known and start_s < known[-1].start_s:
+            start_s = known[-1].start_s
+        known.append(FollowedPlan(start_s, stamp_s,
+                                  av.transform.to_simulation(recorded.plan.states[:, :3])))
+    return {av_id: tuple(plans) for av_id, plans in found.items() if plans}
 
 
 class RoadInWindow(NamedTuple):
@@ -127,16 +180,6 @@ def _lines(lanelet: Lanelet, known: set[int]) -> Iterator[tuple[str, FloatArray]
             yield 'bounds', points[:, :2]
         elif (points is lanelet.left_vertices) if same else lanelet.lanelet_id < neighbour:
             yield 'solid' if marking in _SOLID else 'dashed', points[:, :2]
-
-
-# Duration of the trace behind each driven vehicle [s].
-TRACE_S = 2.0
-# Time between the dots on plans [s].
-DOTS_S = 0.5
-# Shorter bodies have no front mark [m].
-SHOWS_FRONT = 2.5
-# Corners of the mark at the front of a vehicle, in lengths and widths.
-_FRONT = np.array(((0.12, 0.32), (0.38, 0.0), (0.12, -0.32)))
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from crgame_ros.evaluation.summary.cell_block import CellBlock, CellBlocks, CellGroups, IntArray
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
 from crgame_ros.evaluation.summary.group_bootstrap import DrawnUnits
-from crgame_ros.evaluation.summary.paired_cells import paired_cells
 from crgame_ros.evaluation.summary.summary import FailureReason
 import numpy as np
+from numpy.typing import NDArray
 import pyarrow as pa
 import pyarrow.compute as pc
 
+FloatArray = NDArray[np.float64]
+
+# Values with a smaller relative difference are equal.
+SAME = 1e-12
 # Greatest numbers of different reasons that are counted separately, and that are shown.
 _MOST_COUNTED, MOST_TOLD = 1000, 20
 _OTHER = 'other reasons'
@@ -22,6 +26,55 @@ _OTHER = 'other reasons'
 _LONGEST_TRACEBACK = 6000
 # Rows are read in small batches, because tracebacks are long.
 _BATCH_ROWS = 1024
+
+
+@dataclass(frozen=True)
+class PairedCells:
+    """
+    The pairs (P) of a block.
+
+    :param rows: (P) rows of the cells of other planners.
+    :param baseline: (P) rows of the cells of the baseline planner.
+    :param unpaired: rows of cells of other planners without a counterpart of the baseline.
+    """
+
+    rows: IntArray
+    baseline: IntArray
+    unpaired: IntArray
+
+    def differences(self, sums: FloatArray, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """
+        Return the mean of each cell minus that of the baseline's cell.
+
+        :param sums: (N, measures) sums of all cells of the block.
+        :param counts: (N, measures) number of values in each sum.
+        :return: (P, measures) differences, 0 where there is none; and 1 where there is one or 0.
+        """
+        with np.errstate(invalid='ignore', divide='ignore'):
+            means = sums / counts
+        own, other = means[self.rows], means[self.baseline]
+        found = own - other
+        # Rounding errors of equal values are no difference.
+        found[np.abs(found) <= SAME * np.maximum(np.abs(own), np.abs(other))] = 0.0
+        there = ~np.isnan(found)
+        return np.where(there, found, 0.0), there.astype(float)
+
+
+def paired_cells(block: CellBlock, baseline: int) -> PairedCells:
+    """
+    Pair the cells of a block.
+
+    :param baseline: number of the baseline planner's label.
+    """
+    own = block.labels[:, TEXT_FACTORS.index('planner')] == baseline
+    theirs, others = np.flatnonzero(own), np.flatnonzero(~own)
+    if not len(theirs):
+        return PairedCells(np.empty(0, np.int64), np.empty(0, np.int64), others)
+    theirs = theirs[np.argsort(block.pairs[theirs], kind='stable')]
+    known = block.pairs[theirs]
+    place = np.minimum(np.searchsorted(known, block.pairs[others]), len(known) - 1)
+    paired = known[place] == block.pairs[others]
+    return PairedCells(others[paired], theirs[place[paired]], others[~paired])
 
 
 class FailureReasons:

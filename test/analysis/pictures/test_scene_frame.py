@@ -5,12 +5,11 @@
 from dataclasses import replace
 from xml.etree import ElementTree
 
-from crgame_ros.analysis.pictures.followed_plans import FollowedPlan
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.frame_window import FrameWindow, series_windows
 from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
 from crgame_ros.analysis.pictures.run_figure import draw_run
-from crgame_ros.analysis.pictures.scene_frame import FrameScene
+from crgame_ros.analysis.pictures.scene_frame import FollowedPlan, FrameScene
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.outline import outline, placed
