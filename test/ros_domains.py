@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""ROS domains of tests: each worker of pytest-xdist takes those that no other worker takes."""
+"""ROS domains of tests: workers of pytest-xdist have different ones."""
 
 import os
 

@@ -10,8 +10,8 @@ import secrets
 from typing import Protocol
 
 from aiohttp import WSMsgType
+from crgame_ros.cockpit.page_messages import SeenView
 from crgame_ros.cockpit.rights import ALL_RIGHTS
-from crgame_ros.cockpit.seen_view import SeenView
 
 MAX_WAITING = 256
 MAX_WAITING_BYTES = 16 * 2 ** 20

@@ -3,7 +3,7 @@
 """Parsing of messages from pages: untrusted JSON in, checked mappings or one clear error out."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 import json
 import math
 import re
@@ -11,11 +11,12 @@ from typing import Any
 import unicodedata
 
 from crgame_ros.cockpit.rights import ROLES
-from crgame_ros.cockpit.seen_view import SHOWN
 from crgame_ros.errors import InputError
 from crgame_ros.game.task_documents import LONGEST_MS, MAX_NUMBER, PageTimes
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
+# The map, and the viewpoints of the 3D view.
+SHOWN = ('map', 'driver', 'chase', 'bird')
 MAX_BYTES = 64 * 1024
 MAX_NAME = 40
 MAX_EVENT = 100
@@ -30,7 +31,6 @@ ACTIONS = ('start', 'pause', 'step', 'reset', 'stop')
 # Tolerance for rounding of a calibrated axis in the page.
 _AXIS_TOLERANCE = 1e-3
 _MAX_ID = 2 ** 53
-
 _VEHICLE = re.compile(r'(hv|av)[0-9]{1,3}')
 _AV = re.compile(r'av[0-9]{1,3}')
 _CLIENT = re.compile(r'c[0-9]{1,9}')
@@ -41,6 +41,43 @@ _TASK_TIMES = tuple(field.name for field in fields(PageTimes))
 # they hide or reorder text. Angle brackets and ampersands are for mark-up only.
 _HIDDEN = frozenset({'Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp'})
 _MARKUP = frozenset('<>&')
+
+
+@dataclass(frozen=True)
+class SeenView:
+    """
+    The properties of a page's picture, as reported by the page.
+
+    :param shown: one of `SHOWN`; empty before the page has reported.
+    :param inset: whether the small map lies over a 3D view.
+    :param plans: whether the plans of AVs are shown.
+    :param mirrors: whether there are mirrors.
+    :param bare: whether the page is a stage, with only the view.
+    :param across_deg: angle across a 3D view [deg]; None on the map.
+    :param screen_width_m: width of the screen if the view is true to scale [m], else None.
+    :param eye_distance_m: distance of the eyes from the screen [m].
+    :param width_px: width of the picture on the page [CSS px].
+    :param height_px: [CSS px]
+    :param ratio: drawn pixels per CSS pixel.
+    :param rate_hz: pictures per second; None before the first count.
+    :param renderer: name of the renderer as the browser reports it; empty on the map.
+    :param software: whether the processor renders.
+    """
+
+    shown: str = ''
+    inset: bool = False
+    plans: bool = False
+    mirrors: bool = False
+    bare: bool = False
+    across_deg: float | None = None
+    screen_width_m: float | None = None
+    eye_distance_m: float | None = None
+    width_px: float = 0.0
+    height_px: float = 0.0
+    ratio: float = 1.0
+    rate_hz: float | None = None
+    renderer: str = ''
+    software: bool = False
 
 
 def parse_message(text: str) -> dict[str, Any]:

@@ -14,9 +14,9 @@ from crgame_ros.cockpit import page_messages
 from crgame_ros.cockpit.backend import Backend
 from crgame_ros.cockpit.client import Client, Sound, TokenBucket
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.page_messages import SeenView
 from crgame_ros.cockpit.request_guard import browser_of, granted
 from crgame_ros.cockpit.rights import refusal_of
-from crgame_ros.cockpit.seen_view import SeenView
 from crgame_ros.errors import CrgameError, InputError
 
 MESSAGES_PER_S = 400.0

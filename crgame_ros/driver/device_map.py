@@ -9,7 +9,6 @@ from pathlib import Path
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
-from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.driver.indicator_lever import LightButtons
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import AxisBinding, ControlBindings, GearButtons
@@ -21,6 +20,56 @@ from crgame_ros.schema.reading import read
 from crgame_ros.vehicle.lights import Light
 from crgame_ros.yaml_text import parse_yaml, read_yaml
 from evdev import ecodes
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceLimits:
+    """
+    The motor of a wheel.
+
+    :param max_torque: torque at full level [N m]
+    :param strength: factor on the torque of the simulated steering; 0 switches it off [-]
+    :param cap: share of `max_torque` that is never exceeded [-]
+    :param slew: fastest change of the torque [N m/s]
+    :param inverted: whether a positive level turns the wheel to the right.
+    """
+
+    FORM: ClassVar[Form] = Form('see docs/driving.md, section "Force feedback"')
+
+    max_torque: Annotated[float, Within(0.05, 50.0)]
+    strength: Annotated[float, Within(0.0, 5.0)] = 1.0
+    cap: Annotated[float, Within(0.0, 1.0)] = 0.8
+    slew: Annotated[float, Within(1.0, 1000.0)] = 60.0
+    inverted: bool = False
+
+
+class TorqueLimiter:
+    """
+    A limiter that keeps a torque within cap and slew.
+
+    :param limits: of the motor.
+    """
+
+    def __init__(self, limits: ForceLimits) -> None:
+        self.limits = limits
+        self.torque = 0.0
+
+    def step(self, wanted: float, dt_s: float) -> float:
+        """
+        Move towards a torque.
+
+        :param wanted: of the simulated steering [N m]; NaN counts as 0.
+        :param dt_s: since the last step [s]
+        :return: torque of the motor, positive to the left [N m]
+        """
+        limits = self.limits
+        most = limits.cap * limits.max_torque
+        wanted = 0.0 if wanted != wanted else wanted * limits.strength
+        goal = min(most, max(-most, wanted))
+        change = limits.slew * max(0.0, dt_s)
+        self.torque = min(self.torque + change, max(self.torque - change, goal))
+        return self.torque
+
 
 REMEDY = 'see docs/driving.md, section "Add a device"'
 _FORM = Form(REMEDY)

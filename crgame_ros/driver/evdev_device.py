@@ -12,8 +12,7 @@ import struct
 import time
 from typing import Any
 
-from crgame_ros.driver.device_map import DeviceMap, load_device_map, load_device_maps
-from crgame_ros.driver.force_limits import ForceLimits
+from crgame_ros.driver.device_map import DeviceMap, ForceLimits, load_device_map, load_device_maps
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons, NO_LIGHTS
 from crgame_ros.driver.keyboard import KeyState
 from crgame_ros.driver.wheel import (

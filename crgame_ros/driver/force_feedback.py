@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import math
 from typing import Protocol
 
+from crgame_ros.driver.device_map import ForceLimits, TorqueLimiter
 from crgame_ros.driver.evdev_device import EvdevDevice
-from crgame_ros.driver.force_limits import ForceLimits, TorqueLimiter
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import Steering
 from evdev import ecodes, ff

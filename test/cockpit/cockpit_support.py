@@ -23,7 +23,7 @@ from crgame_ros.errors import InputError
 import numpy as np
 import pytest
 
-# Long, because other work may share the machine; nothing waits for it but a failure.
+# Long, because other work may share the machine; only a failing test waits so long.
 PATIENCE_S = 30.0
 HOST = '127.0.0.1'
 

@@ -78,8 +78,8 @@ def test_scans_begin_where_the_sensor_was(backend: ReplayBackend,
         [-spread, 2.0 * spread / 120, 80.0, 0.1], rel=SINGLE)
 
 
-def test_who_is_seen_is_who_was_in_the_request(backend: ReplayBackend,
-                                               recorded: tuple[Perceived, Path]) -> None:
+def test_seen_vehicles_are_those_of_the_request(backend: ReplayBackend,
+                                                recorded: tuple[Perceived, Path]) -> None:
     perceived = recorded[0]
     ids = [item.id for item in perceived.result.setup.descriptions]
     found = of_kind([*frames(backend.chunk(0)), *frames(backend.chunk(1))], FrameKind.SEEN)
@@ -108,7 +108,7 @@ def test_a_chunk_can_be_shown_alone(backend: ReplayBackend) -> None:
         assert bits[:6].astype(bool).tolist() == OCCUPIED.ravel().tolist()
 
 
-def test_the_scene_says_who_perceives(backend: ReplayBackend) -> None:
+def test_the_scene_lists_the_perceiving_avs(backend: ReplayBackend) -> None:
     vehicles = backend.info()['scene']['vehicles']
     assert vehicles[0]['perception'] is None
     assert vehicles[1]['perception']['sensors'] == ['front', 'rear']

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Seats in the browser: who holds them, and what hands, silence and absence become."""
+"""Seats in the browser: their holders, and the effects of input, silence and absence."""
 
 from crgame_ros.cockpit.held_seat import HeldSeat, SILENCE_S
 from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
@@ -19,7 +19,7 @@ THROTTLE = {'keys': [True, False, False, False], 'reverse': False}
 
 @pytest.fixture
 def table() -> SeatTable:
-    """Seats as /seats has them at the start of a game with one human and one AV."""
+    """Return seats as /seats has them at the start of a game with one human and one AV."""
     table = SeatTable()
     table.update({'hv0': {'source': 'game', 'driver': 'keys:/home/me/games/cut_in.keys.yaml'},
                   'av0': {'source': 'planner', 'driver': 'idm'}})
@@ -27,7 +27,7 @@ def table() -> SeatTable:
 
 
 def test_a_seat_is_held_by_one(table: SeatTable) -> None:
-    """Who comes second is told by whom it is held, and may ask."""
+    """A second client gets the holder's name and may ask for the seat."""
     table.claim('c1', 'hv0', NAMES)
     assert table.claim('c1', 'hv0', NAMES).holder == 'c1'
     with pytest.raises(InputError, match='hv0: Ada has the seat; ask for it'):
@@ -41,8 +41,8 @@ def test_a_seat_is_held_by_one(table: SeatTable) -> None:
     assert table.document(NAMES, {})['seats']['av0']['holder'] is None
 
 
-def test_a_seat_is_given_away_with_the_consent_of_who_gets_it(table: SeatTable) -> None:
-    """Only the holder offers; until it is accepted nothing changes; then hands off."""
+def test_a_seat_is_handed_over_with_the_receivers_consent(table: SeatTable) -> None:
+    """Only the holder offers; nothing changes until acceptance, which releases the controls."""
     first = table.claim('c1', 'hv0', NAMES)
     first.apply_input(THROTTLE, 0.0)
     table.ask('c2', 'hv0')
@@ -60,7 +60,7 @@ def test_a_seat_is_given_away_with_the_consent_of_who_gets_it(table: SeatTable) 
     assert second.command(0, DT) == RELEASED
 
 
-def test_an_offer_is_declined_withdrawn_or_ends_with_who_was_to_get_it(table: SeatTable) -> None:
+def test_an_offer_is_declined_withdrawn_or_ends_with_its_receiver(table: SeatTable) -> None:
     """In each case the seat stays where it is."""
     held = table.claim('c1', 'hv0', NAMES)
     for end in (lambda: table.decline('c2', 'hv0'), lambda: table.offer('c1', 'hv0', 'c1'),
@@ -76,8 +76,8 @@ def _driven(person: str = 'p1', here: bool = True) -> tuple[dict, dict[str, Seat
     return _seats('cockpit'), {'hv0': SeatOccupant(SeatPerson(person, 'Ada'), here)}
 
 
-def test_a_seat_is_kept_for_who_has_gone(table: SeatTable) -> None:
-    """For a minute nobody but its driver and a director gets it, then everybody."""
+def test_a_seat_is_kept_for_an_absent_driver(table: SeatTable) -> None:
+    """For a minute only its driver and a director can claim it, then every client can."""
     seats, tenants = _driven(here=False)
     table.update(seats, (), tenants)
     table.note_absent({}, 100.0)
@@ -94,7 +94,7 @@ def test_a_seat_is_kept_for_who_has_gone(table: SeatTable) -> None:
 
 
 def test_two_cockpits_agree(table: SeatTable) -> None:
-    """Who drives at the other one has the seat here too, until they fall silent."""
+    """A driver at the other cockpit has the seat here too, until that driver falls silent."""
     seats, tenants = _driven()
     table.update(seats, (), tenants)
     table.note_absent({'hv0': False}, 100.0)
@@ -104,16 +104,16 @@ def test_two_cockpits_agree(table: SeatTable) -> None:
         table.claim('c2', 'hv0', NAMES, person='p2')
     with pytest.raises(InputError, match='Ada drives in another cockpit'):
         table.release('c2', 'hv0')
-    # That cockpit was killed: nobody said that they have gone.
+    # That cockpit was killed: no message told that the driver had gone.
     table.note_absent({'hv0': True}, 100.0)
     assert table.document(NAMES, {})['seats']['hv0']['holder'] is None
     assert table.claim('c2', 'hv0', NAMES, person='p2').holder == 'c2'
-    # And who is quicker at the other one takes it away.
+    # A quicker driver at the other cockpit gets the seat.
     assert [item.id for item in table.update(seats, (), tenants)] == ['hv0']
 
 
 def test_an_order_in_vain_is_not_repeated() -> None:
-    """The simulation gave the seat to somebody at another cockpit."""
+    """An order ends when the simulation has given the seat to a driver at another cockpit."""
     orders = SeatOrders()
     demand = SeatDemand('hv0', 'cockpit', SeatPerson('p2'))
     orders.note(demand, _seats('game'), {}, 0.0)
@@ -129,7 +129,7 @@ def test_an_order_in_vain_is_not_repeated() -> None:
 
 
 def test_release_gives_back(table: SeatTable) -> None:
-    """By the holder; of a seat that was left, by anybody; never of somebody else's."""
+    """The holder releases a seat, any client an abandoned one, no client another's seat."""
     table.claim('c1', 'hv0', NAMES)
     with pytest.raises(InputError, match='another person has the seat'):
         table.release('c2', 'hv0')
@@ -151,7 +151,7 @@ def test_a_client_that_is_gone_leaves_nothing(table: SeatTable) -> None:
 
 
 def test_unknown_seat_lists_what_there_is(table: SeatTable) -> None:
-    """As everywhere: what was wrong and what would be right."""
+    """The message names the wrong value and the valid ones, as all messages do."""
     for act in (lambda: table.claim('c1', 'hv7', NAMES), lambda: table.release('c1', 'hv7'),
                 lambda: table.ask('c1', 'hv7'), lambda: table.offer('c1', 'hv7', 'c2')):
         with pytest.raises(InputError, match='hv7: there is no such seat; it has hv0, av0'):
@@ -159,7 +159,7 @@ def test_unknown_seat_lists_what_there_is(table: SeatTable) -> None:
 
 
 def test_vehicles_of_another_game_lose_their_holders(table: SeatTable) -> None:
-    """A seat that is no more is nobody's."""
+    """A seat that no longer exists has no holder."""
     table.claim('c1', 'av0', NAMES)
     assert [seat.id for seat in table.update({'hv0': {'source': 'game', 'driver': 'idle'}})] \
         == ['av0']
@@ -167,12 +167,12 @@ def test_vehicles_of_another_game_lose_their_holders(table: SeatTable) -> None:
 
 
 def test_the_driver_is_named_without_the_way_to_its_file(table: SeatTable) -> None:
-    """Who watches from elsewhere learns nothing of this machine's folders."""
+    """Remote clients get no path of this machine."""
     assert table.document(NAMES, {})['seats']['hv0']['driver'] == 'keys:cut_in.keys.yaml'
 
 
 def test_keys_go_through_the_papers_filter() -> None:
-    """CRG 18-19 in simulation time: the same as a keyboard at the same cycles."""
+    """CRG 18-19 apply in simulation time: commands equal a keyboard's at the same cycles."""
     seat, keyboard = HeldSeat('hv0', 'c1'), KeyboardCycles()
     seat.apply_input({'keys': [True, False, True, False], 'reverse': False}, 0.0)
     for n in range(40):
@@ -183,14 +183,14 @@ def test_keys_go_through_the_papers_filter() -> None:
 
 
 def test_axes_pass_as_they_are() -> None:
-    """The page has calibrated them."""
+    """Axes are not changed, as the page has calibrated them."""
     seat = HeldSeat('hv0', 'c1')
     seat.apply_input({'axes': [0.25, 0.0, -0.5], 'reverse': True}, 0.0)
     assert seat.command(3, DT) == DriverCommand(0.25, 0.0, -0.5, True)
 
 
 def test_hands_off_means_released_at_once() -> None:
-    """No ramp: the next command is released, and the filter begins anew after the return."""
+    """The next command is released without a ramp; the filter restarts after the return."""
     seat = HeldSeat('hv0', 'c1')
     seat.apply_input(THROTTLE, 0.0)
     for n in range(50):
@@ -202,7 +202,7 @@ def test_hands_off_means_released_at_once() -> None:
 
 
 def test_silence_is_noticed() -> None:
-    """A page that hangs sends nothing, not even that it is gone."""
+    """A page that hangs sends no message at all, so its silence must be detected."""
     seat = HeldSeat('hv0', 'c1')
     assert not seat.is_silent(100.0)
     seat.apply_input(THROTTLE, 100.0)
@@ -213,7 +213,7 @@ def test_silence_is_noticed() -> None:
 
 
 def test_a_new_run_begins_at_cycle_0() -> None:
-    """After a reset the step counter falls: the filter follows instead of refusing."""
+    """After a reset the step counter falls, and the filter follows it without an error."""
     seat = HeldSeat('hv0', 'c1')
     seat.apply_input(THROTTLE, 0.0)
     for n in range(500, 550):
@@ -226,7 +226,7 @@ def _seats(source: str, driver: str = 'idle') -> dict[str, dict[str, str]]:
 
 
 def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTable) -> None:
-    """While the answer is awaited the seat stays held; with it, /seats has the last word."""
+    """The seat stays held until the answer arrives; from then on /seats decides."""
     orders = SeatOrders()
     table.claim('c1', 'hv0', NAMES)
     orders.note(SeatDemand('hv0', 'cockpit'), table.seats, {}, 0.0)
@@ -238,14 +238,14 @@ def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTab
 
 
 def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
-    """Every half second for ten: a reset that loads a big map hears nothing for seconds."""
+    """Orders repeat every 0.5 s for 10 s, as a reset with a big map can block for seconds."""
     orders = SeatOrders()
     taken, given = SeatDemand('hv0', 'cockpit'), SeatDemand('hv0', 'game')
     orders.note(taken, table.seats, {}, 100.0)
     assert orders.due(100.0 + 0.9 * AGAIN_S) == []
     assert orders.due(100.0 + AGAIN_S) == [taken]
     assert orders.due(100.0 + 1.9 * AGAIN_S) == []
-    # The later order is the one that counts.
+    # The later order counts.
     orders.note(given, table.seats, {}, 101.0)
     assert orders.due(101.0 + AGAIN_S) == [given]
     assert orders.due(101.0 + GIVE_UP_S) == [] and 'hv0' not in orders
@@ -255,7 +255,7 @@ def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
     ('cockpit', 'cockpit', 'idle'), ('game', 'game', 'idle'), ('game', 'other', 'idle'),
     ('game', 'cockpit', 'cockpit')], ids=['taken', 'given back', 'to another', 'at home'])
 def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: str) -> None:
-    """For the simulation says nothing when nothing changes."""
+    """The simulation sends no answer if the seat does not change."""
     orders = SeatOrders()
     demand = SeatDemand('hv0', ordered)
     orders.note(demand, _seats(source, driver), {}, 0.0)
@@ -271,6 +271,6 @@ def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: s
     '{"hv0": {"source": 1, "driver": "idle"}}', '{"a b": {"source": "game", "driver": "idle"}}',
     '{"hv0000": {"source": "game", "driver": "idle"}}'])
 def test_seats_that_are_none_are_refused(text: str) -> None:
-    """A name would become a topic, and a missing source an error in the midst of driving."""
+    """A bad name would become a topic, and a missing source an error during the drive."""
     with pytest.raises(InputError, match='/seats: is not what the contract says'):
         parse_seats_document(text)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks on the server, over real sockets: each is refused and hurts nobody else."""
+"""Attacks on the server, over real sockets: each is refused and harms no other client."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -44,7 +44,7 @@ async def test_pages_of_other_sites_get_nothing() -> None:
                 await running.join(Origin=origin)
             assert caught.value.status == 403
             assert (await get(port, '/api/scenarios', f'Origin: {origin}'))[0] == 403
-        # An image or script of another page has no Origin, but says where it comes from.
+        # A request for an image or script of another page has no Origin, but has Sec-Fetch-Site.
         for site in ('cross-site', 'same-site'):
             assert (await get(port, '/static/js/main.js', f'Sec-Fetch-Site: {site}'))[0] == 403
         # A link on another page may lead here.
@@ -91,7 +91,7 @@ async def test_without_the_token_nothing_is_served_and_the_token_is_not_told() -
 async def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
     async with cockpit(token=TOKEN) as running:
         url = f'{running.address}/?token={TOKEN}'
-        # What else the address says of the page stays.
+        # The other parameters of the address stay.
         for rest, place in (('', '/'), ('&stage=hv0&view=map', '/?stage=hv0&view=map'),
                             ('&a=http://b.example', '/?a=http://b.example')):
             async with running.http.get(f'{url}{rest}', allow_redirects=False) as answer:
@@ -104,11 +104,11 @@ async def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
             assert answer.status == 200
         joined = await running.join()
         await next_text(joined, 'hello')
-        # The token does not make other sites welcome.
+        # Other sites are refused even with the token.
         with pytest.raises(WSServerHandshakeError):
             await running.join(Origin='http://evil.example')
         await joined.close()
-        # Whoever has the token may use any name of the machine.
+        # A client with the token may use any name of the machine.
         assert (await get(running.port, f'/?token={TOKEN}', host='lab-pc:8000'))[0] == 303
 
 
@@ -139,7 +139,7 @@ async def test_other_methods_and_posts_without_the_header_do_nothing() -> None:
                 assert status == 403
         for method in ('PUT', 'DELETE', 'PATCH', 'TRACE'):
             assert (await get(running.port, '/', 'X-Crgame: 1', method=method))[0] == 405
-        # No other site is ever told that it may send that header.
+        # The server never allows another site to send that header.
         _, answer = await get(running.port, '/api/load', own, method='OPTIONS')
         assert b'access-control' not in answer.lower()
 
@@ -162,7 +162,7 @@ async def test_what_is_no_message_ends_the_connection_after_a_few() -> None:
             assert (await next_text(sender, 'notice'))['level'] == 'error'
             await send(sender)
             assert await close_code(sender) == 1008
-        # Each kind once is the same to the server.
+        # One bad message of each kind counts like repeats of one kind.
         sender = await running.join()
         for send in bad.values():
             await send(sender)
@@ -184,7 +184,7 @@ async def test_the_backend_learns_of_a_drop_before_the_client_does() -> None:
             peer.socket.close()
             return gone
 
-        # The farewell, whose code is 1008 = 0x3f0, is never answered.
+        # The close frame, whose code is 1008 = 0x3f0, is never answered.
         assert await asyncio.to_thread(misbehave) == ['c1']
 
 
@@ -217,7 +217,7 @@ async def test_a_message_of_64_kib_is_read_and_a_larger_one_ends_the_connection(
 
 
 class RawPeer:
-    """A WebSocket client of a thread of its own, which does what no library would."""
+    """A WebSocket client in its own thread that violates the protocol, as no library does."""
 
     def __init__(self, port: int, receive_buffer: int | None = None) -> None:
         self.socket = socket.socket()
@@ -239,7 +239,7 @@ class RawPeer:
         try:
             self.socket.sendall(frame * count)
         except OSError:
-            pass  # It was thrown out before the last one: that is what the test is for.
+            pass  # The server dropped the client before the last message, as the test expects.
 
     def read_to_the_end(self) -> bytes:
         received = b''
@@ -273,7 +273,7 @@ async def check_undisturbed(running: Cockpit, times: list[float], seconds: float
     pumped, got = running.backend.pumped, len(times)
     await asyncio.sleep(seconds)
     pumped, got = running.backend.pumped - pumped, len(times) - got
-    # This process is also the attacker's, and the machine is shared: the backend itself is late.
+    # The attacker runs in this process, and the machine is shared: the backend itself is late.
     assert pumped > 10
     assert got > 0.8 * pumped
 
@@ -303,7 +303,7 @@ async def test_a_flood_is_cut_off_and_others_go_on(opcode: int, text: bytes) -> 
             await wait_until(lambda: running.backend.gone == ['c2'], 'the end of the flood')
             await wait_until(lambda: not thread.is_alive(), 'the attacker')
             seconds = loop.time() - start_s
-        # The burst, and what refills meanwhile.
+        # The burst, and the refill meanwhile.
         answered = len(running.backend.commands) + flood[0].count(b'\x8a\x04ping')
         assert answered <= min(800 + 400 * seconds, 9_000)
         await reader.close()
@@ -311,7 +311,7 @@ async def test_a_flood_is_cut_off_and_others_go_on(opcode: int, text: bytes) -> 
 
 @pytest.mark.clock
 @in_loop
-async def test_whoever_sends_400_messages_a_second_is_kept() -> None:
+async def test_a_client_that_sends_400_messages_a_second_is_kept() -> None:
     async with cockpit() as running:
         sender = await running.join()
         for _ in range(100):
@@ -326,7 +326,7 @@ async def test_whoever_sends_400_messages_a_second_is_kept() -> None:
 
 @pytest.mark.clock
 @in_loop
-async def test_whoever_never_reads_is_dropped_and_costs_nothing() -> None:
+async def test_a_client_that_never_reads_is_dropped_and_costs_nothing() -> None:
     # 64 KiB at 100 Hz: 40 MB until it is dropped, if they were kept.
     async with cockpit(backend=PumpBackend(bytes(64 * 1024))) as running:
         reader = await running.join()
@@ -343,7 +343,7 @@ async def test_whoever_never_reads_is_dropped_and_costs_nothing() -> None:
                 _, peak = tracemalloc.get_traced_memory()
             finally:
                 tracemalloc.stop()
-            # One frame half sent, the newest of each slot behind it.
+            # One frame is half sent; the newest of each slot waits behind it.
             assert deaf.waiting <= 2 and deaf._unsent() <= 64 * 1024 + 16
             assert peak - before < 4 * 2 ** 20
             await wait_until(lambda: running.backend.gone == ['c2'], 'it to be dropped')
@@ -354,7 +354,7 @@ async def test_whoever_never_reads_is_dropped_and_costs_nothing() -> None:
 
 @pytest.mark.clock
 @in_loop
-async def test_whoever_falls_silent_is_noticed() -> None:
+async def test_a_silent_client_is_noticed() -> None:
     # It reads nothing and answers nothing, but nothing is unsent either: only a ping tells, sent
     # after 5 s and answered within 2.5 s.
     class Quiet(PumpBackend):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a sensor looked from: as perception itself places it, also between received states."""
+"""The pose of a sensor is perception's own, also between received states."""
 
 from collections import OrderedDict
 import copy
@@ -46,7 +46,7 @@ def replaced(mounts: SensorMounts) -> SensorMounts:
 
 
 def states(state: VehicleState) -> np.ndarray:
-    """Return rows of which the second is the AV, with columns that are not of the state."""
+    """Return rows, the second of the AV, with columns beyond those of the state."""
     return np.array([[0.0] * 12, [*state, 1.0, 2.0, 3.0, 4.0]])
 
 
@@ -62,7 +62,7 @@ def test_a_sensor_is_where_perception_has_it(mounts: SensorMounts, vehicle: Vehi
 
 
 def test_a_step_between_two_states_is_reached_from_the_nearest(mounts: SensorMounts) -> None:
-    """On a circle; the chord of 5 steps differs from its arc by s^3 / 24 R^2 = 7 um."""
+    """On a circle the chord of 5 steps differs from its arc by s^3 / 24 R^2 = 7 um."""
     def on_circle(n: int) -> VehicleState:
         yaw, radius = YAW_RATE * n * DT_S, SPEED / YAW_RATE
         return VehicleState(radius * np.sin(yaw), radius * (1.0 - np.cos(yaw)), yaw, SPEED,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The server as a browser sees it: files, ports, messages and replies, shutdown."""
+"""The server, as a browser sees it: files, ports, messages and replies, shutdown."""
 
 import asyncio
 import json
@@ -23,7 +23,7 @@ from crgame_ros.cockpit import hub, page_files, server, session
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Sound
 from crgame_ros.cockpit.frames import FrameKind
-from crgame_ros.cockpit.seen_view import SeenView
+from crgame_ros.cockpit.page_messages import SeenView
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
 import pytest
@@ -78,7 +78,7 @@ def test_a_missing_page_is_one_clear_error(tmp_path: Path) -> None:
 @in_loop
 async def test_libraries_are_served_from_when_they_are_there(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Absent, then fetched while the server runs; and nothing else from their folder."""
+    """Libraries may appear while the server runs; no other file of their folder is served."""
     monkeypatch.setattr(page_files, 'find_libraries', lambda: next(tmp_path.iterdir(), None))
     async with cockpit() as running:
         for path in page_files.LIBRARIES:
@@ -125,7 +125,7 @@ async def test_one_origin_may_show_the_page_and_the_page_is_told_which() -> None
                 assert policy.startswith("default-src 'self';")
         joined = await running.join()
         assert (await next_text(joined, 'hello'))['framed_by'] == 'http://127.0.0.1:8070'
-        # To look is not to talk: its own scripts cannot.
+        # The framing page may show the cockpit, but its own scripts may not connect.
         with pytest.raises(WSServerHandshakeError):
             await running.join(Origin='http://127.0.0.1:8070')
         await joined.close()
@@ -251,7 +251,7 @@ async def test_an_address_gets_no_more_than_its_share_and_silent_pages_give_way(
         assert await close_code(late) == 1013
         clients = list(running.hub.clients.values())
         assert len(running.backend.present) == len(clients) == hub.MAX_OF_ADDRESS
-        # They have said nothing for a while, but for one; the longest silent one drives.
+        # All but one have been silent for a while; the longest silent one drives.
         for age_s, client in enumerate(reversed(clients)):
             client.heard_s -= 2.0 * hub.GIVES_WAY_S + age_s
         clients[0].drives = True
@@ -265,7 +265,7 @@ async def test_an_address_gets_no_more_than_its_share_and_silent_pages_give_way(
 
 
 @in_loop
-async def test_who_says_nothing_is_no_page() -> None:
+async def test_a_client_that_says_nothing_is_no_page() -> None:
     async with cockpit(backend=PumpBackend(period_s=0.1)) as running:
         socket = await running.join()
         await next_text(socket, 'hello')
@@ -281,7 +281,7 @@ async def test_the_next_free_port_is_taken() -> None:
         runner, port = await listen(app, HOST, running.port)
         assert running.port < port < running.port + server.PORTS_TRIED
         assert (await get(port, '/'))[0] == 200
-        # The name of the first server with its port is not the name of the second.
+        # The first server's name and port are not valid for the second.
         assert (await get(port, '/', host=f'{HOST}:{running.port}'))[0] == 403
         await runner.cleanup()
 
@@ -307,7 +307,7 @@ async def test_the_end_closes_every_socket_within_a_second() -> None:
     runner, port = await listen(create_app(backend, Access(HOST, 0), None), HOST, 0)
     async with ClientSession() as http:
         reading = await http.ws_connect(f'http://{HOST}:{port}/ws')
-        # This one never answers the server's farewell.
+        # This client never answers the server's close frame.
         deaf = await http.ws_connect(f'http://{HOST}:{port}/ws', autoclose=False)
         backend.held.clear()
         await reading.send_json({'type': 'trigger', 'event': 'never ends', 'id': 1})
@@ -316,7 +316,7 @@ async def test_the_end_closes_every_socket_within_a_second() -> None:
         loop = asyncio.get_running_loop()
         start_s = loop.time()
         await runner.cleanup()
-        # A second is the server's; the rest is for a busy machine.
+        # The server has one second; the rest is for a busy machine.
         assert loop.time() - start_s < 2.0
         assert await closing == 1001
         assert sorted(backend.gone) == ['c1', 'c2'] and backend.stopped

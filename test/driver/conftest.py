@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Modules beside the tests can be imported by them."""
+"""Make the modules beside the tests importable."""
 
 from pathlib import Path
 import sys

@@ -12,10 +12,9 @@ from tempfile import gettempdir
 import time
 from typing import Any
 
-from crgame_ros.driver.device_map import load_device_map
+from crgame_ros.driver.device_map import ForceLimits, load_device_map
 from crgame_ros.driver.evdev_device import EvdevDevice, EventDecoder
 from crgame_ros.driver.force_feedback import ForceFeedback
-from crgame_ros.driver.force_limits import ForceLimits
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.steering import Steering
 from evdev import ecodes, ff

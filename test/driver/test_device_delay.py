@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of devices at the machine are dated, and their delay is told once a second."""
+"""Inputs of local devices have stamps, and their delay is published once a second."""
 
 import os
 from typing import Any
@@ -15,13 +15,13 @@ import pytest
 
 
 class Told:
-    """Keeps what is published on /diagnostics."""
+    """Keeps the statuses that are published on /diagnostics."""
 
     def __init__(self) -> None:
         self.statuses: list[tuple[str, str, dict[str, Any]]] = []
 
     def publish(self, name: str, level: object, text: str, values: dict[str, Any]) -> None:
-        """Keep a status."""
+        """Store a status."""
         self.statuses.append((name, text, values))
 
 

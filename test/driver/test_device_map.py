@@ -20,7 +20,7 @@ import pytest
 
 WHEEL_AXES = frozenset({ecodes.ABS_X, ecodes.ABS_Y, ecodes.ABS_Z, ecodes.ABS_RZ})
 WHEEL_BUTTONS = frozenset(range(ecodes.BTN_TRIGGER, ecodes.BTN_DEAD + 1))
-# What the kernel reports of these wheels and of two families of gamepads.
+# Reports of the kernel for these wheels and for two families of gamepads.
 WHEEL_LIMITS = {ecodes.ABS_X: (0.0, 65535.0), ecodes.ABS_Y: (0.0, 255.0),
                 ecodes.ABS_Z: (0.0, 255.0), ecodes.ABS_RZ: (0.0, 255.0)}
 STICKS = dict.fromkeys((ecodes.ABS_X, ecodes.ABS_Y, ecodes.ABS_RX, ecodes.ABS_RY))
@@ -36,7 +36,7 @@ def find(name: str, axes: frozenset[int], buttons: frozenset[int]) -> list[str]:
 
 
 def test_wheels_come_before_gamepads_before_keyboards() -> None:
-    """The order is the one in which auto chooses."""
+    """The order is that of the choice `auto`."""
     maps = load_device_maps()
     assert [m.kind for m in maps] == sorted(m.kind for m in maps)
     assert {m.name for m in maps} == {*WHEELS, 'generic_gamepad', 'keyboard'}
@@ -50,7 +50,7 @@ def test_wheels_come_before_gamepads_before_keyboards() -> None:
     ('Logitech G920 Driving Force Racing Wheel', 'logitech_g923_xbox'),
 ])
 def test_wheels_are_known_by_the_names_that_the_kernel_gives(device: str, expected: str) -> None:
-    """Exactly one map fits each, for the two G923 have their pedals on different axes."""
+    """Exactly one map fits each wheel; the two G923 have their pedals on different axes."""
     assert find(device, WHEEL_AXES, WHEEL_BUTTONS) == [expected]
 
 
@@ -86,7 +86,7 @@ def test_wheel_endpoints(name: str) -> None:
     *((name, WHEEL_LIMITS) for name in WHEELS), ('generic_gamepad', XBOX_LIMITS),
     ('generic_gamepad', PLAYSTATION_LIMITS)])
 def test_evdev_and_joy_agree(name: str, limits: dict[int, tuple[float, float]]) -> None:
-    """The same device drives the same whether read by evdev or by a joy node."""
+    """A device gives the same commands through evdev and through a joy node."""
     device = load_device_map(name)
     assert device.evdev is not None and device.joy is not None
     for share in [i / 20 for i in range(21)]:
@@ -136,7 +136,7 @@ buttons: {reverse_toggle: [{evdev: BTN_A, joy: 2}]}
 
 
 def test_combined_pedals_are_read() -> None:
-    """One axis for both pedals, ranges from the device."""
+    """One axis serves both pedals, with the device's ranges."""
     device = parse_device_map(COMBINED, 'maps/old.yaml')
     assert (device.name, device.kind) == ('old', DeviceKind.WHEEL)
     assert device.evdev is not None
@@ -168,7 +168,7 @@ def test_combined_pedals_are_read() -> None:
     ('title: Old wheel', 'title: [', 'is no YAML'),
 ])
 def test_wrong_maps_name_file_and_key(old: str, new: str, key: str) -> None:
-    """Each message holds the file, the key and what is there."""
+    """Each message names the file, the key and the value."""
     assert old in COMBINED
     with pytest.raises(InputError, match=key) as caught:
         parse_device_map(COMBINED.replace(old, new), 'maps/old.yaml')
@@ -176,7 +176,7 @@ def test_wrong_maps_name_file_and_key(old: str, new: str, key: str) -> None:
 
 
 def test_a_missing_map_lists_the_known_ones(tmp_path: Path) -> None:
-    """So does a directory in place of a file."""
+    """A directory in place of a file gives the same list."""
     with pytest.raises(InputError, match='generic_gamepad, keyboard, logitech_g29'):
         load_device_map('logitech_g30')
     (tmp_path / 'x.yaml').mkdir()
@@ -192,7 +192,7 @@ def test_maps_of_another_directory(tmp_path: Path) -> None:
 
 
 def test_the_documented_example_is_the_g29() -> None:
-    """The example of docs/driving.md is read, and drives as a G29 without a shifter does."""
+    """The example of docs/driving.md is valid and drives like a G29 without a shifter."""
     text = (Path(__file__).parents[2] / 'docs' / 'driving.md').read_text(encoding='utf-8')
     block = next(b for b in text.split('```yaml')[1:] if b.startswith('\ntitle:'))
     device = parse_device_map(block.split('```')[0], 'driving.yaml')

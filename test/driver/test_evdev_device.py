@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Devices read through evdev: decoding with real events, real absence, and uinput where it is."""
+"""Devices read through evdev: real events, really absent devices, and uinput if present."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,12 +31,12 @@ def event(kind: int, code: int, value: int) -> InputEvent:
 
 
 def feed(decoder: EventDecoder, *events: tuple[int, int, int]) -> list[bool]:
-    """Feed events and give what each reported."""
+    """Feed events and return the result of each."""
     return [decoder.feed(event(*e)) for e in events]
 
 
 def absent(tmp_path: Path, name: str) -> EvdevDevice:
-    """Return a device of a map that is not there, to be fed by its decoder."""
+    """Return an absent device of a map, to be fed through its decoder."""
     device_map = load_device_map(name)
     device = EvdevDevice((device_map,), directory=tmp_path / 'none')
     device.device_map = device_map
@@ -49,7 +49,7 @@ def absent(tmp_path: Path, name: str) -> EvdevDevice:
 
 
 def test_axes_and_buttons_are_kept() -> None:
-    """The last value of each axis and the held buttons; repeats and reports change nothing."""
+    """The last axis values and the held buttons are kept; repeats and reports change nothing."""
     decoder = EventDecoder(GearButtons())
     changed = feed(decoder, (ecodes.EV_ABS, ecodes.ABS_X, 7), (ecodes.EV_ABS, ecodes.ABS_X, 7),
                    (ecodes.EV_ABS, ecodes.ABS_X, 8), (ecodes.EV_KEY, ecodes.KEY_W, 1),
@@ -62,7 +62,7 @@ def test_axes_and_buttons_are_kept() -> None:
 
 
 def test_a_key_toggles_the_gear_once_a_press() -> None:
-    """Press, auto-repeat and release are one change; the next press changes back."""
+    """A press with auto-repeat and release is one change; the next press changes back."""
     decoder = EventDecoder(GearButtons(toggle=frozenset({ecodes.KEY_R})))
     gears = []
     for value in (1, 2, 2, 0, 1, 0):
@@ -72,7 +72,7 @@ def test_a_key_toggles_the_gear_once_a_press() -> None:
 
 
 def test_an_overrun_is_recovered_from() -> None:
-    """After SYN_DROPPED the events up to the report are void and the state is read anew."""
+    """After SYN_DROPPED events up to the report are ignored, and the state is read again."""
     decoder = EventDecoder(GearButtons(held=frozenset({706})))
     feed(decoder, (ecodes.EV_KEY, ecodes.KEY_W, 1), (ecodes.EV_SYN, ecodes.SYN_DROPPED, 0),
          (ecodes.EV_KEY, ecodes.KEY_A, 1), (ecodes.EV_ABS, 0, 9))
@@ -87,7 +87,7 @@ def test_an_overrun_is_recovered_from() -> None:
 
 
 def test_a_chosen_gear_outlives_a_synchronisation() -> None:
-    """Only a gate follows the buttons; what a paddle chose stays."""
+    """Only a shifter gate follows the buttons; a gear chosen by paddle stays."""
     decoder = EventDecoder(GearButtons(on=frozenset({293}), held=frozenset({706})))
     feed(decoder, (ecodes.EV_KEY, 293, 1), (ecodes.EV_KEY, 293, 0))
     decoder.synchronise({}, ())
@@ -95,7 +95,7 @@ def test_a_chosen_gear_outlives_a_synchronisation() -> None:
 
 
 def test_a_wheel_drives_through_its_map(tmp_path: Path) -> None:
-    """Half throttle and 225 of 450 degrees to the left, at once, from real events."""
+    """Real events give half throttle and 225 of 450 degrees to the left at once."""
     device = absent(tmp_path, 'logitech_g29')
     driver = EvdevDriver(device)
     assert driver.command(0, DT_S) == (0.0, 0.0, 0.0, False, 0, False)
@@ -122,7 +122,7 @@ def test_a_keyboard_drives_through_the_filter(tmp_path: Path) -> None:
 
 
 def test_no_input_directory_is_explained(tmp_path: Path) -> None:
-    """No exception, in no call: a message with the way out, and a released command."""
+    """No call raises an exception; the message names the remedy, the command is released."""
     device = open_evdev(directory=tmp_path / 'input')
     driver = EvdevDriver(device)
     assert [driver.poll(now_s) for now_s in (0.0, 0.5, 1.0, 5.0)] == [False] * 4
@@ -134,14 +134,14 @@ def test_no_input_directory_is_explained(tmp_path: Path) -> None:
 
 
 def test_no_fitting_device_is_explained(tmp_path: Path) -> None:
-    """An empty directory names the maps that were looked for."""
+    """For an empty directory the message names the maps that were tried."""
     problem = open_evdev('logitech_g29', tmp_path).problem
     assert 'no device fits logitech_g29; found: none' in str(problem)
     assert 'generic_gamepad' not in str(problem)
 
 
 def test_a_file_that_is_no_device_is_named(tmp_path: Path) -> None:
-    """The kernel refuses its ioctl; the scan goes on and says which file it was."""
+    """The kernel refuses its ioctl; the scan continues and names the file."""
     (tmp_path / 'event3').write_bytes(b'no device')
     (tmp_path / 'mouse0').write_bytes(b'never opened')
     problem = str(open_evdev(directory=tmp_path).problem)
@@ -151,7 +151,7 @@ def test_a_file_that_is_no_device_is_named(tmp_path: Path) -> None:
 
 @contextmanager
 def without_privileges() -> Iterator[None]:
-    """Give up root for a while, if the test runs as root, for nothing is denied to root."""
+    """Drop root for a while, if the test runs as root: root is denied nothing."""
     user = os.geteuid()
     if user == 0:
         os.seteuid(65534)
@@ -175,7 +175,7 @@ def test_missing_permission_is_explained() -> None:
 
 
 def test_a_lost_device_is_looked_for_once_a_second(tmp_path: Path) -> None:
-    """The message follows the directory only where a scan is due."""
+    """The message follows changes of the directory only when a scan is due."""
     device = open_evdev(directory=tmp_path / 'later')
     device.poll(100.0)
     (tmp_path / 'later').mkdir()
@@ -186,7 +186,7 @@ def test_a_lost_device_is_looked_for_once_a_second(tmp_path: Path) -> None:
 
 
 def test_a_wrong_map_is_refused_at_once(tmp_path: Path) -> None:
-    """A file that is no device map is no missing device."""
+    """A file that is no device map is an error and not a missing device."""
     path = tmp_path / 'mine.yaml'
     path.write_text('title: 3', encoding='utf-8')
     with pytest.raises(InputError, match='"kind" is missing'):
@@ -194,7 +194,7 @@ def test_a_wrong_map_is_refused_at_once(tmp_path: Path) -> None:
 
 
 def virtual_wheel(name: str = G29, pedal: int = 255) -> UInput:
-    """Make a wheel that the kernel shows like a real one."""
+    """Make a virtual wheel that the kernel presents like a real one."""
     axis = {ecodes.ABS_X: AbsInfo(32767, 0, 65535, 0, 0, 0)}
     for code in (ecodes.ABS_Y, ecodes.ABS_Z, ecodes.ABS_RZ):
         axis[code] = AbsInfo(pedal, 0, 255, 0, 0, 0)
@@ -204,7 +204,7 @@ def virtual_wheel(name: str = G29, pedal: int = 255) -> UInput:
 
 
 def wait_for(device: EvdevDevice, connected: bool, start_s: float) -> float:
-    """Poll once a simulated second until the device comes or goes."""
+    """Poll once a simulated second until the device appears or disappears."""
     now_s = start_s
     while device.connected != connected:
         time.sleep(0.05)
@@ -215,7 +215,7 @@ def wait_for(device: EvdevDevice, connected: bool, start_s: float) -> float:
 
 @needs_uinput
 def test_a_real_device_survives_unplug_and_replug() -> None:
-    """A virtual wheel is found, driven, unplugged, missed, plugged in again and driven on."""
+    """A virtual wheel works again after it was found, driven, unplugged and plugged in."""
     wheel = virtual_wheel()
     device = open_evdev(G29)
     now_s = wait_for(device, True, 0.0)
@@ -239,7 +239,7 @@ def test_a_real_device_survives_unplug_and_replug() -> None:
 
 @needs_uinput
 def test_a_wheel_is_preferred_to_a_keyboard() -> None:
-    """The rank of auto, on real devices."""
+    """`auto` prefers a wheel on real devices too."""
     codes = load_device_map('keyboard').keys
     assert codes is not None
     keyboard = UInput({ecodes.EV_KEY: sorted(codes.codes)}, name='crgame test keys')

@@ -16,7 +16,12 @@ import sys
 import threading
 import time
 
-from crgame_ros.driver.device_map import load_device_maps, parse_device_map
+from crgame_ros.driver.device_map import (
+    ForceLimits,
+    load_device_maps,
+    parse_device_map,
+    TorqueLimiter,
+)
 from crgame_ros.driver.evdev_device import open_evdev
 from crgame_ros.driver.force_feedback import (
     ForceFeedback,
@@ -26,7 +31,6 @@ from crgame_ros.driver.force_feedback import (
     STATE_TIMEOUT_S,
     SteeringTorque,
 )
-from crgame_ros.driver.force_limits import ForceLimits, TorqueLimiter
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from evdev import AbsInfo, ecodes, ff, UInput

@@ -38,7 +38,7 @@ def steps_until(keys: KeyState, start: DriverCommand, reached: DriverCommand,
 def test_ramp_times_are_the_papers(keys: KeyState, start: DriverCommand, reached: DriverCommand,
                                    seconds: float, dt_s: float) -> None:
     """Each ramp takes change / rate: r_th+ 1.8, r_br+ 2.5, r_p- 2.2, r_s+ 2.0, r_s- 3.5 1/s."""
-    # A deadband may end the last of the cycles early, rounding may begin another.
+    # A deadband may end the last cycle early; rounding may add another one.
     assert steps_until(keys, start, reached, dt_s) == pytest.approx(seconds / dt_s, abs=1.01)
 
 
@@ -60,7 +60,7 @@ def test_braking_takes_precedence() -> None:
 
 
 def test_both_steering_keys_hold_the_steering() -> None:
-    """b_L - b_R = 0 in the first case of CRG 19: no increment and no decay."""
+    """b_L - b_R = 0 is the first case of CRG 19: no increment and no decay."""
     keyboard = KeyboardFilter()
     keyboard.state = DriverCommand(steering=0.3)
     assert keyboard.advance(KeyState(left=True, right=True), DT_S).steering == 0.3
@@ -74,7 +74,7 @@ def test_release_does_not_overshoot_the_centre() -> None:
 
 
 def test_deadbands_act_on_the_command_and_not_on_the_state() -> None:
-    """Below 1e-3 and 1e-4 the command is 0, yet a filter of tiny steps still gets off 0."""
+    """Below 1e-3 and 1e-4 the command is 0, yet a filter with tiny steps still leaves 0."""
     keyboard = KeyboardFilter()
     held = KeyState(throttle=True, brake=False, left=True)
     first = keyboard.advance(held, 4e-5)  # 7.2e-5 of throttle, 8e-5 of steering
@@ -114,7 +114,7 @@ def test_random_keys_follow_the_printed_equations() -> None:
 
 
 def test_look_ahead_commits_nothing() -> None:
-    """Looking ahead gives what advance gives, any number of times, from the committed state."""
+    """look_ahead returns advance's result, any number of times, from the committed state."""
     keyboard = KeyboardFilter()
     keyboard.advance(KeyState(throttle=True), DT_S)
     ahead = [keyboard.preview(KeyState(throttle=True), DT_S) for _ in range(3)]
@@ -123,13 +123,13 @@ def test_look_ahead_commits_nothing() -> None:
 
 
 def test_reverse_is_passed_on_at_once() -> None:
-    """The gear is a request; the vehicle decides at standstill."""
+    """The gear is a request at once; the vehicle changes it at standstill."""
     command = KeyboardFilter().advance(KeyState(reverse=True), DT_S)
     assert command == (0.0, 0.0, 0.0, True, 0, False)
 
 
 def test_a_cycle_can_be_computed_again() -> None:
-    """A key that changes within cycle 1 replaces that cycle's command and leaves cycle 0's."""
+    """A key change within cycle 1 replaces that cycle's command and keeps cycle 0's."""
     cycles = KeyboardCycles()
     cycles.command(0, KeyState(throttle=True), DT_S)
     assert cycles.command(1, KeyState(throttle=True), DT_S).throttle == 2 * 1.8 * DT_S
@@ -138,7 +138,7 @@ def test_a_cycle_can_be_computed_again() -> None:
 
 
 def test_missed_cycles_pass_with_the_last_keys() -> None:
-    """From cycle 0 to cycle 20 the throttle gains 21 * 0.018, as if none had been missed."""
+    """From cycle 0 to cycle 20 the throttle gains 21 * 0.018, as without missed cycles."""
     cycles = KeyboardCycles()
     cycles.command(0, KeyState(throttle=True), DT_S)
     assert cycles.command(20, KeyState(throttle=True), DT_S).throttle == pytest.approx(21 * 0.018)
@@ -158,7 +158,7 @@ def test_going_back_is_refused() -> None:
     {'throttle_rate': -1.0}, {'brake_rate': math.nan}, {'steering_rate': math.inf},
     {'steering_cap': 0.0}, {'steering_cap': 1.01}])
 def test_wrong_parameters_are_refused(wrong: dict[str, float]) -> None:
-    """A rate that is no finite number of at least 0, or a cap outside (0, 1], names itself."""
+    """The message names a rate that is not finite and at least 0, or a cap outside (0, 1]."""
     with pytest.raises(InputError, match=next(iter(wrong))):
         KeyboardParameters(**wrong)
 

@@ -41,7 +41,7 @@ def test_a_closed_terminal_is_an_end_in_good_order(tmp_path: Path) -> None:
 
 
 @pytest.mark.exhaustive
-def test_a_pipe_that_nobody_reads_any_more_ends_it_without_a_traceback(tmp_path: Path) -> None:
+def test_a_closed_pipe_ends_it_without_a_traceback(tmp_path: Path) -> None:
     """`./run.sh | head`: the first line is read, then the pipe is closed."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'crgame_ros.launcher.main', str(CUT_IN), '--headless', '--out',

@@ -160,7 +160,7 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
 
 
 @pytest.mark.clock
-def test_a_flood_takes_nobodys_place(run: Run) -> None:
+def test_a_flood_takes_no_place(run: Run) -> None:
     """
     Under hundreds of foreign plans, agents and commands a second the real ones arrive.
 

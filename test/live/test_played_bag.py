@@ -194,7 +194,7 @@ def test_each_round_is_a_recording_of_its_own(played: Played) -> None:
         assert log.ks[0] - original.ks[0] <= 10.0 * offset_s + 1.0
         assert abs(int(log.ks[-1] - original.ks[-1])) <= 1
         for topic in ('/vehicles/state', '/timing/cycle'):
-            # On a busy machine some may be missing from before publisher and subscriber were matched.
+            # On a busy machine some from before publisher and subscriber met may be missing.
             assert counts[topic] >= (DURATION_S - offset_s) * 100 * 0.95
 
 

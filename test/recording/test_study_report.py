@@ -7,7 +7,7 @@ from pathlib import Path
 import re
 
 from crgame_ros.cli import main
-from crgame_ros.study.data.condition_means import within_halves
+from crgame_ros.study.data.condition_section import within_halves
 from crgame_ros.study.data.timing_quality import BOUNDS, timing_faults
 from crgame_ros.study.session_journal import JOURNAL, SessionJournal
 import numpy as np

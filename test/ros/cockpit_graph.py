@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The cockpit's live backend between pages and a graph whose messages the test chooses."""
+"""The cockpit's live backend between pages and a graph with messages of the test."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -30,7 +30,7 @@ SCRIPT = 'keys:cut_in.keys.yaml'
 
 
 class Graph:
-    """A backend with pages, and the peer that plays the simulation for it."""
+    """A backend with pages, and a peer in the role of the simulation."""
 
     def __init__(self, peer: Peer, hub: Hub, backend: LiveBackend, node: Any) -> None:
         self.peer = peer
@@ -46,7 +46,7 @@ class Graph:
         return client
 
     async def ask(self, client: Client, kind: str, **fields: Any) -> str:
-        """Let a page ask for something."""
+        """Send a request of a page."""
         return await self.backend.command(
             client, parse_message(json.dumps({'type': kind, 'id': 1, **fields})))
 
@@ -76,7 +76,7 @@ class Graph:
         await self.until(lambda: self.scene.get('time', {}).get('epoch') == epoch, 'the scene')
 
     async def seats(self, source: str, driver: str = SCRIPT, page: Client | None = None) -> None:
-        """Say who drives hv0; the person at a page if there is one."""
+        """Publish the driver of hv0, with the person at a page if there is one."""
         tenant = None if page is None else SeatOccupant(SeatPerson(page.person))
         await self.say('/seats', String(data=json.dumps({
             'hv0': seat_entry(source, driver, tenant),
@@ -115,7 +115,7 @@ class Graph:
         return [item.axes[0] for item in self.peer.messages['/<v>/driver_command']]
 
     async def until(self, condition: Callable[[], object], what: str) -> None:
-        """Let everybody work until a condition holds."""
+        """Run backend and peer until a condition holds."""
         loop = asyncio.get_running_loop()
         until_s = loop.time() + PATIENCE_S
         while not condition():
@@ -124,7 +124,7 @@ class Graph:
             await asyncio.sleep(0.005)
 
     async def pause(self, seconds: float) -> None:
-        """Let everybody work for a time."""
+        """Run backend and peer for a time."""
         until_s = asyncio.get_running_loop().time() + seconds
         while asyncio.get_running_loop().time() < until_s:
             self.peer.listen()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Let the tests of the graph use what the tests of the live part share."""
+"""Make the shared modules of the live tests available to the tests of the graph."""
 
 from pathlib import Path
 import sys

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A game whose AV perceives, and messages of what it perceives."""
+"""A game whose AV perceives, and messages with its perception."""
 
 from array import array
 from dataclasses import replace

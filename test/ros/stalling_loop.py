@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A loop as that of sim_node, in which something known takes long at known steps.
+A loop like that of sim_node, with known stalls at known steps.
 
-Prints JSON: what is told of the cycle after each of them, and what the deed itself measured.
+It prints JSON: the report of the cycle after each stall, and the stall's own measurement.
 """
 
 from collections.abc import Callable
@@ -85,7 +85,7 @@ def stop(_: Path) -> float:
 
 
 def share_processor(_: Path) -> float:
-    """Compute on a processor that others keep busy, who go before this process."""
+    """Compute on a processor that processes of higher priority keep busy."""
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(before)})
     hogs = [subprocess.Popen([sys.executable, '-c', HOG]) for _ in range(2)]
@@ -138,7 +138,7 @@ def main() -> None:
         late.update({step.n: step for step in single.worst})
     print(json.dumps({
         'tells_waiting': watch.tells_waiting, 'kept': len(kept),
-        # The deed in row n is why the next one, of cycle n + 2, is late.
+        # The stall in row n makes the next row, of cycle n + 2, late.
         'told': {name: late[n + 2].as_dict() for n, name in deeds.items() if n + 2 in late},
         'measured_ms': {name: 1e3 * time_s for name, time_s in measured.items()}}))
     rclpy.shutdown()

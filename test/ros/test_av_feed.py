@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What AVs perceive on its way to the pages that want it, and the map of permanent obstacles."""
+"""Perception of AVs for the pages that want it, and the map of permanent obstacles."""
 
 from array import array
 from dataclasses import replace
@@ -27,8 +27,8 @@ def _frame(graph: Graph, slot: str) -> list[float]:
     return np.frombuffer(graph.hub._frames[slot].data).tolist()
 
 
-def test_what_an_av_perceives_is_passed_on_to_who_wants_it(setup: Setup) -> None:
-    """Estimate, scans of each sensor where it was at their stamp, who is seen; nobody else's."""
+def test_what_an_av_perceives_is_passed_on_to_its_pages(setup: Setup) -> None:
+    """Pages get estimate, scans at the sensor's pose of their stamp, and seen ids of that AV."""
     async def check(graph: Graph) -> None:
         page, other = graph.page(), graph.page()
         page.perceives_as, page.wants_scans = 'av0', True
@@ -66,7 +66,7 @@ def test_what_an_av_perceives_is_passed_on_to_who_wants_it(setup: Setup) -> None
 
 
 def test_skipped_frames_are_those_of_perception_too(setup: Setup) -> None:
-    """While the simulation is late nobody gets scans; afterwards the newest."""
+    """While the simulation is late no page gets scans; afterwards each gets the newest."""
     async def check(graph: Graph) -> None:
         page = graph.page()
         page.perceives_as, page.wants_scans = 'av0', True

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the cockpit makes of messages good and bad, and of seats that change."""
+"""The cockpit's handling of good and bad messages, and of seats that change."""
 
 from array import array
 from dataclasses import replace
@@ -9,7 +9,7 @@ from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
 from crgame_ros.cockpit.client import Sound
-from crgame_ros.cockpit.seen_view import SeenView
+from crgame_ros.cockpit.page_messages import SeenView
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import events_document
 from crgame_ros.game.events import FiredEvent
@@ -37,7 +37,7 @@ def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
 
 
 def _trajectory(*points: int, names: tuple[str, ...] = ()) -> JointTrajectory:
-    """Make a trajectory whose points give so many positions, and nothing else."""
+    """Make a trajectory whose points have so many positions, and nothing else."""
     message = JointTrajectory(joint_names=list(names))
     message.header.stamp = to_time(OFFSET_NS)
     message.points = [JointTrajectoryPoint(positions=array('d', [float('nan')] * count))
@@ -81,7 +81,7 @@ MALFORMED = [
                          ids=[case[0].replace('/', '_') for case in MALFORMED])
 def test_no_message_stops_the_pump(setup: Setup, name: str, vehicle: str,
                                    messages: list[Any]) -> None:
-    """Whatever peers send: the next good state is shown, and a driver drives."""
+    """After any message of a peer the next good state is shown, and a driver drives."""
     async def check(graph: Graph) -> None:
         page = graph.page()
         page.wants_predictions = page.wants_scans = True
@@ -105,7 +105,7 @@ def test_no_message_stops_the_pump(setup: Setup, name: str, vehicle: str,
 
 
 def test_a_refused_claim_takes_nothing_away(setup: Setup) -> None:
-    """Who asks for a seat that somebody has keeps the one that is theirs."""
+    """A client that asks for a taken seat keeps its own."""
     async def check(graph: Graph) -> None:
         first, second = graph.page(), graph.page()
         await graph.begin(setup)
@@ -122,7 +122,7 @@ def test_a_refused_claim_takes_nothing_away(setup: Setup) -> None:
 
 
 def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
-    """Released is the last word: nothing of a held pedal is left for who comes next."""
+    """The last command is released: no held pedal is left for the next driver."""
     async def check(graph: Graph) -> None:
         page = graph.page()
         await graph.begin(setup)
@@ -142,7 +142,7 @@ def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
 
 
 def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
-    """At each change and once a second, with the time of the run; of nobody else."""
+    """It is published at each change and once a second, with the run's time, for seats only."""
     def told(graph: Graph, what: str = 'sound') -> list[tuple[int, dict[str, str]]]:
         return [(from_time(message.header.stamp), read_status(status).values)
                 for message in graph.peer.messages['/diagnostics'] for status in message.status
@@ -180,21 +180,21 @@ def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
 
 
 def test_an_order_is_repeated_until_it_is_answered(setup: Setup) -> None:
-    """While the simulation loads a game it hears nothing; a seat is not lost by that."""
+    """While the simulation loads a game it gets no order; no seat is lost by that."""
     async def check(graph: Graph) -> None:
         page = graph.page()
         await graph.begin(setup)
         await graph.seats('game')
         await graph.ask(page, 'claim', seat='hv0')
         await graph.until(lambda: graph.orders() == ['cockpit'] * 3, 'the order three times')
-        # What was said before the order arrived takes nothing away; what follows from it ends it.
+        # Messages from before the order arrived take nothing away; its result ends the repetition.
         await graph.seats('other')
         assert graph.seat()['holder'] == page.id
         await graph.seats('cockpit', page=page)
         await graph.pause(1.2)
         assert len(graph.orders()) <= 4
         assert graph.seat()['holder'] == page.id
-        # Now somebody outside takes the seat.
+        # Now an outside driver takes the seat.
         await graph.seats('other')
         await graph.until(lambda: graph.seat()['holder'] is None, 'the seat taken away')
     lived(check)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Statuses of every node: one form, one time base, and whose they are."""
+"""Statuses of every node: one form, one time base, and their owner."""
 
 import ast
 from collections.abc import Iterator
@@ -71,8 +71,8 @@ def test_a_node_has_one_publisher_of_them(node: Node) -> None:
     assert node.count_publishers('/exp1/diagnostics') == 1
 
 
-def test_nobody_makes_statuses_elsewhere(project_root: Path) -> None:
-    """One helper makes them all: elsewhere a status without time or owner would slip in."""
+def test_statuses_are_made_in_one_place(project_root: Path) -> None:
+    """One helper makes them all: other code might leave out time or owner."""
     made = []
     for file in (project_root / 'crgame_ros').rglob('*.py'):
         for call in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
@@ -83,7 +83,7 @@ def test_nobody_makes_statuses_elsewhere(project_root: Path) -> None:
 
 
 def test_the_page_passes_over_what_is_of_the_run_before() -> None:
-    """Whoever says it; who has not heard of any time yet is heard all the same."""
+    """This holds for every sender; a status of a sender without time yet is shown."""
     setup = build_setup(load_game(SCENARIOS / 'cut_in.yaml'))
 
     def recording(text: str, stamp_ns: int) -> DiagnosticArray:

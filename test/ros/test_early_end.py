@@ -21,6 +21,6 @@ def test_ctrl_c_during_imports_is_no_traceback(after_s: float) -> None:
     time.sleep(after_s)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60.0)
-    # Before Python itself is up, the system's own way of ending a process holds.
+    # Before Python has started, the system itself ends the process.
     assert process.returncode in (0, 1, 130, -signal.SIGINT)
     assert 'planner_node' not in errors and 'rclpy' not in errors

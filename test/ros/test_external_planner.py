@@ -31,7 +31,7 @@ MAX_LINES = 80
 ALLOWED_IMPORTS = {'rclpy', 'std_msgs', 'trajectory_msgs'}
 DURATION_S = 8.0
 TICKS = 80
-# The planning problem's speed [m/s]; nobody is in the way until the human's cut-in after 4 s.
+# The planning problem's speed [m/s]; the lane is free until the human's cut-in after 4 s.
 SPEED = 20.0
 CUT_IN_S = 4.0
 
@@ -66,7 +66,7 @@ def test_external_planner_gets_no_planner_node(tmp_path: Path) -> None:
 
 
 def test_options_of_an_external_planner_are_refused(tmp_path: Path) -> None:
-    """Nobody would hand them over, so that the game must not have any."""
+    """No process would pass them on, so that the game must not have any."""
     game = yaml.safe_load(CUT_IN.read_text())
     game['scenario'] = str(SCENARIOS / game['scenario'])
     game['humans'][0]['driver'] = 'idle'
@@ -101,7 +101,7 @@ def external_planner(domain: int, vehicle: str, end: signal.Signals) -> Iterator
 
 @pytest.fixture(scope='module')
 def cut_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Run the cut-in game with the example as planner, and give the run's folder."""
+    """Run the cut-in game with the example as planner, and return the run's folder."""
     out = tmp_path_factory.mktemp('external') / 'run'
     with Launcher([CUT_IN, '--planner', 'external', '--duration', DURATION_S], out) as launcher, \
             external_planner(launcher.domain, 'av0', signal.SIGINT):
@@ -156,16 +156,16 @@ def test_plans_answer_requests(cut_in: Path) -> None:
     # All but perhaps the last one; fewer than ticks on a busy machine.
     assert len(set(stamps['plan'])) >= len(set(stamps['request'])) - 1 > 0
     assert set(stamps['plan']) <= set(stamps['request'])
-    # However late recorder and planner have come to know each other.
+    # This holds however late recorder and planner are matched.
     assert min(stamps['plan']) == min(stamps['request'])
 
 
-def test_av_brakes_behind_the_human_who_cuts_in(cut_in: Path) -> None:
+def test_av_brakes_behind_the_cut_in(cut_in: Path) -> None:
     """
     The AV holds lane and speed while the road is free, and brakes once the human is in the way.
 
-    At the end the human drives at about 15 m/s, 25 m ahead. Whoever did not brake after the cut-in
-    would still drive at 20 m/s.
+    At the end the human drives at about 15 m/s, 25 m ahead. An AV that did not brake after the
+    cut-in would still drive at 20 m/s.
     """
     names, positions, velocities = _joints(cut_in / 'bag', '/vehicles/state')
     av, human = names.index('av0/x'), names.index('hv0/x')
@@ -182,7 +182,7 @@ def test_av_brakes_behind_the_human_who_cuts_in(cut_in: Path) -> None:
     assert np.diff(speed[-100:]).max() <= 0.0
     ahead = positions[:, human] - positions[:, av]
     in_lane = np.abs(positions[:, human + 1]) < 1.8
-    # Never nearer than a car's length and the model's 2 m at rest.
+    # The distance is never below a car's length and the model's 2 m at rest.
     assert ahead[in_lane].min() > 4.5 + 2.0
 
 

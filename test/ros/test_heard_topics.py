@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a run that waits for its start takes the recorder's word for."""
+"""Topics that the recorder has heard, for a run that waits for its start."""
 
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics, OFFSET, RECORDED
@@ -12,7 +12,7 @@ WANTED = {'/av0/plan', '/hv0/driver_command'}
 
 
 def test_only_this_runs_messages_count() -> None:
-    """Those of the run before, which the recorder may still speak of, do not."""
+    """Messages of the run before, which the recorder may still report, do not count."""
     domain = own_domain_id()
     with Peer(domain) as sim, Peer(domain) as recorder:
         heard = HeardTopics(Endpoints(sim.node), 5)

@@ -3,7 +3,7 @@
 """
 A running graph has exactly the endpoints of the contract.
 
-DDS tells type, reliability and durability of an endpoint to others, not its depth, so the depth is
+DDS announces type, reliability and durability of an endpoint, not its depth, so the depth is
 no part of this comparison.
 """
 
@@ -26,7 +26,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 import yaml
 
 TESTER = 'tester'
-# What every ROS node has of its own accord.
+# Endpoints that every ROS node has by default.
 OF_EVERY_NODE = {'/rosout', '/parameter_events'}
 SERVICES_OF_EVERY_NODE = {
     'describe_parameters', 'get_parameter_types', 'get_parameters', 'get_type_description',
@@ -34,13 +34,13 @@ SERVICES_OF_EVERY_NODE = {
 # Subscriptions that exist only while a game needs them: (topic, node).
 ONLY_WITH_A_JOY_NODE = ('/<hv>/joy', 'driver_node')
 ONLY_WITH_DRIVABILITY_STOP = ('/<v>/drivability', 'sim_node')
-# No test has a wheel; test_live_force.py looks at what one brings.
+# No test has a wheel; test_live_force.py tests the endpoints of one.
 ONLY_WITH_A_MOTOR = frozenset({('/<v>/odom', 'driver_node'), ('/<v>/drivability', 'driver_node')})
 ONLY_WITH_TASKS = ('/tasks/report', 'sim_node')
 OPTIONAL = frozenset({ONLY_WITH_A_JOY_NODE, ONLY_WITH_DRIVABILITY_STOP, ONLY_WITH_TASKS})
 ONLY_WITH_PERCEPTION = (('/<av>/plan_request', 'sim_node'), ('/<av>/localization', 'cockpit_node'),
                         ('/<av>/scan', 'cockpit_node'))
-# Processes that only a game with reactive traffic and a map has.
+# Processes that exist only in a game with reactive traffic and a map.
 ENGINES = ('traffic_node', 'map_node')
 PARAMETER_TYPES = {'bool': 1, 'integer': 2, 'double': 3, 'string': 4}
 
@@ -135,11 +135,11 @@ class Graph:
     executor: SingleThreadedExecutor
 
     def publishers(self) -> set[Endpoint]:
-        """Return every publisher but those that each node has."""
+        """Return all publishers but those that each node has."""
         return self._endpoints(self.node.get_publishers_info_by_topic)
 
     def subscriptions(self) -> set[Endpoint]:
-        """Return every subscription but those that each node has."""
+        """Return all subscriptions but those that each node has."""
         return self._endpoints(self.node.get_subscriptions_info_by_topic)
 
     def _endpoints(self, look_up: object) -> set[Endpoint]:
@@ -148,7 +148,7 @@ class Graph:
                 if name not in OF_EVERY_NODE for info in look_up(name) if info.node_name != TESTER}
 
     def services(self) -> set[tuple[str, str, str]]:
-        """Return every service but those that each node has: node, name, type."""
+        """Return all services but those that each node has: node, name, type."""
         return {(node, name, kind) for node in self.node.get_node_names() if node != TESTER
                 for name, kinds in self.node.get_service_names_and_types_by_node(node, '/')
                 if name.rpartition('/')[2] not in SERVICES_OF_EVERY_NODE for kind in kinds}
@@ -183,7 +183,7 @@ def graph(request: pytest.FixtureRequest,
         node = rclpy.create_node(TESTER, context=context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
-        # marker_node takes plans and requests only while somebody looks at what it draws.
+        # marker_node subscribes to plans and requests only while its markers have a subscriber.
         endpoints = Endpoints(node)
         markers = endpoints.polled('/markers')
         try:
@@ -196,7 +196,7 @@ def graph(request: pytest.FixtureRequest,
 
 
 def _settled(look: object, expected: set[tuple[str, ...]]) -> set[tuple[str, ...]]:
-    """Look until the expected is seen, or has not been for a while; give what is seen."""
+    """Poll until the expected is seen, or time is up; return what was seen last."""
     assert callable(look)
     until_s = time.monotonic() + 20.0
     while (seen := look()) != expected and time.monotonic() < until_s:

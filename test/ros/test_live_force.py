@@ -58,7 +58,7 @@ class Bend:
 
 
 def test_the_wheel_follows_the_vehicle_and_rests_with_it() -> None:
-    """The torque of the bend while it lasts, none 0.2 s after the last state, none at the end."""
+    """It has the torque of the bend while it lasts; none 0.2 s after the last state or the end."""
     domain, context = own_domain_id(), Context()
     rclpy.init(context=context, domain_id=domain)
     node = rclpy.create_node('driver_node', context=context)

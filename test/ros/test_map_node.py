@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the real map node publishes over DDS while a vehicle drives across a map."""
+"""Tiles that the real map node publishes over DDS while a vehicle drives across a map."""
 
 import json
 import os
@@ -47,7 +47,7 @@ def _states(*positions: tuple[float, float]) -> JointTrajectory:
 
 @pytest.mark.exhaustive
 def test_the_tiles_near_the_vehicles_come_when_they_change(tmp_path: Path) -> None:
-    """One grid until other tiles are needed, cell for cell as in the map; nothing without one."""
+    """One grid holds until other tiles are needed, cell for cell as in the map; none without one."""
     loaded = load_scenario(CUT_IN.parent / 'ZAM_CutIn-1_1_T-1.xml')
     path = write_map(Raster(loaded, RasterSpec()), tmp_path / 'map', 'cut-in').path
     occupancy = TiledOccupancy(path)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""marker_node in a running graph: what who looks sees, and what it spares who does not."""
+"""marker_node in a running graph: its markers, and its savings without a subscriber."""
 
 from collections.abc import Iterator
 import math
@@ -29,10 +29,10 @@ from std_msgs.msg import Bool, String
 from steady_game import write_steady_game
 from visualization_msgs.msg import Marker, MarkerArray
 
-# On a machine with nothing to spare what is said once may come before who hears it.
+# On a busy machine a message that is sent once may come before its subscriber.
 pytestmark = pytest.mark.clock
 
-# CommonRoad vehicle 2 (BMW 320i): the rear axle is so far behind the centre [m].
+# CommonRoad vehicle 2 (BMW 320i): distance of the rear axle behind the centre [m].
 REAR_TO_CENTER = 1.4227
 TOPICS = ('/clock', '/scenario/game', '/vehicles/state', ('/<av>/plan', 'av0'))
 # The cut-in map has no stop lines.
@@ -50,7 +50,7 @@ def _frames(messages: list[MarkerArray]) -> list[MarkerArray]:
 
 
 def _settle(viewer: Peer) -> None:
-    """Wait for the map, and for its second copy: the first may come before all have met."""
+    """Wait for the map and its second copy: the first may come before all are matched."""
     viewer.wait_until(lambda: _maps(viewer.messages['/markers']), 'the map')
     viewer.listen_for(1.5)
 
@@ -77,8 +77,8 @@ def _subscribers(peer: Peer, topic: str) -> set[str]:
     return {info.node_name for info in peer.node.get_subscriptions_info_by_topic(topic)}
 
 
-def test_who_looks_sees_the_map_then_what_moves(graph: tuple[Launcher, Peer]) -> None:
-    """Deletion and map first; boxes are at the states of their stamp, and go along with them."""
+def test_a_viewer_sees_the_map_then_what_moves(graph: tuple[Launcher, Peer]) -> None:
+    """Deletion and map come first; boxes are at the states of their stamp, and move with them."""
     launcher, peer = graph
     with Peer(launcher.domain, '/markers') as viewer:
         seen = viewer.messages['/markers']
@@ -86,7 +86,7 @@ def test_who_looks_sees_the_map_then_what_moves(graph: tuple[Launcher, Peer]) ->
         peer.listen()
         assert seen[0].markers[0].action == Marker.DELETEALL
         assert {item.ns for item in seen[0].markers[1:]} == MAP
-        # Twice more for who has just come, and then never again.
+        # Twice more for a subscriber that has just come, and then never again.
         assert len(_maps(seen)) <= 3
         assert all(item.action == Marker.ADD for message in seen[1:] for item in message.markers)
         frames = _frames(seen)
@@ -103,7 +103,7 @@ def test_who_looks_sees_the_map_then_what_moves(graph: tuple[Launcher, Peer]) ->
                 assert math.isclose(box.pose.position.y, y + REAR_TO_CENTER * math.sin(yaw),
                                     abs_tol=5e-5)
                 places.append((box.pose.position.x, box.pose.position.y))
-            # Both drive at more than 20 m/s.
+            # Both vehicles drive at more than 20 m/s.
             assert math.dist(places[0], places[-1]) > 20.0
         plans = [np.array(plan.points[0].positions[:2]) for plan in peer.messages['/<av>/plan']]
         line = _marker(frames[-1], 'plan', 0)
@@ -117,7 +117,7 @@ def test_who_looks_sees_the_map_then_what_moves(graph: tuple[Launcher, Peer]) ->
 
 
 def test_late_joiner_gets_the_map(graph: tuple[Launcher, Peer]) -> None:
-    """Who comes later, while another looks, gets it too; for the other nothing is deleted."""
+    """A second, later subscriber gets it too; for the first nothing is deleted."""
     launcher, _ = graph
     with Peer(launcher.domain, '/markers') as viewer:
         seen = viewer.messages['/markers']
@@ -130,7 +130,7 @@ def test_late_joiner_gets_the_map(graph: tuple[Launcher, Peer]) -> None:
                        for item in message.markers)
 
 
-def test_requests_and_plans_are_taken_only_while_somebody_looks(
+def test_requests_and_plans_are_taken_only_for_a_viewer(
         graph: tuple[Launcher, Peer]) -> None:
     """They are the large messages: marker_node leaves these topics when the last viewer does."""
     launcher, peer = graph
@@ -145,7 +145,7 @@ def test_requests_and_plans_are_taken_only_while_somebody_looks(
 
 
 def test_frame_skipping_suppresses_markers(graph: tuple[Launcher, Peer]) -> None:
-    """While ordered nothing comes, though the vehicles drive on; then it goes on."""
+    """While skipping is ordered no marker comes, though the vehicles drive on; then they do."""
     launcher, peer = graph
     with Peer(launcher.domain, '/markers') as viewer:
         seen = viewer.messages['/markers']
@@ -168,7 +168,7 @@ def test_frame_skipping_suppresses_markers(graph: tuple[Launcher, Peer]) -> None
 
 
 def test_a_reset_clears_the_scene(graph: tuple[Launcher, Peer]) -> None:
-    """A deletion and the map come again; from then on everything is of the new epoch."""
+    """A deletion and the map come again; from then on all markers are of the new epoch."""
     launcher, peer = graph
     with Peer(launcher.domain, '/markers') as viewer:
         seen = viewer.messages['/markers']
@@ -263,9 +263,9 @@ def stage(tmp_path: Path, ros_domain: int) -> Iterator[Stage]:
     found.close()
 
 
-def test_nothing_is_computed_while_nobody_looks(
+def test_nothing_is_computed_without_a_viewer(
         stage: Stage, ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither is a document read nor a marker made, until somebody subscribes."""
+    """No document is read and no marker is made before the first subscriber."""
     made: list[str] = []
 
     class Counted(marker_node.SceneMarkers):
@@ -293,7 +293,7 @@ def test_nothing_is_computed_while_nobody_looks(
 
             viewer.wait_until(drawn, 'markers')
         assert made[:2] == ['scene', 'message']
-        # At 20 Hz it has noticed within a second that nobody looks any more.
+        # At 20 Hz it has noticed within a second that no subscriber is left.
         peer.listen_for(1.0)
         count = len(made)
         for _ in range(20):
@@ -303,7 +303,7 @@ def test_nothing_is_computed_while_nobody_looks(
 
 
 def test_documents_that_do_not_fit_are_waited_for(stage: Stage, ros_domain: int) -> None:
-    """A game of another scenario's text draws nothing; malformed text is said, then mended."""
+    """A game with another scenario's text draws nothing; malformed text is reported, then fixed."""
     with Peer(ros_domain, '/markers', '/scenario/game') as viewer:
         seen = viewer.messages['/markers']
         stage.tell(epoch=0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The markers of real games: where they are, how large, in which colour, and when they go."""
+"""The markers of real games: their place, size and colour, and when they are deleted."""
 
 from collections.abc import Sequence
 import math
@@ -30,7 +30,7 @@ from visualization_msgs.msg import Marker
 
 OFFSET_NS = 5_000_000_000
 TICK_NS = 100_000_000
-# CommonRoad vehicle 2 (BMW 320i): length, width, and the rear axle's way to the centre [m].
+# CommonRoad vehicle 2 (BMW 320i): length, width, distance from rear axle to centre [m].
 LENGTH, WIDTH, REAR_TO_CENTER = 4.508, 1.610, 1.4227
 LIGHT = """
 <trafficLight id="900">
@@ -122,7 +122,7 @@ def test_solid_lines_follow_the_bounds() -> None:
                 pairs = np.concatenate((places[:-1], places[1:]), axis=1)
                 assert {tuple(row) for row in pairs.tolist()} <= drawn
                 solid += len(pairs)
-    # What is left are dashes.
+    # The others are dashes.
     assert 0 < solid < len(segments)
 
 
@@ -155,7 +155,7 @@ def test_stop_lines_are_where_the_scenario_has_them() -> None:
 
 
 def test_goals_are_drawn_for_the_avs(setup: Setup) -> None:
-    """The outline of the AV's goal has the area of the goal's lanelets; nobody else's is drawn."""
+    """The outline of the AV's goal has the area of the goal's lanelets; no other is drawn."""
     assert 'goals' not in {marker.ns for marker in map_markers(setup.loaded)}
     problem = setup.avs[0].planning_problem
     (marker,) = [item for item in map_markers(setup.loaded, [problem.planning_problem_id])
@@ -263,7 +263,7 @@ def test_traffic_brakes_move_on_and_vanish() -> None:
     states = np.array([vehicle.state for vehicle in setup.vehicles])
     scene.set_objects(ObjectStates(poses, velocities), OFFSET_NS)
     for since_ns, x in ((50_000_000, 0.5), (3 * TICK_NS, 1.0)):
-        # A step later, and no further: nobody knows what comes then.
+        # A step later, and no further: later motion is unknown.
         scene.set_vehicles(states, OFFSET_NS + since_ns)
         markers = _by_key(scene.message().markers)
         assert markers['objects', number].pose.position.x == pytest.approx(x, abs=1e-12)
@@ -278,14 +278,14 @@ def test_traffic_brakes_move_on_and_vanish() -> None:
     deleted = [marker for marker in scene.message().markers if marker.action == Marker.DELETE]
     assert {(marker.ns, marker.id) for marker in deleted} == {
         (namespace, number) for namespace in ('objects', 'heading', 'brake_lights', 'labels')}
-    # Said once: nothing of it is in later messages, until it is there again.
+    # The deletion is sent once: later messages have nothing of the object until it is back.
     assert not {marker.id for marker in scene.message().markers} & {number}
     scene.set_objects(ObjectStates(poses, velocities), OFFSET_NS + 3 * TICK_NS)
     assert _by_key(scene.message().markers)['objects', number].action == Marker.ADD
 
 
 def test_lights_have_the_colour_of_their_state() -> None:
-    """A light stands at its place and shows red, yellow, green; grey if nobody speaks of it."""
+    """A light stands at its place and shows red, yellow, green; grey if its state is unknown."""
     text = (SCENARIOS / 'ZAM_Intersection-1_1_T-1.xml').read_text()
     first = text.index('</lanelet>')
     text = f'{text[:first]}<trafficLightRef ref="900"/>{text[first:]}'
@@ -329,7 +329,7 @@ def test_plan_is_drawn_until_it_is_used_up(scene: SceneMarkers, setup: Setup) ->
 
 def test_prediction_is_drawn_in_map() -> None:
     """
-    Whoever moves has a line of segments of 0.5 s; everybody is mapped back.
+    Each moving object has a line of segments of 0.5 s; all lines are mapped back.
 
     The planner's coordinates are turned by 90 degrees here.
     """
@@ -350,7 +350,7 @@ def test_prediction_is_drawn_in_map() -> None:
     paths.set_prediction(_series(names, positions))
     assert not paths.perceived.present
     segments = _points(paths.prediction.markers[0]).reshape(-1, 2, 2)
-    # Six segments of 0.5 s for each of the two that move; the AV itself is nobody's prediction.
+    # Six segments of 0.5 s for each of the two that move; the AV itself is not predicted.
     assert len(segments) == 12
     cars = segments[(segments[:, :, 0] > 0.01).any(axis=1)]
     assert np.allclose(np.sort(cars[:, 1, 0]), [5.0, 10.0, 15.0, 20.0, 25.0, 30.0])
@@ -366,7 +366,7 @@ def test_what_an_av_knows_of_is_outlined_where_it_takes_it_to_be() -> None:
     """
     Outlines by shapely at the poses of the first point, mapped back; the unseen has none.
 
-    Driven vehicles are placed by their rear axle, and the AV itself is nothing that it perceives.
+    Driven vehicles are placed by their rear axle, and the AV does not perceive itself.
     """
     transform = RigidTransform(0.5 * math.pi, 100.0, 0.0)
     poses = {'av0': (0.0, 0.0, 0.0), 'hv0': (30.0, -4.0, 0.4), 'o1': (7.0, 7.0, -2.0),

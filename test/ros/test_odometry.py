@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a driven vehicle says of itself to ROS tools."""
+"""The odometry of a driven vehicle for ROS tools."""
 
 import math
 import time

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node whose parent is gone ends, whatever it hangs in."""
+"""A node whose parent is gone ends, in whatever call it hangs."""
 
 from pathlib import Path
 import subprocess
@@ -28,7 +28,7 @@ time.sleep(600.0)
 
 
 @pytest.mark.exhaustive
-def test_who_hangs_ends_some_time_after_its_parent() -> None:
+def test_a_hanging_node_ends_some_time_after_its_parent() -> None:
     done = subprocess.run([sys.executable, '-c', SCRIPT], capture_output=True, text=True)
     child = Path('/proc') / done.stdout.strip()
     assert done.returncode == 0, done.stderr

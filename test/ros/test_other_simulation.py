@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A simulation of which no lock tells: it is noticed by what it says."""
+"""A simulation without a lock here is noticed by its messages."""
 
 import threading
 import time
@@ -16,8 +16,8 @@ from ros_domains import own_domain_id
 from rosgraph_msgs.msg import Clock
 
 
-def test_who_speaks_as_a_simulation_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock alone is that of somebody who was killed a moment ago, or of a bag."""
+def test_another_simulation_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock alone does not count: it may be that of a killed simulation, or of a bag."""
     domain = own_domain_id()
     with Peer(domain) as here, Peer(domain) as there:
         refuse_another(here.node, time.monotonic())

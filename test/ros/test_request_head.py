@@ -36,7 +36,7 @@ def test_head_is_that_of_the_message(objects: int, av: str) -> None:
 
 
 def test_accelerations_may_be_left_out() -> None:
-    """As in every request from outside."""
+    """Requests from outside have none."""
     message = to_joint_trajectory(request(3))
     for point in message.points:
         point.accelerations = []
@@ -51,6 +51,6 @@ def test_accelerations_may_be_left_out() -> None:
     serialize_message(JointTrajectory(joint_names=['a', 'b', 'c', 'd']))],
     ids=['empty', 'header', 'big endian', 'noise', 'text', 'nothing', 'cut', 'no points'])
 def test_anything_else_is_refused(data: bytes) -> None:
-    """In one line, never by an exception of another kind."""
+    """It is refused in one line, never by an exception of another kind."""
     with pytest.raises(InputError, match='/av0/plan_request: cannot be read'):
         request_head(data, '/av0/plan_request')

@@ -165,7 +165,7 @@ def test_state_message_is_refilled_in_place() -> None:
 
 
 def test_stated_frame_may_be_left_out() -> None:
-    """An empty frame means map; so do accelerations that nobody gives mean unknown."""
+    """An empty frame means map; accelerations that are left out mean unknown."""
     series = _series(points=2)
     message = to_joint_trajectory(series)
     message.header.frame_id = ''
@@ -245,7 +245,7 @@ def test_message_that_is_no_plan_is_refused(names: tuple[str, ...], times_ns: Se
     DriverCommand(), DriverCommand(1.0, 0.0, -1.0, True, 5), DriverCommand(0.1, 0.7, 1.0 / 3.0),
     DriverCommand(lights=2), DriverCommand(put_back=True)])
 def test_command_is_rounded_once(command: DriverCommand) -> None:
-    """A Joy holds float32, to which every command is rounded: what comes is what was meant."""
+    """A Joy holds float32; commands are rounded to it beforehand, so that they arrive exactly."""
     message = _sent(to_joy(command, 1_230_000_000, 'cockpit'))
     assert message.header.frame_id == 'cockpit'
     assert from_time(message.header.stamp) == 1_230_000_000
@@ -263,14 +263,14 @@ def test_command_of_a_stranger_is_clipped() -> None:
     """Values out of range are clipped, no numbers count as released, further axes are ignored."""
     message = Joy(axes=[3.0, -1.0, -math.inf, 9.0], buttons=[5, 1, 0, 7, 0, 9])
     assert from_joy(_sent(message), 'joy') == DriverCommand(1.0, 0.0, -1.0, True, 5)
-    # As recordings of earlier versions have it: one button.
+    # Recordings of earlier versions have one button.
     message = Joy(axes=[math.nan, 0.5, math.nan], buttons=[0])
     assert from_joy(_sent(message), 'joy') == DriverCommand(0.0, 0.5, 0.0, False, 0)
 
 
 @pytest.mark.parametrize(('axes', 'buttons'), [(0, 1), (2, 1), (3, 0), (0, 0)])
 def test_incomplete_command_is_refused(axes: int, buttons: int) -> None:
-    """Three axes and a button are needed; the message says how many came and from where."""
+    """Three axes and a button are needed; the error has their numbers and the source."""
     message = _sent(Joy(axes=[0.0] * axes, buttons=[0] * buttons))
     with pytest.raises(InputError, match=f'^/hv0/driver_command: has {axes} axes and {buttons} '):
         from_joy(message, '/hv0/driver_command')

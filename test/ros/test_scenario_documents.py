@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Documents are given once they belong together, in whatever order they come."""
+"""Documents are returned once they belong together, in whatever order they come."""
 
 from dataclasses import replace
 from itertools import permutations
@@ -36,7 +36,7 @@ def two_avs() -> dict[str, str]:
 
 @pytest.mark.parametrize('order', permutations(KINDS), ids='-'.join)
 def test_a_set_is_given_once(order: tuple[str, ...], cut_in: dict[str, str]) -> None:
-    """With the third document, and not again when the same text comes again."""
+    """It comes with the third document, and not again when the same text comes again."""
     collector = DocumentCollector()
     for kind in order:
         assert collector.complete() is None
@@ -84,7 +84,7 @@ def test_a_reset_does_not_read_the_same_scenario_again(cut_in: dict[str, str]) -
 
 
 def test_what_cannot_be_read_is_said(cut_in: dict[str, str]) -> None:
-    """The error names the topic, and what was there before stays: it is given with what is new."""
+    """The error names the topic; the old documents stay and are returned with the new ones."""
     collector = DocumentCollector()
     for kind, text in cut_in.items():
         collector.add(kind, text)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who drove from which step to which."""
+"""The drivers of a seat, with first and last step."""
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import DrivingSpell, parse_spells, SeatPerson
@@ -11,15 +11,15 @@ ADA, BOB = SeatPerson('p1', 'Ada', 'Keyboard'), SeatPerson('p2', 'Bob', 'G29')
 
 
 def driven(person: SeatPerson | None) -> tuple[str, str, str, SeatPerson | None]:
-    """Return a seat of a cockpit with somebody in it."""
+    """Return a seat of a cockpit with a driver."""
     return 'hv0', 'cockpit', 'cockpit', person
 
 
 def test_each_stretch_has_its_steps() -> None:
-    """Two people one after the other, an AV taken over in between; the last one goes on."""
+    """Two drivers in turn, with an AV taken over in between; the last stretch is open."""
     spells = SeatSpells(3)
     spells.note(0, [driven(None)])
-    # Before the first step was done: nobody drove a stretch of no steps.
+    # Before the first step: a stretch without steps has no driver.
     spells.note(0, [driven(ADA)])
     spells.note(40, [driven(ADA), ('av0', 'cockpit', 'idm', BOB)])
     spells.note(70, [driven(ADA)])

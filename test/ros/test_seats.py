@@ -32,7 +32,7 @@ FULL = DriverCommand(throttle=1.0)
 
 
 class Table(NamedTuple):
-    """The seats, and a stranger who commands and orders."""
+    """The seats, and a stranger that commands and orders."""
 
     seats: Seats
     sources: dict[str, str]
@@ -57,7 +57,7 @@ class Table(NamedTuple):
         wait_until(lambda: self.seats.apply_orders(now_ns)[0], f'the order {source}')
 
     def drive(self, first_ms: int, last_ms: int) -> DriverCommand | None:
-        """Drive hv0 at 20 m/s, one cycle each 10 ms of the steady clock; give the last command."""
+        """Drive hv0 at 20 m/s, one cycle each 10 ms of the steady clock; return the last command."""
         command = None
         for now_ms in range(first_ms, last_ms, 10):
             command = self.human.command(now_ms * MS, 0.01, 20.0)
@@ -66,7 +66,7 @@ class Table(NamedTuple):
 
 @pytest.fixture
 def table() -> Iterator[Table]:
-    """Seats of the cut-in game and a peer, who have met."""
+    """Return seats of the cut-in game and a peer, after they are matched."""
     domain, context = own_domain_id(), Context()
     rclpy.init(context=context, domain_id=domain)
     node = rclpy.create_node('seats', context=context)
@@ -80,7 +80,7 @@ def table() -> Iterator[Table]:
 
 
 def _heard(table: Table, command: DriverCommand, source: str = GAME) -> None:
-    """Let the seat hear a command at 0 ms of the steady clock."""
+    """Send the seat a command at 0 ms of the steady clock."""
     def obeyed() -> bool:
         table.say(command, source)
         return table.human.command(0, 0.01, 20.0) == command
@@ -110,8 +110,8 @@ def test_a_pause_gives_a_lost_driver_no_pedals_back(table: Table) -> None:
     assert table.human.losses == 1
 
 
-def test_who_takes_the_seat_of_a_lost_driver_gets_it_released(table: Table) -> None:
-    """The claim of the seat is no word of the driver who died with the pedal down."""
+def test_the_seat_of_a_lost_driver_is_taken_released(table: Table) -> None:
+    """Pedals stay released: a claim is no command of the driver that died with the pedal down."""
     _heard(table, FULL)
     table.drive(10, 1_500)
     table.order('cockpit', 1_500 * MS)
@@ -124,7 +124,7 @@ def test_who_takes_the_seat_of_a_lost_driver_gets_it_released(table: Table) -> N
 
 
 def test_a_change_of_hands_keeps_the_command_until_the_new_one_speaks(table: Table) -> None:
-    """No dip of the pedals, but no longer than the watchdog waits for anybody."""
+    """The pedals do not dip, but for no longer than the watchdog waits for any driver."""
     _heard(table, FULL)
     table.order('cockpit')
     assert table.drive(0, 200) == FULL
@@ -177,7 +177,7 @@ def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
 
 
 def test_what_makes_no_command_is_counted(table: Table) -> None:
-    """Of a run before, of nobody's source, without axes, or not finite: nothing of it drives."""
+    """A command of an earlier run or no source, without axes or not finite does not drive."""
     _heard(table, RELEASED)
     old, empty, stranger = (to_joy(FULL, stamp_ns, source) for stamp_ns, source in (
         (OFFSET_NS - 1, GAME), (OFFSET_NS, GAME), (OFFSET_NS, 'stranger')))
@@ -195,10 +195,10 @@ def test_what_makes_no_command_is_counted(table: Table) -> None:
 
 def test_a_recording_drives_by_the_step(table: Table) -> None:
     """
-    Row n in cycle n, however late it is; who takes the seat has it, and gives it back to row n.
+    Row n counts in cycle n, however late it is; a taken seat is given back to row n.
 
-    After the last row nobody is there: the pedals go up and the brake holds. An AV is driven
-    where somebody had taken it over, and follows its plan elsewhere.
+    After the last row the seat is empty: the pedals go up and the brake holds. An AV is driven
+    in the rows in which it was taken over, and follows its plan elsewhere.
     """
     setup = build_setup(load_game(CUT_IN))
     rows = np.array([[0.01 * n, 0.0, 0.0, 0.0] for n in range(100)])
@@ -236,7 +236,7 @@ def test_a_recording_drives_by_the_step(table: Table) -> None:
 
 
 def _demand(table: Table, **fields: object) -> tuple[bool, list[str]]:
-    """Send an order about hv0 and give what came of it: whether anything changed, refusals."""
+    """Send an order about hv0 and return whether anything changed, and the refusals."""
     table.orders.publish(String(data=json.dumps({'seat': 'hv0', **fields})))
     told: list[tuple[bool, list[str]]] = []
 
@@ -248,7 +248,7 @@ def _demand(table: Table, **fields: object) -> tuple[bool, list[str]]:
 
 
 def test_of_two_cockpits_the_first_gets_the_seat(table: Table) -> None:
-    """Who names the person that they displace gets it; who thinks it free comes too late."""
+    """A claim that names the displaced person gets it; one that assumes a free seat does not."""
     ada, bob = {'id': 'p1', 'name': 'Ada'}, {'id': 'p2', 'name': 'Bob'}
     assert _demand(table, source='cockpit', person=ada) == (True, [])
     assert _demand(table, source='cockpit', person=bob)[1] == [
@@ -262,7 +262,7 @@ def test_of_two_cockpits_the_first_gets_the_seat(table: Table) -> None:
     assert _demand(table, source='cockpit', person=bob, displaced='p1') == (True, [])
     assert [item[:2] + (item[3],) for item in table.seats.driven()] == [
         ('hv0', 'cockpit', table.human.tenant.person)]  # type: ignore[union-attr]
-    # What is said of somebody else, by whomever, changes nothing.
+    # A message about another person changes nothing, whatever its sender.
     table.orders.publish(String(data=json.dumps({'seat': 'hv0', 'left': 'p1'})))
     assert _demand(table, source='game') == (True, [])
     assert 'person' not in json.loads(table.seats.document())['hv0']
@@ -272,7 +272,7 @@ def test_of_two_cockpits_the_first_gets_the_seat(table: Table) -> None:
     {'name': 'x'}, {'id': ''}, {'id': 7}, {'id': 'p1', 'name': 'x' * 81},
     {'id': 'p1', 'device': 'a\nb'}, {'id': 'p1', 'role': None}, [], 'p1'])
 def test_people_that_cannot_be_shown_are_refused(table: Table, person: object) -> None:
-    """Any peer may order: what it says goes into pages and recordings."""
+    """Any peer may order, and the text of its order goes into pages and recordings."""
     changed, refusals = _demand(table, source='cockpit', person=person)
     assert not changed and len(refusals) == 1 and refusals[0].startswith('/seats/order: ')
     assert table.human.source == GAME

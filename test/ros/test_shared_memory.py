@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Half-made ports in shared memory: removed when nobody finishes them, left alone otherwise."""
+"""Half-made ports in shared memory: removed if no process finishes them, kept otherwise."""
 
 from contextlib import suppress
 import fcntl
@@ -30,7 +30,7 @@ def _age(path: Path, seconds: float) -> None:
 
 
 def test_old_half_made_ports_go_and_all_else_stays(tmp_path: Path) -> None:
-    """Only ports, only those that are not initialised, only after the patience."""
+    """Only ports that are not initialised go, and only after a waiting time."""
     for name, content in (('fastrtps_port7001', MADE), ('fastrtps_port7002', UNMADE),
                           ('fastrtps_port7003', b''), ('fastrtps_port7002_el', b''),
                           ('sem.fastrtps_port7002_mutex', UNMADE), ('fastrtps_0123', UNMADE),
@@ -64,7 +64,7 @@ def _left(folder: Path, *names: str) -> None:
 
 
 def test_what_dead_processes_left_goes_and_what_is_used_stays(tmp_path: Path) -> None:
-    """Unlocked and unmapped alone; the young, the locked, the mapped and the strange stay."""
+    """Only unlocked and unmapped files go; young, locked, mapped and foreign ones stay."""
     gone, locked, mapped, young = (f'fastrtps_{digit * 16}' for digit in '0123')
     _left(tmp_path, gone, f'{gone}_el', locked, f'{locked}_el', mapped, f'{mapped}_el',
           'fastrtps_port7001', 'fastrtps_port7001_el', 'sem.fastrtps_port7001_mutex',
@@ -83,7 +83,7 @@ def test_what_dead_processes_left_goes_and_what_is_used_stays(tmp_path: Path) ->
 
 
 def test_ports_of_the_dead_go_when_asked_for(tmp_path: Path) -> None:
-    """With their locks and mutexes; one that is mapped stays, and so does one that is held."""
+    """Their locks and mutexes go, too; a port that is mapped or locked stays."""
     gone, locked, mapped = (f'fastrtps_port{number}' for number in (7410, 7411, 7412))
     _left(tmp_path, gone, f'{gone}_el', f'sem.{gone}_mutex', locked, f'{locked}_sl',
           f'sem.{locked}_mutex', mapped, f'sem.{mapped}_mutex', 'sem.strange')
@@ -99,7 +99,7 @@ def test_ports_of_the_dead_go_when_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_living_participant_keeps_its_memory_and_a_killed_one_does_not() -> None:
-    """Real Fast DDS: its own files are there while it lives, whoever cleans, and go after it."""
+    """With real Fast DDS a participant's files survive all cleaning while it lives, then go."""
     code = ('import rclpy, time; rclpy.init(); node = rclpy.create_node("held"); '
             'print("up", flush=True); time.sleep(100)')
     process = subprocess.Popen(
@@ -119,8 +119,8 @@ def test_a_living_participant_keeps_its_memory_and_a_killed_one_does_not() -> No
         process.wait()
         process.stdout.close()
     for name in own:
-        # What was written last made it young again: the time of a mapped file is that of the first
-        # touch of each of its pages. Whoever else cleans may have been here already.
+        # The last write made it young again: the time of a mapped file is that of the first
+        # touch of each of its pages. Another process may have cleaned already.
         with suppress(FileNotFoundError):
             _age(SHARED_MEMORY / name, 2.0 * YOUNG_S)
     remove_stale()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Real stalls of a loop as that of sim_node are told by their causes."""
+"""Real stalls of a loop like that of sim_node are reported with their causes."""
 
 import json
 import os
@@ -20,7 +20,7 @@ STEP_MS = 10.0
 
 @pytest.fixture(scope='module')
 def stalls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Run the loop in a process of its own, and read what it tells."""
+    """Run the loop in a process of its own, and read its report."""
     done = subprocess.run(
         [sys.executable, LOOP, tmp_path_factory.mktemp('stalls')], check=True,
         capture_output=True, text=True, env=os.environ | {'ROS_DOMAIN_ID': str(own_domain_id())})
@@ -34,17 +34,17 @@ def stalls(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 @pytest.mark.parametrize('cause', ['gc', 'work', 'page_faults', 'blocked', 'stopped', 'processor'])
 def test_a_stall_is_told_by_its_cause(stalls: dict[str, Any], cause: str) -> None:
     """
-    As long as the deed itself measured, less what the step had time for.
+    A stall has its own measured length, less the time that the step had left.
 
-    Of page faults the time is an estimate, of their number. What a busy machine adds, such as
-    waiting for the processor, is told beside it.
+    The time of page faults is an estimate from their number. Additional delays of a busy machine,
+    such as waiting for the processor, are reported beside it.
     """
     told, measured_ms = stalls['told'][cause], stalls['measured_ms'][cause]
     causes_ms = told['causes_ms']
     assert measured_ms > 2.0 * STEP_MS
     least = 0.4 if cause == 'page_faults' else 0.9
     assert causes_ms[cause] > least * measured_ms - STEP_MS
-    # Of others the deed measures a part: processes that it starts are waited for as well.
+    # Other stalls measure only a part: they also wait for the processes that they start.
     assert causes_ms[cause] < 1.1 * measured_ms + STEP_MS or cause in ('blocked', 'processor')
     assert told['during'] == 'step'
     assert sum(causes_ms.values()) == pytest.approx(told['late_ms'])
@@ -55,7 +55,7 @@ def test_a_stall_is_told_by_its_cause(stalls: dict[str, Any], cause: str) -> Non
 
 
 def test_stolen_time_is_what_one_processor_certainly_lost() -> None:
-    """In ticks as proc(5) has them: the greatest of all processors, less one; cut lines do not."""
+    """It is the greatest of all processors in ticks of proc(5), less one; cut lines are skipped."""
     before = (b'cpu  9 9 9 9 9 9 9 50 0 0\ncpu0 1 1 1 1 1 1 1 20 0 0\n'
               b'cpu1 1 1 1 1 1 1 1 30 0 0\nintr 7\n')
     after = before.replace(b' 20 ', b' 21 ').replace(b' 30 ', b' 37 ')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the time-sync supervisor orders, said by the real node over DDS."""
+"""Orders of the time-sync supervisor, published by the real node over DDS."""
 
 import os
 import subprocess

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The configurations for RViz and Foxglove name what the contract has."""
+"""The configurations for RViz and Foxglove name topics of the contract."""
 
 from collections.abc import Iterator
 import json
@@ -57,8 +57,8 @@ def test_rviz_shows_the_scene_from_above(rviz: dict[str, Any],
             continue
         topic = display['Topic']['Value']
         assert contract[topic].type_name == DISPLAYED[kind]
-        # A best-effort publisher would give nothing to who asks for reliable, or the reverse; and
-        # what is latched comes to a late viewer only if it asks for it.
+        # A best-effort publisher would send nothing to a reliable subscriber, or the reverse; and
+        # a latched message comes to a late viewer only if it asks for it.
         qos = contract[topic].qos
         assert display['Topic']['Reliability Policy'] == qos.reliability.title() == 'Reliable'
         assert display['Topic']['Durability Policy'] == qos.durability.replace('_', ' ').title()

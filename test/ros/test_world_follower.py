@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of the world are put together in order, whatever half of one is lost or late."""
+"""Steps of the world are put together in order, also if half of one is lost or late."""
 
 from collections.abc import Callable, Iterator
 import time
@@ -65,25 +65,25 @@ class Stage:
             time.sleep(0.01)
 
     def state(self, k: int) -> None:
-        """Say where the vehicles are at tick k."""
+        """Publish the vehicles' places at tick k."""
         n = k * self._scheduler.steps_per_tick
         self._states.publish(self._state.stamp(self._scheduler.stamp_ns(n)))
 
     def objects(self, k: int) -> None:
-        """Say where the objects are at tick k: all at x = k."""
+        """Publish the objects' places at tick k: all at x = k."""
         n = k * self._scheduler.steps_per_tick
         self._object.positions[:] = k
         self._objects.publish(self._object.stamp(self._scheduler.stamp_ns(n)))
 
     def follow(self, count: int) -> list[tuple[int, float]]:
-        """Wait for so many steps in all, and give tick and objects of each."""
+        """Wait for so many steps in all, and return tick and objects of each."""
         self._wait(lambda: len(self.take()) >= count)
         time.sleep(0.1)
         return [(step.n // self._scheduler.steps_per_tick, float(step.objects.poses[0, 0]))
                 for step in self.take()]
 
     def take(self) -> list[WorldStep]:
-        """Take what is complete."""
+        """Receive the complete steps."""
         self.steps += self._follower.steps()
         return self.steps
 
@@ -111,7 +111,7 @@ def test_states_wait_for_the_objects_of_their_tick(stage: Stage) -> None:
 
 
 def test_a_tick_whose_objects_are_lost_holds_up_nothing(stage: Stage) -> None:
-    """As at the start: the reader of objects may be known to the writer later than the other."""
+    """This happens at the start: the subscriber of objects may be matched later than the other."""
     stage.state(0)
     stage.state(1)
     stage.objects(1)

@@ -26,7 +26,7 @@ BESIDE = HumanSpec('hv0', 'idle', spawn=PoseSpawn(-20.0, 3.75, 0.0, 15.0))
 
 
 def game_of(loaded: LoadedScenario, humans: Sequence[HumanSpec] = (), **fields: Any) -> Game:
-    """Make a game; without `avs` every planning problem becomes one."""
+    """Make a game; without `avs` every planning problem becomes an AV."""
     timing = {name: fields.pop(name) for name in ('rate', 'realign', 'sample') if name in fields}
     return Game(Path(loaded.source), humans=tuple(humans), timing=TimingSpec(**timing), **fields)
 
@@ -38,7 +38,7 @@ def setup_of(loaded: LoadedScenario, humans: Sequence[HumanSpec] = (), **fields:
 
 def moved(loaded: LoadedScenario, speed: float, shift: tuple[float, float] = (0.0, 0.0),
           turn: float = 0.0) -> LoadedScenario:
-    """Return the first planning problem another initial speed and pose."""
+    """Change the initial speed and pose of the first planning problem."""
     problems = list(copy.deepcopy(loaded.planning_problems))
     state = problems[0].initial_state
     state.velocity, state.orientation = speed, state.orientation + turn

@@ -27,7 +27,7 @@ def run(cut_in: LoadedScenario) -> HandDriven:
 
 
 def test_busy_planner_is_not_asked_again_before_a_second(run: HandDriven) -> None:
-    """Silent: asked at 0, skipped at nine ticks, asked again after 1 s, and so on."""
+    """A silent planner is asked at 0, skipped at nine ticks, asked again after 1 s, and so on."""
     counters = run.simulation.avs[0].counters
     asked = [0]
     for n in range(1, 301):
@@ -39,7 +39,7 @@ def test_busy_planner_is_not_asked_again_before_a_second(run: HandDriven) -> Non
 
 
 def test_answer_clears_the_busy_flag(run: HandDriven) -> None:
-    """Only the answer to the request that is out does."""
+    """Only the answer to the outstanding request does."""
     av = run.simulation.avs[0]
     request = run.result.requests['av0']
     assert av.busy
@@ -52,7 +52,7 @@ def test_answer_clears_the_busy_flag(run: HandDriven) -> None:
 
 
 def test_overdue_answer_leaves_the_planner_busy(run: HandDriven) -> None:
-    """It belongs to the request before the one that is out; the plan itself is welcome."""
+    """It answers the request before the outstanding one; the plan itself is accepted."""
     first = run.result.requests['av0']
     run.drive(100, plans=False)
     second = run.result.requests['av0']
@@ -64,7 +64,7 @@ def test_overdue_answer_leaves_the_planner_busy(run: HandDriven) -> None:
 
 
 def test_refused_answer_is_an_answer(run: HandDriven) -> None:
-    """A planner that answers nonsense is asked again at the next tick."""
+    """After an invalid answer the planner is asked again at the next tick."""
     request = run.result.requests['av0']
     broken = support.answer(request)
     broken.positions[3, 0] = math.nan
@@ -132,7 +132,7 @@ BAD = [
 @pytest.mark.parametrize(('make', 'reason'), BAD, ids=[reason for _, reason in BAD])
 def test_bad_plan_is_refused_and_the_last_one_stays(
         run: HandDriven, make: Callable[[JointSeries], JointSeries], reason: str) -> None:
-    """The AV goes on along its last good plan as if nothing had come."""
+    """The AV goes on along its last good plan, as without the bad one."""
     run.drive(10)
     av = run.simulation.avs[0]
     good, start = av.plan, av.state
@@ -158,7 +158,7 @@ def test_old_plan_is_refused(run: HandDriven) -> None:
 
 
 def test_same_answer_twice_says_nothing_new(run: HandDriven) -> None:
-    """A message that is delivered twice neither counts nor disturbs."""
+    """The second delivery of a message neither counts nor has an effect."""
     request = run.result.requests['av0']
     assert run.simulation.offer_plan('av0', support.answer(request)) is None
     run.drive(5, plans=False)
@@ -195,7 +195,7 @@ def test_used_up_plan_brakes_to_a_stop_along_it(run: HandDriven) -> None:
 
 
 def test_without_any_plan_it_brakes_from_the_start(run: HandDriven) -> None:
-    """The planner never came: 20^2 / 8 = 50 m to the stop."""
+    """No planner ever answers: 20^2 / 8 = 50 m to the stop."""
     start = run.simulation.avs[0].state
     states = run.drive(700, plans=False)
     assert states[-1].speed == 0.0
@@ -204,7 +204,7 @@ def test_without_any_plan_it_brakes_from_the_start(run: HandDriven) -> None:
 
 
 def test_stop_is_a_stop_from_any_speed(cut_in: LoadedScenario) -> None:
-    """Speed exactly 0, never a rounding error behind it, after v^2 / 8 m."""
+    """The speed is exactly 0, without a rounding error, after v^2 / 8 m."""
     for speed in np.random.default_rng(81).uniform(0.1, 2.0, 30).tolist():
         run = HandDriven(support.setup_of(support.moved(cut_in, speed)))
         start = run.simulation.avs[0].state.x
@@ -228,7 +228,7 @@ def test_recovery_when_plans_return(run: HandDriven) -> None:
 
 
 def test_overdue_plan_does_not_throw_the_vehicle_ahead(run: HandDriven) -> None:
-    """A plan for 20 m/s comes when the AV has braked for 0.9 s: it is entered where the AV is."""
+    """A plan for 20 m/s comes after 0.9 s of braking: the AV enters it where the AV is."""
     av = run.simulation.avs[0]
     first = run.result.requests['av0']
     before = run.drive(90, plans=False)[-1]
@@ -243,7 +243,7 @@ def test_late_braking_plan_makes_no_backward_step(run: HandDriven, latency: int)
     """
     A plan that brakes at 8 m/s^2 from where the AV was `latency` steps ago lies behind it.
 
-    The AV holds still until the plan has come by: never a step back, and in the end it stops
+    The AV stands until the plan has caught up. It never steps back, and in the end it stops
     where the plan stops or where it is.
     """
     run.drive(10)

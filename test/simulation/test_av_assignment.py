@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who drives: alternatives on one spot, and exported runs that are driven again."""
+"""Which AVs drive: alternatives on one spot, and exported runs that are driven again."""
 
 from dataclasses import replace
 import math
@@ -43,7 +43,7 @@ def test_problems_on_one_spot_are_alternatives(shared_scenarios: Path) -> None:
 
 
 def test_hundreds_of_alternatives_are_counted() -> None:
-    """Of 500 problems on one spot a few are named, and the remedy is still read."""
+    """Of 500 problems on one spot the message names a few, and still shows the remedy."""
     game = load_game(scenarios_directory() / 'cut_in.yaml')
     loaded = load_scenario(game.scenario)
     problem = loaded.planning_problems[0]
@@ -57,7 +57,7 @@ def test_hundreds_of_alternatives_are_counted() -> None:
 
 
 def test_another_alternative_is_asked_for(shared_scenarios: Path) -> None:
-    """By the command line or the game; naming several of them is the user's word."""
+    """The command line or the game asks; several of them drive if the user names them."""
     path = shared_scenarios / MERGE
     request = RunRequest(scenario=path, driver='idle', problems=(100059,))
     assert problems_of(effective_game(request)) == [100059]
@@ -74,14 +74,14 @@ def test_another_alternative_is_asked_for(shared_scenarios: Path) -> None:
 
 
 def test_problems_that_start_apart_all_drive() -> None:
-    """The two AVs of our own scenario, 40 m apart, are a cast."""
+    """The two AVs of the package's own scenario, 40 m apart, both drive."""
     path = scenarios_directory() / 'C-ZAM_TwoAvs-1_1_T-1.xml'
     assert problems_of(Game(path, humans=HUMAN)) == [100, 101]
 
 
 @pytest.mark.slow
 def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
-    """Run, XML, run, XML, run: hv0 plays back to 0.1 mm, av0 drives its own problem, alike."""
+    """Run, XML, run, XML, run: hv0 plays back to 0.1 mm, av0 drives its own problem equally."""
     first = run_offline(build_setup(load_game(scenarios_directory() / 'cut_in.yaml')),
                         duration_s=8.0)
     log = trajectories_of(first)
@@ -105,8 +105,8 @@ def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
     assert math.dist(result.states_of('av0')[-1, :2], first.states_of('av0')[0, :2]) > 80.0
 
 
-def test_who_was_human_is_told_in_the_file(tmp_path: Path) -> None:
-    """In the source, which the schema leaves free, for the last run only."""
+def test_the_file_names_the_human_vehicles(tmp_path: Path) -> None:
+    """The source, which the schema leaves free, names them, for the last run only."""
     game = load_game(scenarios_directory() / 'cut_in.yaml')
     exported = write_scenario(trajectories_of(run_offline(build_setup(game), duration_s=0.3)),
                               tmp_path / 'run.xml')
@@ -120,12 +120,12 @@ def test_who_was_human_is_told_in_the_file(tmp_path: Path) -> None:
     again = write_scenario(trajectories_of(run_offline(asked, duration_s=0.2)),
                            tmp_path / 'again.xml')
     told = etree.fromstring(again.xml_text.encode()).get('source')
-    # Two humans by now: who drove, and who played back.
+    # Two humans by now: the one that drove, and the one played back.
     assert told.count('(humans: ') == 1 and told.count('driven in crgame_ros') == 2
     assert f'planning problem {exported.problem_ids["hv0"]} is obstacle ' in told
     assert asked.loaded.human_problems == {
         exported.problem_ids['hv0']: exported.obstacle_ids['hv0']}
-    # Whoever takes the obstacle out to solve its problem gets it as an AV.
+    # If the user removes the obstacle to solve its problem, it becomes an AV.
     root = etree.parse(str(tmp_path / 'run.xml')).getroot()
     root.remove(root.find(f'dynamicObstacle[@id="{exported.obstacle_ids["hv0"]}"]'))
     (tmp_path / 'solved.xml').write_bytes(etree.tostring(root))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""With `contact: stop` a person's vehicle stands where it touches somebody, and can drive away."""
+"""With `contact: stop` a person's vehicle stops where it touches another, and can drive away."""
 
 from collections.abc import Sequence
 import math
@@ -23,7 +23,7 @@ COMES = HumanSpec('hv0', 'idle', spawn=PoseSpawn(-90.0, 0.0, 0.0, 10.0))
 
 
 def setup_of(loaded: LoadedScenario, humans: Sequence[HumanSpec], contact: str) -> Setup:
-    """Make a run with what a contact does."""
+    """Make a run with the given effect of a contact."""
     return support.setup_of(loaded, humans, drivability=DrivabilitySpec(contact=contact))
 
 
@@ -58,7 +58,7 @@ def test_a_vehicle_is_driven_against_another(cut_in: LoadedScenario, contact: st
         assert max(areas) > 0.5 and states[0].x > states[1].x
         return
     assert max(areas) == 0.0 and states[0].x < states[1].x - 3.0
-    # It came fast, stood within a step, and presses on without getting anywhere.
+    # It came fast, stopped within a step, and pushes on without moving.
     assert max(speeds) > 12.0 and min(np.diff(speeds)) < -10.0
     assert max(speeds[-100:]) < 0.5
     assert states[1] == run.simulation.humans[1].state and states[1].speed == 0.0
@@ -67,7 +67,7 @@ def test_a_vehicle_is_driven_against_another(cut_in: LoadedScenario, contact: st
     assert run.simulation.states[1].x - run.simulation.states[0].x > gap + 1.0
 
 
-def test_who_stands_and_is_run_into_may_leave(cut_in: LoadedScenario) -> None:
+def test_a_standing_vehicle_that_is_run_into_may_leave(cut_in: LoadedScenario) -> None:
     """An AV that drives on by its plan is not stopped: it is over the standing vehicle."""
     av = support.setup_of(cut_in).avs[0].state
     ahead = HumanSpec('hv0', 'idle', spawn=PoseSpawn(av.x + 12.0, av.y, av.yaw, 0.0))
@@ -79,7 +79,7 @@ def test_who_stands_and_is_run_into_may_leave(cut_in: LoadedScenario) -> None:
     assert run.simulation.states[0] == start and run.simulation.states[1].speed > 10.0
     while run.simulation.states[1].center(1.4)[0] < start.center(1.4)[0]:
         run.drive(1, commands=lambda n: [GAS])
-    # The AV has its centre ahead of it now: backwards leads out.
+    # The AV's centre is ahead of it now: it gets out backwards.
     run.drive(100, commands=lambda n: [REVERSE])
     assert run.simulation.states[0].speed < 0.0
 

@@ -17,7 +17,7 @@ import pytest
     ('ZAM_Over-1_1', 'front', 'stopped track', 'av0', 4.0)])
 def test_contact_of_a_blind_driver(name: str, side: str, kind: str, able: str, duration_s: float,
                                    shared_scenarios: Path) -> None:
-    """A recorded car runs into a slow AV; an AV that does not look runs into what stands."""
+    """A recorded car runs into a slow AV; a blind AV runs into a standing obstacle."""
     planner = 'idm' if side == 'rear' else 'constant-velocity'
     setup = build_setup(Game(shared_scenarios / f'{name}.xml', humans=(HumanSpec('hv0', 'idle'),),
                              avs=(AvSpec('av0', planner=planner),)))

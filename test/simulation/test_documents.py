@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The run as JSON text: round trips, and garbage from anybody on the bus."""
+"""The run as JSON text: round trips, and garbage from any publisher on the bus."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -38,7 +38,7 @@ def text(game: Setup) -> str:
 
 
 def test_game_round_trip(game: Setup, text: str) -> None:
-    """What the engine runs is what the others read."""
+    """Other processes read the game that the engine runs."""
     document = parse_game_document(text)
     assert document.epoch == 2
     assert document.scenario_sha256 == game.loaded.sha256
@@ -49,7 +49,7 @@ def test_game_round_trip(game: Setup, text: str) -> None:
         assert item.state == setup.state
         assert item.vehicle == replace(
             setup.vehicle, steering_ratio=table_text(setup.vehicle.steering_ratio))
-        # Who drives by pedals in another process needs the table itself.
+        # A pedal driver in another process needs the table itself.
         assert load_steering_ratio(item.vehicle.steering_ratio) == load_steering_ratio(
             setup.vehicle.steering_ratio)
     for av, item in zip(game.avs, document.avs, strict=True):
@@ -72,7 +72,7 @@ def test_scripted_driver_travels_as_text(game: Setup, text: str) -> None:
 
 
 def test_vehicle_by_id(text: str) -> None:
-    """Humans and AVs; None for everybody else."""
+    """Humans and AVs; None for all others."""
     document = parse_game_document(text)
     assert document.av('av1') == document.avs[1]
     assert document.human('hv0') == document.humans[0]
@@ -122,7 +122,7 @@ def with_value(key: str, value: Any) -> Callable[[dict[str, Any]], None]:
     with_value('humans', ['hv0']), with_value('humans', [{'id': 'hv0'}]),
     with_value('drivability', {'colour': 'red'}), with_value('drivability', None)])
 def test_spoilt_game_is_refused(text: str, spoil: Callable[[dict[str, Any]], None]) -> None:
-    """One error that names the topic, never a bare exception."""
+    """It raises one error that names the topic, never another exception."""
     content = json.loads(text)
     spoil(content)
     with pytest.raises(InputError, match='/scenario/game: (is no game document|drivability: )'):
@@ -135,7 +135,7 @@ GARBAGE = ['', 'no json', '[]', '7', 'null', '{}', '"text"', '[' * 100_000, '\x0
 
 @pytest.mark.parametrize('garbage', GARBAGE, ids=range(len(GARBAGE)))
 def test_garbage_is_refused(garbage: str) -> None:
-    """Whatever arrives on either topic."""
+    """For any text on either topic."""
     with pytest.raises(InputError, match='/scenario/game'):
         parse_game_document(garbage)
     if garbage not in ('[]', '{}', '"text"'):
@@ -162,7 +162,7 @@ def test_objects_round_trip(traffic: LoadedScenario) -> None:
     ('shape', {'kind': 'rectangle', 'length': -1.0, 'width': 2.0, 'vertices': []}),
     ('shape', {'kind': 'polygon', 'length': 1.0, 'width': 2.0, 'vertices': [[1.0]]})])
 def test_spoilt_objects_are_refused(key: str, value: Any) -> None:
-    """An object that could not be drawn or avoided."""
+    """For an object that could not be drawn or avoided."""
     item = ObjectDescription('o1', 'car', Role.RECORDED, Shape.rectangle(4.0, 2.0))
     entries = json.loads(objects_document([item]))
     entries[0][key] = value
@@ -174,5 +174,5 @@ def test_vehicle_entry_has_every_parameter(text: str) -> None:
     """A planner in another process rebuilds the parameters from the text alone."""
     entry = json.loads(text)['avs'][0]['vehicle']
     assert entry.keys() == {field.name for field in fields(VehicleParameters)}
-    # A path of this machine says nothing to another one.
+    # A path on this machine means nothing on another one.
     assert str(Path.cwd()) not in json.dumps(entry)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A human's violation ends an offline run at its very step, where the game says so."""
+"""A human's violation ends an offline run at its step, if the game asks for it."""
 
 from dataclasses import replace
 import json
@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 import yaml
 
-# Well ahead of the AV, where nobody runs into the human: x, y, yaw and speed.
+# Well ahead of the AV, where no vehicle runs into the human: x, y, yaw and speed.
 STARTS = {'USA_US101-4_1_T-1': (43.57, -38.65, -0.7094, 5.331),
           'ZAM_Tutorial-1_2_T-1': (76.59, 0.0, 0.0, 22.0)}
 
 
 def run(path: Path, stop: bool, rate: float = 100.0, **options: bool) -> OfflineResult:
-    """Run a published scenario with a human who lets the car roll straight on."""
+    """Run a published scenario with a human whose car rolls straight on."""
     game = effective_game(RunRequest(scenario=path, driver='idle'))
     game = replace(game, drivability=replace(game.drivability, stop=stop),
                    timing=replace(game.timing, rate=rate),
@@ -37,7 +37,7 @@ def run(path: Path, stop: bool, rate: float = 100.0, **options: bool) -> Offline
     ('ZAM_Tutorial-1_2_T-1', 559)])   # the AV has been in a collision since 296: no matter
 def test_ends_where_the_human_first_violates(name: str, steps: int,
                                              shared_scenarios: Path) -> None:
-    """Everything up to the violation is as without the rule, and nothing comes after it."""
+    """All up to the violation is as without the rule, and nothing comes after it."""
     path = shared_scenarios / f'{name}.xml'
     free, ended = run(path, stop=False), run(path, stop=True)
     first = next(item for item in free.violations
@@ -63,14 +63,14 @@ def test_above_100_hz_it_ends_at_a_step_that_live_is_published(shared_scenarios:
     ended = run(path, stop=True, rate=1000.0)
     assert ended.stop is not None
     assert ended.stop.n % 10 == 0
-    # 0.55 s as at 100 Hz, but for the finer integration.
+    # 0.55 s as at 100 Hz, except for the finer integration.
     assert ended.stop.n == pytest.approx(550, abs=10)
     assert len(ended.vehicle_states) == ended.stop.n + 1
 
 
 def test_the_command_tells_both_steps_and_writes_what_was(
         shared_scenarios: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Six scenario steps are in the file: 0 to 5, for n = 55 lies after the fifth."""
+    """Six scenario steps are in the file, 0 to 5, because n = 55 lies after the fifth."""
     game = tmp_path / 'game.yaml'
     game.write_text(yaml.safe_dump({
         'scenario': str(shared_scenarios / 'USA_US101-4_1_T-1.xml'),

@@ -57,7 +57,7 @@ def test_request_holds_what_the_step_made(cut_in: LoadedScenario) -> None:
 
 
 def test_human_moves_as_its_vehicle_model_over_the_given_interval(cut_in: LoadedScenario) -> None:
-    """The engine adds nothing: the same commands and intervals on a bare vehicle, same bits."""
+    """The same commands and intervals on a bare vehicle give the same bits."""
     setup = support.setup_of(cut_in, [support.BESIDE], avs=())
     simulation = Simulation(setup)
     simulation.begin()
@@ -69,7 +69,7 @@ def test_human_moves_as_its_vehicle_model_over_the_given_interval(cut_in: Loaded
 
 
 def test_commands_are_rounded_and_clipped_at_the_entrance(cut_in: LoadedScenario) -> None:
-    """What is recorded is what was consumed: float32, within its range, NaN as released."""
+    """The record has the commands as consumed: float32, within range, NaN as released."""
     simulation = Simulation(support.setup_of(cut_in, [support.BESIDE], avs=()))
     simulation.begin()
     simulation.step(support.DT, [DriverCommand(0.1, 7.0, float('nan'))])
@@ -105,7 +105,7 @@ def test_scenario_that_begins_later(cut_in: LoadedScenario) -> None:
 
 
 def test_two_humans_and_two_avs(two_avs: LoadedScenario) -> None:
-    """Each AV is told of the three others at their places, never of itself beyond now."""
+    """Each AV's request has the three others at their places, and itself only now."""
     setup = support.setup_of(two_avs, PAIR)
     run = HandDriven(setup)
     assert setup.vehicle_ids == ('hv0', 'hv1', 'av0', 'av1')
@@ -152,7 +152,7 @@ def test_plan_comes_back_through_the_inverse(turned: LoadedScenario) -> None:
     """
     CRG 9 on the way to the planner, CRG 10 on the way back.
 
-    The simulator places the AV on the lane; its planner sees the declared pose.
+    The simulator places the AV on the lane; its planner gets the declared pose.
     """
     setup = support.setup_of(turned, avs=(AvSpec('av0', spawn='lanelet'),))
     transform = setup.avs[0].transform
@@ -175,10 +175,10 @@ def test_plan_comes_back_through_the_inverse(turned: LoadedScenario) -> None:
 
 def test_the_whole_world_is_mapped_for_each_planner(shared_scenarios: Path) -> None:
     """
-    Everybody stands to each planner's ego as to its simulated AV, recorded obstacles too (CRG 9).
+    All relative poses to a planner's ego are those to its simulated AV, also of obstacles (CRG 9).
 
-    Two AVs whose problems are declared beside their lane, each by its own pose: for each the
-    distances between all are those of the simulation, now and in every prediction.
+    The problems of two AVs are declared beside their lane, each by its own pose. In each request
+    the distances between all are those of the simulation, now and in every prediction.
     """
     loaded = load_scenario(shared_scenarios / 'USA_US101-4_1_T-1.xml')
     second = copy.deepcopy(loaded.planning_problems[0])
@@ -224,7 +224,7 @@ def setup_without_transforms(setup: Setup) -> Setup:
 
 
 def places(names: Sequence[str], positions: Array, velocities: Array) -> Array:
-    """Return x, y, vx, vy and yaw (Q, 5) of everybody in a point of a request."""
+    """Return x, y, vx, vy and yaw (Q, 5) of all objects in a point of a request."""
     starts = [index for index, name in enumerate(names) if name.endswith('/x')]
     return np.array([(*positions[i:i + 2], *velocities[i:i + 2], positions[i + 2])
                      for i in starts])
@@ -236,7 +236,7 @@ def distances(points: Array) -> Array:
 
 
 def test_others_are_mapped_for_the_planner(turned: LoadedScenario) -> None:
-    """The human stands to the planner's ego as it stands to the simulated AV (CRG III-A1c)."""
+    """The human's pose relative to the planner's ego is that to the simulated AV (CRG III-A1c)."""
     setup = support.setup_of(turned, [support.BESIDE], avs=(AvSpec('av0', spawn='lanelet'),))
     run = HandDriven(setup)
     run.drive(20, commands=lambda n: [GAS])
@@ -253,7 +253,7 @@ def test_others_are_mapped_for_the_planner(turned: LoadedScenario) -> None:
 
 
 def test_human_alone(cut_in: LoadedScenario) -> None:
-    """A scenario without a planning problem: ticks and objects go on, nobody is asked."""
+    """A scenario without a planning problem: ticks and objects go on, without plan requests."""
     setup = support.setup_of(replace(cut_in, planning_problems=()), [HumanSpec('hv0', 'idle')])
     assert setup.avs == ()
     run = HandDriven(setup)
@@ -267,7 +267,7 @@ def test_human_alone(cut_in: LoadedScenario) -> None:
 
 
 def test_hash_is_sha256_of_all_states(two_avs: LoadedScenario) -> None:
-    """Anybody can compute it from a trace: the states as float64, step by step."""
+    """It can be computed from a trace: the states as float64, step by step."""
     run = HandDriven(support.setup_of(two_avs, PAIR))
     trace = [run.simulation.states]
     for _ in range(25):

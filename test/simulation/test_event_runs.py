@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whole offline runs with events: the AV reacts, planners change, and all of it repeats."""
+"""Whole offline runs with events: the AV reacts, planners change, and runs repeat exactly."""
 
 from dataclasses import replace
 import json
@@ -63,7 +63,7 @@ def test_av_stops_for_the_pedestrian_that_is_released(game: Game) -> None:
 
 @pytest.mark.slow
 def test_runs_with_triggers_repeat_to_the_last_bit(game: Game) -> None:
-    """The setup is shared and no event leaves a trace in it; a tick later is another run."""
+    """The setup is shared and no event changes it; a trigger one tick later gives another run."""
     setup = build_setup(game)
     triggers = [(200, 'slow-zone'), (405, 'careful-planner'), (RELEASE_N, 'pedestrian')]
     first, plain, again = (run_offline(setup, triggers=used)
@@ -78,7 +78,7 @@ def test_runs_with_triggers_repeat_to_the_last_bit(game: Game) -> None:
 
 @pytest.mark.slow
 def test_recorded_events_repeat_a_run_as_conditions(game: Game) -> None:
-    """The same bits without anybody at the buttons; nothing else fires by itself."""
+    """The same bits without triggers; no other event fires by itself."""
     clock = read(EventList, [{'name': 'clock', 'when': {'time': 3.0},
                               'plan_display': {'av': 'av0', 'show': False}}], '')
     game = replace(game, events=(*game.events, *clock))
@@ -90,7 +90,7 @@ def test_recorded_events_repeat_a_run_as_conditions(game: Game) -> None:
     assert again.state_hash == original.state_hash
     assert [event.k for event in again.fired] == [event.k for event in original.fired]
     assert {event.by for event in again.fired} == {'condition'}
-    # What did not fire in the recording waits for a trigger; what it did not know stays.
+    # Events that did not fire in the recording wait for a trigger; events it lacks stay.
     silent = with_recorded_events(game, (), {'pedestrian'})
     assert silent.events[-1].when == AtTime(3.0)
     assert with_recorded_events(game, ()).events[-1].when is None
@@ -121,9 +121,9 @@ def test_speed_limit_of_one_lanelet(game: Game) -> None:
 @pytest.mark.parametrize('planner', ['constant-velocity', 'reactive', 'idm-package'])
 def test_planner_is_replaced_in_the_run(game: Game, planner: str) -> None:
     """
-    The newcomer answers from its tick on, without a refused plan or a fallback.
+    The new planner answers from its tick on, without a refused plan or a fallback.
 
-    The pedestrian tells them apart: only constant velocity does not care.
+    The pedestrian shows the difference: only constant velocity does not react.
     """
     swap = read(EventList, [{'name': 'swap', 'planner': {'av': 'av0', 'planner': planner}}], '')
     game = replace(game, humans=(), events=(*game.events, *swap))
@@ -145,7 +145,7 @@ def test_hidden_plan_changes_no_motion(game: Game) -> None:
 
 
 def test_refused_trigger_ends_the_run(game: Game) -> None:
-    """A script that names a wrong event must not pass for one that did."""
+    """A script that names a wrong event must not count as one that fired it."""
     with pytest.raises(InputError, match='trigger at step 50: there is no event "fly"'):
         play(game, (50, 'fly'), duration_s=2.0)
 

@@ -61,7 +61,7 @@ def test_planners_behind_an_adapter_are_not_checked_twice(cut_in: LoadedScenario
 
 @pytest.mark.slow
 def test_every_lanelet_of_published_maps_may_be_planned_along(shared_scenarios: Path) -> None:
-    """What follows a lanelet's centre is on the road, for vehicles of its width."""
+    """A plan along a lanelet's centre is on the road, for vehicles of its width."""
     loaded = load_scenario(shared_scenarios / 'USA_Lanker-1_3_T-1.xml')
     setup = build_setup(Game(shared_scenarios / 'USA_Lanker-1_3_T-1.xml', avs=av_of('external')),
                         loaded)
@@ -96,5 +96,5 @@ def test_check_takes_less_than_a_millisecond(shared_scenarios: Path) -> None:
             start_s = time.perf_counter()
             limit.refusal(states)
             took_s.append(time.perf_counter() - start_s)
-        # What else runs here only ever adds to it.
+        # Other load on this machine only adds to the time.
         assert min(took_s) < 1e-3 and statistics.median(took_s) < 2e-3

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What AVs indicate on made roads: up to where, from where, and on the lane of oncomers."""
+"""Indicators of AVs on made roads: where they begin and end, and on the oncoming lane."""
 
 from commonroad.common.util import Interval
 from commonroad.planning.goal import GoalRegion
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def indicator_on(roads: RoadNetwork, goal: int) -> PlanIndicator:
-    """Make an indicator of a vehicle that begins at the origin, with a lanelet as its goal."""
+    """Make the indicator of a vehicle that begins at the origin, with a lanelet as its goal."""
     state = InitialState(time_step=0, position=np.zeros(2), orientation=0.0, velocity=10.0,
                          acceleration=0.0, yaw_rate=0.0, slip_angle=0.0)
     region = GoalRegion([CustomState(time_step=Interval(0, 100))], {0: [goal]})
@@ -37,8 +37,8 @@ def two_lanes() -> RoadNetwork:
                  2: Piece((0.0, WIDTH, 0.0), 300.0, right=1)})
 
 
-def test_who_settles_beside_the_middle_has_changed_lanes() -> None:
-    """0.5 m beside it; the light is on up to there, and not any more where the plan stays so."""
+def test_a_vehicle_that_settles_beside_the_middle_has_changed_lanes() -> None:
+    """0.5 m beside it: the light is on up to there, and off once the plan stays there."""
     indicator = indicator_on(two_lanes(), 1)
     x = np.arange(0.0, 300.0, 5.0)
     y = (WIDTH - 0.5) * 0.5 * (1.0 - np.cos(np.pi * np.clip((x - 20.0) / 60.0, 0.0, 1.0)))
@@ -50,21 +50,21 @@ def test_who_settles_beside_the_middle_has_changed_lanes() -> None:
     assert {bits for at, bits in shown.items() if at >= 85} == {0}
 
 
-def test_who_is_held_up_between_lanes_goes_on_indicating() -> None:
-    """A plan that does not move says nothing else."""
+def test_a_vehicle_held_up_between_lanes_goes_on_indicating() -> None:
+    """A plan that does not move changes nothing."""
     indicator = indicator_on(two_lanes(), 1)
     x = np.linspace(0.0, 60.0, 11)
     indicator.update(plan(x, WIDTH * x / 60.0))
     stands = np.tile((36.0, 2.1, 0.05), (11, 1))
     indicator.update(stands)
     assert indicator.shown == Light.LEFT
-    # Back in its own lane it has given the change up.
+    # Back in its own lane it has abandoned the change.
     indicator.update(plan(36.0 + x, np.zeros(11)))
     assert indicator.shown == 0
 
 
 def test_a_change_that_was_never_made_is_over_on_another_lane() -> None:
-    """Meant was the lane on the left; the vehicle comes to the middle of that on the right."""
+    """The plan led to the left lane; the vehicle comes to the middle of the right lane."""
     indicator = indicator_on(made({
         1: Piece((0.0, 0.0, 0.0), 300.0, left=2, right=3),
         2: Piece((0.0, WIDTH, 0.0), 300.0, right=1),
@@ -78,8 +78,8 @@ def test_a_change_that_was_never_made_is_over_on_another_lane() -> None:
 
 @pytest.mark.parametrize(('x', 'expected'), [
     (75.0, 0), (82.0, Light.LEFT), (88.0, Light.LEFT), (96.0, Light.LEFT), (104.0, Light.LEFT)])
-def test_who_stands_before_a_fork_indicates_within_30_m(x: float, expected: int) -> None:
-    """A lanelet up to a stop line, of 10 m, lies between."""
+def test_a_vehicle_standing_before_a_fork_indicates_within_30_m(x: float, expected: int) -> None:
+    """A lanelet of 10 m up to a stop line lies between."""
     before = Piece((0.0, 0.0, 0.0), 100.0, after=(2,))
     line = Piece(before.end, 10.0, after=(3, 4))
     indicator = indicator_on(made({1: before, 2: line, 3: Piece(line.end, 20.0, 90.0),
@@ -89,7 +89,7 @@ def test_who_stands_before_a_fork_indicates_within_30_m(x: float, expected: int)
 
 
 def test_a_turn_behind_another_fork_is_not_shown_before_that() -> None:
-    """As in a roundabout, in which the exit before one's own is near."""
+    """As in a roundabout, where the exit before the vehicle's own is near."""
     before = Piece((0.0, 0.0, 0.0), 100.0, after=(2, 5))
     line = Piece(before.end, 10.0, after=(3, 4))
     third = Piece(line.end, 20.0, 90.0)
@@ -98,15 +98,15 @@ def test_a_turn_behind_another_fork_is_not_shown_before_that() -> None:
         5: Piece(before.end, 20.0, 90.0)}), 3)
     way = np.concatenate([piece.poses()[:-1] for piece in (before, line, third)])
     for x, expected in ((95, 0), (102, Light.LEFT)):
-        # Whether it stands there or drives on.
+        # Both if it stands there and if it drives on.
         for poses in (np.tile(way[x], (11, 1)), way[x:x + 22:2]):
             indicator.forget()
             indicator.update(poses)
             assert indicator.shown == expected
 
 
-def test_who_follows_the_one_way_there_is_turns_off_nowhere() -> None:
-    """Into lanelet 3, which bends, others come from 2, from where one can go straight on."""
+def test_a_vehicle_on_the_only_way_does_not_turn_off() -> None:
+    """Others enter lanelet 3, which bends, from 2, from which straight on is possible."""
     first = Piece((0.0, 0.0, 0.0), 50.0, after=(3,))
     second = Piece((20.0, 30.0, -90.0), 30.0, after=(3, 4))
     third = Piece(first.end, 30.0, 90.0)
@@ -120,7 +120,7 @@ def test_who_follows_the_one_way_there_is_turns_off_nowhere() -> None:
 
 
 def test_overtaking_on_the_lane_of_oncomers_is_shown() -> None:
-    """To the left and back to the right, over lanelets of which none but the first is beside."""
+    """To the left and back to the right, over lanelets of which only the first is beside."""
     roads = made({1: Piece((0.0, 0.0, 0.0), 150.0, after=(2,), opposite=4),
                   2: Piece((150.0, 0.0, 0.0), 150.0, opposite=3),
                   3: Piece((300.0, WIDTH, 180.0), 150.0, after=(4,), opposite=2),

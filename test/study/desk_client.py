@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A desk that listens in this process, and pages of it that a test speaks for."""
+"""A desk that listens in this process, and its pages, whose messages a test sends."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -72,7 +72,7 @@ async def served(folder: Path, host: str = '127.0.0.1', step_s: float = 0.02,
 
 
 def in_loop(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
-    """Run a test in an event loop, which must be empty at its end."""
+    """Run a test in an event loop, which must have no task at its end."""
     @functools.wraps(test)
     def run(tmp_path: Path) -> None:
         async def body() -> None:
@@ -96,19 +96,19 @@ async def shown(socket: ClientWebSocketResponse, fits: Callable[[dict[str, Any]]
 
 
 def shows(what: str, item: str = '') -> Callable[[dict[str, Any]], bool]:
-    """Fit a document of the participant's page."""
+    """Return a predicate that fits a document of the participant's page."""
     return lambda content: content['type'] == 'desk' and content['show'] == what \
         and item in ('', content['item'])
 
 
 async def do(socket: ClientWebSocketResponse, order: dict[str, Any]) -> dict[str, Any]:
-    """Return an order as the experimenter; give the reply."""
+    """Send an order as the experimenter; return the reply."""
     await socket.send_json({**order, 'id': 7})
     return await shown(socket, lambda content: content['type'] == 'reply')
 
 
 async def do_until(served_: Served, socket: ClientWebSocketResponse, wanted: str) -> None:
-    """Do as a willing participant does, up to an item."""
+    """Complete the items before a given one as a willing participant."""
     desk = served_.desk
     while (item := desk.session.next_item) is not None and item.id != wanted:
         document = participant_document(desk)
@@ -121,12 +121,12 @@ async def do_until(served_: Served, socket: ClientWebSocketResponse, wanted: str
                        for question in document.get('questions', [])}
             await socket.send_json({'type': 'finish', 'item': item.id, 'answers': answers,
                                     'agreed': True, **TIMES})
-        # No faster than people, or the page would be dropped.
+        # The page would be dropped if it answered faster than people.
         await asyncio.sleep(0.06)
 
 
 def answer_to(question: dict[str, Any]) -> Any:
-    """Return an answer that can be taken."""
+    """Return a valid answer."""
     match question['kind']:
         case 'choice':
             return [] if question['several'] else question['choices'][0][0]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A desk in a process of its own, which tests end as they like."""
+"""A desk in a process of its own, which tests can end in any way."""
 
 import asyncio
 from pathlib import Path
@@ -18,7 +18,7 @@ from desk_support import DrivesWithoutGraph  # noqa: E402, I100
 
 
 async def main(study: str, folder: str, port: str, link: str = '', step_s: str = '0.05') -> None:
-    """Serve the session in a folder until somebody ends the process."""
+    """Serve the session in a folder until the process is ended."""
     with ParticipantSession(load_study(Path(study)), Path(folder), 'P07', 0) as session:
         desk = Desk(session, DrivesWithoutGraph(session, link, float(step_s)))
         _, lines = await serve_desk(desk, Access('127.0.0.1', int(port)), Path(folder))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A study with every kind of item, and what lets its sessions go on where no graph drives."""
+"""A study with every kind of item, and drives that need no running graph."""
 
 import asyncio
 from collections.abc import Callable

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Means of conditions: their intervals against scipy's tests and numbers worked out by hand."""
+"""Means of conditions: their intervals against scipy's tests and hand-computed numbers."""
 
 import math
 
-from crgame_ros.study.data.condition_means import (
+from crgame_ros.study.data.condition_section import (
     condition_means,
+    condition_svg,
     participant_means,
     within_halves,
 )
-from crgame_ros.study.data.condition_section import condition_svg
 import numpy as np
 import pytest
 from scipy import stats
@@ -18,13 +18,13 @@ RNG = np.random.default_rng(7)
 
 
 def values_of(table: np.ndarray, names: str) -> dict[tuple[str, str], float]:
-    """Name the rows of a table as people, its columns as conditions."""
+    """Name the rows of a table after people and its columns after conditions."""
     return {(f'P{row:02}', name): float(table[row, place])
             for row in range(len(table)) for place, name in enumerate(names)}
 
 
 def test_of_two_conditions_the_interval_is_that_of_the_paired_test() -> None:
-    # Of two conditions the corrected interval is 1/sqrt(2) of that of the difference.
+    # The corrected interval of two conditions is 1/sqrt(2) of that of their difference.
     table = RNG.normal(size=(9, 1)) * 20.0 + RNG.normal(size=(9, 2)) + (0.0, 1.0)
     interval = stats.ttest_rel(table[:, 0], table[:, 1]).confidence_interval(0.95)
     half = (interval.high - interval.low) / 2.0
@@ -50,7 +50,7 @@ def test_numbers_worked_out_by_hand() -> None:
     assert within_halves(table) == pytest.approx([half, half], rel=1e-9)
 
 
-def test_who_lacks_a_condition_is_left_out_of_all() -> None:
+def test_a_person_without_a_condition_is_left_out_of_all() -> None:
     table = RNG.normal(size=(6, 3))
     values = values_of(table, 'abc')
     del values['P02', 'b']
@@ -60,7 +60,7 @@ def test_who_lacks_a_condition_is_left_out_of_all() -> None:
     assert found.within and found.used == ('P00', 'P01', 'P03', 'P05')
     assert [each.mean for each in found.conditions] == pytest.approx(whole.mean(axis=0).tolist())
     assert [each.half for each in found.conditions] == pytest.approx(within_halves(whole).tolist())
-    # Their points are shown all the same.
+    # Their points are shown nevertheless.
     assert set(found.conditions[0].points) == {f'P{row:02}' for row in range(6)}
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The desk's server over real sockets: documents, orders, who is let in, hostile pages."""
+"""The desk's server over real sockets: documents, orders, access, hostile pages."""
 
 import asyncio
 import json
@@ -77,7 +77,7 @@ async def test_what_is_stale_twice_or_wrong_changes_nothing(tmp_path: Path) -> N
 
 
 @in_loop
-async def test_who_does_not_agree_ends_the_session(tmp_path: Path) -> None:
+async def test_refused_consent_ends_the_session(tmp_path: Path) -> None:
     async with served(tmp_path, languages=[]) as running:
         director, socket = await running.direct(), await running.join()
         await do_until(running, socket, 'before/1')
@@ -102,7 +102,7 @@ async def test_the_newest_page_is_used_and_an_old_one_takes_over_when_asked(tmp_
                                'answers': {'age': 33, 'licence': 'yes'}, **TIMES})
         await shown(first, shows('elsewhere'))
         assert running.desk.session.next_item.id == 'fields'
-        # Who comes back after a broken connection does not push the other aside.
+        # A page that reconnects after a broken connection does not displace the other page.
         await first.close()
         first = await running.join(fresh=False)
         await shown(first, shows('elsewhere'))
@@ -184,7 +184,7 @@ async def test_a_break_lasts_whatever_the_page_says(tmp_path: Path) -> None:
 
 
 @in_loop
-async def test_only_who_has_the_printed_link_is_the_experimenter(tmp_path: Path) -> None:
+async def test_only_the_printed_link_makes_an_experimenter(tmp_path: Path) -> None:
     async with served(tmp_path) as running:
         for path in ('/experimenter', '/experimenter/journal', '/ws/experimenter',
                      '/experimenter?token=guessed'):
@@ -210,7 +210,7 @@ async def test_other_sites_names_and_tokens(tmp_path: Path) -> None:
                 await running.http.ws_connect(f'{running.root}/ws/participant', headers=headers)
         async with running.http.get(f'{running.root}/static/study/desk/page/desk.css') as answer:
             assert answer.status == 403
-        # The experimenter needs no other token than that of the own link.
+        # The experimenter needs no token but that of the own link.
         await (await running.direct()).close()
         async with running.http.get(running.participant) as answer:
             assert answer.status == 200

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the desk's pages may say, and what pages and words of a study become."""
+"""Messages that the desk's pages may send, and a study's pages and texts in its documents."""
 
 import json
 from pathlib import Path

@@ -7,14 +7,14 @@ import pytest
 
 
 class Clocks:
-    """Two clocks, one of which stands while the machine sleeps."""
+    """Two clocks, one of which stops while the machine sleeps."""
 
     def __init__(self) -> None:
         self.steady_s = 100.0
         self.boot_s = 130.0
 
     def pass_s(self, seconds: float, asleep: bool = False) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self.boot_s += seconds
         self.steady_s += 0.0 if asleep else seconds
 

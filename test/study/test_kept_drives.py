@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What people drive in is kept with the study, and may not change under it."""
+"""Files of the drives are kept with the study and may not change during it."""
 
 import os
 from pathlib import Path
@@ -17,7 +17,7 @@ import yaml
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """Write a study with all that it may name beside it."""
+    """Write a study together with all files that it may name."""
     base = tmp_path / 'mine'
     base.mkdir()
     for name in ('cut_in.yaml', 'cut_in.keys.yaml', 'ZAM_CutIn-1_1_T-1.xml'):
@@ -36,7 +36,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def keep(file: Path, root: Path) -> None:
-    """Begin a session, as far as files are concerned."""
+    """Create the files of a new session."""
     study = load_study(file)
     StudyFolder(root).keep_study(study, file, pictures_of(study))
 
@@ -50,14 +50,14 @@ def test_all_files_are_kept_to_the_byte(file: Path, tmp_path: Path) -> None:
         assert kept[name] == (file.parent / name).read_bytes()
     drives = yaml.safe_load(kept['drives.json'])
     assert list(drives) == ['main: practice', 'main: clear', 'main: noisy']
-    # A game is not its file alone: what it names is there, too.
+    # The files that a game names belong to it too.
     script = (file.parent / 'cut_in.keys.yaml').read_bytes()
     scenario = (file.parent / 'ZAM_CutIn-1_1_T-1.xml').read_bytes()
     contents = list(kept.values())
     assert scenario in contents
     assert drives['main: noisy']['avs'][0]['perception']['localisation']['position_noise'] == 0.5
     assert str(file.parent) not in kept['drives.json'].decode()
-    # The participant's seat has a person instead of the script.
+    # A person drives in the participant's seat instead of the script.
     assert script not in contents and drives['main: clear']['humans'][0]['driver'] == 'cockpit'
     before = {path: os.stat(path).st_mtime_ns for path in (root / 'study').rglob('*')}
     keep(file, root)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Sessions go on where they were, whatever ended them: nothing is lost, nothing comes twice."""
+"""An ended session resumes at its place: no item is lost or repeated."""
 
 from collections.abc import Iterator
 import json
@@ -58,7 +58,7 @@ def open_session(folder: Path | str, place: int = 0, **changed: Any) -> Particip
 
 
 def do_next(session: ParticipantSession) -> str:
-    """Do the next item as a participant would; give its id."""
+    """Complete the next item as a participant; return its id."""
     item = session.next_item
     assert item is not None
     if isinstance(item.what, PracticeDrives):
@@ -162,7 +162,7 @@ def test_with_a_trial_come_its_questions_again(session: ParticipantSession) -> N
         pass
     session.repeat('main/1', 'the telephone rang')
     assert [do_next(session) for _ in range(3)] == ['main/1', 'main/1/after/1', 'main/2/break']
-    # One that was not asked yet is asked once.
+    # A question that was not asked yet is asked once.
     do_next(session)
     session.repeat('main/3', 'again')
     assert [do_next(session) for _ in range(3)] == ['main/3', 'main/3/after/1', 'main/4']

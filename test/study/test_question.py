@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is an answer to a question, and that it stays as it was."""
+"""Valid answers to questions are accepted and stored unchanged."""
 
 from typing import Any
 

@@ -15,12 +15,12 @@ import pytest
 
 RATINGS = {'mental': 70, 'physical': 10, 'temporal': 55, 'performance': 25, 'effort': 60,
            'frustration': 40}
-# Who wins each comparison: mental 5, temporal 3, effort 4, frustration 2, performance 1.
+# Comparisons won: mental 5, temporal 3, effort 4, frustration 2, performance 1.
 RANKS = ('mental', 'effort', 'temporal', 'frustration', 'performance', 'physical')
 
 
 def weighted() -> dict[str, object]:
-    """Answer the weighted index: of each pair the item that ranks higher."""
+    """Answer the weighted index: choose the item of each pair that ranks higher."""
     answers: dict[str, object] = dict(RATINGS)
     for question in load_questionnaire('nasa_tlx').questions:
         if '_or_' in question.name:
@@ -56,7 +56,7 @@ def test_simulator_sickness() -> None:
     worst = ssq.score(dict.fromkeys(names, 4))
     assert list(worst.values()) == pytest.approx([200.34, 159.18, 292.32, 235.62])
     assert set(ssq.score(dict.fromkeys(names, 1)).values()) == {0.0}
-    # Nausea alone, slight: it counts for nausea and for disorientation.
+    # Slight nausea alone counts for nausea and for disorientation.
     one = ssq.score(dict.fromkeys(names, 1) | {'nausea': 2})
     assert list(one.values()) == pytest.approx([9.54, 0.0, 13.92, 2 * 3.74])
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Mistakes of a study are found before anybody sits down."""
+"""Mistakes of a study are found before a session begins."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ PLAIN: dict[str, Any] = {
 
 
 def study_of(folder: Path, **changed: Any) -> StudyFile:
-    """Make a study that differs from the plain one."""
+    """Make a study with changes to the plain one."""
     return read(StudyFile, PLAIN | changed, 'study', folder)
 
 
@@ -45,7 +45,7 @@ def test_the_example_is_written_checked_and_planned(
     assert main(['study', 'new', str(folder)]) == 2
     study = load_study(folder / 'study.yaml')
     length = length_of(study)
-    # Eight drives and three of practice of 20 s; a break of 2 min among everything else.
+    # Eight drives and three practice drives of 20 s each; a break of 2 min and all other items.
     assert length.driving_s == 11 * 20.0 and length.else_s > 120.0
 
 
@@ -59,7 +59,7 @@ def test_settings_cascade(tmp_path: Path) -> None:
     a, b = (condition.settings for condition in conditions_of(study, study.blocks[0]))
     assert (a.planner, a.options, a.seed, a.duration, a.map, a.view) == (
         'idm', {'v0': 9.0}, 4, 1.0, True, 'chase')
-    # Another planner does not take the options of the first.
+    # Another planner does not accept the first one's options.
     assert (b.planner, b.options, b.seed) == ('reactive', None, 3)
     assert conditions_of(study, study.blocks[1])[0].settings.duration == 2.0
     game = trial_game(a, 'idle')
@@ -100,7 +100,7 @@ def test_texts_that_a_language_lacks_are_told(tmp_path: Path) -> None:
 
 
 def test_a_scenario_alone_can_be_driven(tmp_path: Path) -> None:
-    """A level may name a CommonRoad file: alone, or as the road of a game."""
+    """A level may name a CommonRoad file, either alone or as the road of a game."""
     road = {'name': 'road', 'scenario': str(scenarios_directory() / 'ZAM_Merge-1_1_T-1.xml')}
     study = study_of(tmp_path, settings={'duration': 1}, factors=[{'name': 'scene', 'levels': [
         road, {'name': 'game', 'game': CUT_IN}]}], blocks=[{'name': 'main', 'practice': {}}])

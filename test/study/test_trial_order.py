@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Orders are balanced, and the same everywhere."""
+"""Orders are balanced and equal on every machine."""
 
 from collections import Counter
 from itertools import pairwise
@@ -51,13 +51,13 @@ def test_a_list_is_taken_in_turn() -> None:
 
 
 def test_another_process_orders_alike() -> None:
-    """Whatever its hash seed: nothing depends on the order of a set."""
+    """The order is the same for every hash seed, as no code depends on the order of a set."""
     code = ('from crgame_ros.study.trial_plan import order_of; '
             'print([order_of(kind, 7, 11, 5) for kind in ("random", "williams")])')
     told = {subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                            env={'PYTHONHASHSEED': seed, 'PYTHONPATH': ':'.join(sys.path)}).stdout
             for seed in ('1', '2')}
-    # Written down once: another machine or Python must give them, too.
+    # Recorded values: another machine or Python version must give them too.
     assert told == {f'{[order_of(kind, 7, 11, 5) for kind in ("random", "williams")]}\n'}
     assert order_of('random', 7, 11, 5) == [0, 6, 4, 5, 3, 1, 2]
 
@@ -74,7 +74,7 @@ def test_each_drive_may_have_a_seed_of_its_own() -> None:
     seeds = [[trial.condition.settings.seed for trial in plan_trials(study, place)
               if trial.condition.name == 'x'] for place in range(4)]
     assert len({seed for row in seeds for seed in row}) == 12
-    # As another machine has drawn them for its first six drives.
+    # Drawn by another machine for its first six drives.
     drawn = [1240283022, 212378984, 1781601113, 391212979, 1356494655, 1019340412]
     assert seeds[0] == [drawn[trial.number - 1] for trial in plan_trials(study, 0)
                         if trial.condition.name == 'x']

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a trial's row says of its tasks."""
+"""The columns for tasks in a trial's row."""
 
 from crgame_ros.analysis.tables.tasks import DETECTION_SCORES, TAKE_OVER_REQUESTS
 from crgame_ros.study.data.trials_table import TASK_COLUMNS, task_values

@@ -102,7 +102,7 @@ def test_the_countries_are_codes() -> None:
 
 
 def test_a_mirrored_scene_is_driven_as_the_mirror_image(maps: Path) -> None:
-    """Three on unsigned roads meet: one turns across, one comes towards it, one from the side."""
+    """Three meet on unsigned roads: one turns across, one is oncoming, one is from the side."""
     original = load_scenario(maps / 'ZAM_Intersection-1_1_T-1.xml').scenario
     found = []
     for flip in (1.0, -1.0):

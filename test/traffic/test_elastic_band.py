@@ -32,7 +32,7 @@ def one_lane(band: ElasticBand, found: Obstacles, left: float = 5.25, right: flo
 
 
 def least_distance(bands: Bands, found: Obstacles, step: float = 1.0) -> float:
-    """Move a car's box along the reference of lane 0 and measure its distance to the boxes."""
+    """Move a car's box along the reference of lane 0; return its least distance to the boxes."""
     others = [box(s - length, d - width, s + length, d + width)
               for lane, s, d, length, width in zip(*found, strict=True) if lane == 0]
     car = box(-0.5 * LENGTH, -0.5 * WIDTH, 0.5 * LENGTH, 0.5 * WIDTH)
@@ -153,7 +153,7 @@ def test_the_nearer_side_is_taken_then_the_one_with_more_room(
 
 @pytest.mark.slow
 def test_the_band_has_the_least_energy() -> None:
-    """scipy solves the bounded least squares min |d - m^2 d''|, low <= d <= high, equally."""
+    """Scipy solves the bounded least squares min |d - m^2 d''|, low <= d <= high, equally."""
     rng = np.random.default_rng(7)
     n = 160
     for _ in range(12):

@@ -33,7 +33,7 @@ def random_changes(count: int) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def test_coefficients_solve_the_six_conditions() -> None:
-    """numpy solves the 6 x 6 system for y, y', y'' at 0 and at L to the same coefficients."""
+    """Numpy solves the 6 x 6 system for y, y', y'' at 0 and at L to the same coefficients."""
     offset, slope, curvature, target, length = random_changes(50)
     got = quintic(offset, slope, curvature, target, length)
     for i, big_l in enumerate(length):

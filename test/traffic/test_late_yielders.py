@@ -63,9 +63,8 @@ def test_an_av_with_the_right_of_way_meets_them(shared_scenarios: Path) -> None:
     """
     A recorded car comes to a real junction which the AV crosses first, having the right of way.
 
-    It yields to the AV in both cases. As a late yielder it brakes 2.7 times as hard and is 0.9 m/s
-    faster
-    halfway. Without the AV it just drives.
+    It yields to the AV in both cases. As a late yielder it brakes 2.7 times as hard and is
+    0.9 m/s faster halfway. Without the AV it drives on.
     """
     def speeds(**given: Any) -> NDArray[np.float64]:
         spec = TrafficSpec(recorded='reactive', late_yielders=given.pop('share'))

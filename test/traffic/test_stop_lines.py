@@ -181,8 +181,8 @@ def test_the_names_of_the_file_go_before_the_geometry() -> None:
 
 
 @pytest.mark.parametrize(('own', 'waits'), [
-    # Beside a light for everybody that is red from 30 to 100: an arrow that is green (or has no
-    # more to say) meanwhile frees nobody, but for one who could otherwise never go.
+    # The light for all movements is red from 30 to 100. An arrow that is green or inactive
+    # meanwhile frees no agent, except one that could otherwise never go.
     (((TrafficLightState.GREEN, 60), (TrafficLightState.INACTIVE, 40)), True),
     (((TrafficLightState.RED, 20), (TrafficLightState.GREEN, 80)), True),
     (((TrafficLightState.RED, 40), (TrafficLightState.GREEN, 60)), False)], ids=str)

@@ -73,7 +73,7 @@ def test_an_agent_stops_behind_a_standing_human() -> None:
     run = support.Run(one_lane(), TrafficSpec(), 0, [human], follower(20.0, 13.0)).ticks(400)
     poses, speeds = run.series(0)
     assert speeds[-1] == 0.0
-    # Behind the human's bumper with the standstill gap of 2 m, and what it no longer creeps.
+    # Behind the human's bumper with the standstill gap of 2 m, plus a rest that it does not creep.
     gap = 200.0 - 2.25 - (poses[-1, 0] + 2.25)
     assert 1.5 < gap < 2.6
     assert np.diff(speeds).min() > -0.4

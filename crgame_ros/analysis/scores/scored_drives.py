@@ -2,18 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores only the drives of a run: nuPlan's score and plans, without CommonRoad's checker."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
+from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.nuplan import Expert, NuplanScore, NuplanScorer
 from crgame_ros.analysis.scores.plan_record import PlanRecord
-from crgame_ros.analysis.scores.run_expert import recorded_expert
 from crgame_ros.analysis.scores.scored_drive import drive_of
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.vehicle import VehicleScores
-from crgame_ros.errors import InputError
+from crgame_ros.errors import CrgameError, InputError, one_line
 from crgame_ros.game.objects import Role
+from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import parse_scenario
+import numpy as np
+from shapely.errors import GEOSException
 
 
 def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
@@ -81,3 +86,77 @@ class _Drives:
             return self._nuplan.score(drive_of(log, number), expert, problem), ()
         except InputError as error:
             return None, (f'no nuPlan score: {error}',)
+
+
+class RunScores(NamedTuple):
+    """
+    The scores of a run.
+
+    :param vehicles: scores of each driven vehicle, in the log's order; empty without scores.
+    :param refusal: why there are no scores; empty otherwise.
+    """
+
+    vehicles: tuple[VehicleScores, ...] = ()
+    refusal: str = ''
+
+
+def scores_of(record: RunRecord, plans: Mapping[str, PlanRecord], *, drives_only: bool = False,
+              progress: Callable[[float], object] = lambda _: None) -> RunScores:
+    """
+    Score a run as `crgame score` does.
+
+    :param plans: plan records by AV, as far as known.
+    :param drives_only: whether to leave out CommonRoad's tools, which take most of the time.
+    :param progress: called with the share done so far, 0 to 1.
+    """
+    try:
+        if drives_only:
+            return RunScores(score_drives(record.log, plans=plans, put_back=record.put_back))
+        # The checker takes a second to import.
+        from crgame_ros.analysis.scores.scored_run import score_run
+        return RunScores(score_run(record, plans=plans, progress=progress).vehicles)
+    except (CrgameError, ValueError, GEOSException) as error:
+        # States from another publisher may have no outlines, and cannot be exported.
+        return RunScores((), one_line(str(error)))
+
+
+def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> Expert:
+    """
+    Return the expert from a run: its first human, or else its first vehicle.
+
+    :param expert: the expert's run.
+    :param log: the run that is scored; the expert's poses are cut and padded to its steps.
+    :param name: name of the expert's run, for people.
+    :raises InputError: if the expert's run has no driven vehicle, or another scenario or times.
+    """
+    if not expert.vehicles:
+        raise InputError('it has no driven vehicle', name, 'give a run with a human')
+    if expert.game.scheduler.time_step_s != log.game.scheduler.time_step_s:
+        raise InputError('its time steps are not as long as those of the run', name,
+                         'give a run of the same scenario')
+    item = expert.vehicles[0]
+    centers = shifted(expert.vehicle_states[:, 0, :3], item.rear_to_center)
+    rows = np.arange(len(log.ks)) + int(log.ks[0] - expert.ks[0])
+    poses = np.full((max(0, min(len(rows), len(expert.ks) - int(rows[0]))), 3), np.nan)
+    known = rows[:len(poses)] >= 0
+    poses[known] = centers[rows[:len(poses)][known]]
+    if not np.isfinite(poses).any():
+        raise InputError('it drove at other times', name, 'give a run of the same scenario')
+    return Expert(f'{item.id} of {name}', poses)
+
+
+def recorded_expert(scored: ScoredScenario, problem: PlanningProblem | None,
+                    first_k: int, steps: int) -> Expert | None:
+    """
+    Return the recorded obstacle that a planning problem replaced; None where there is none.
+
+    :param first_k: time step at which the drive begins.
+    :param steps: number of its steps.
+    """
+    obstacle = None if problem is None else scored.own.get(problem.planning_problem_id)
+    if obstacle is None:
+        return None
+    course = scored.course(obstacle)[first_k:first_k + steps]
+    if not np.isfinite(course).any():
+        return None
+    return Expert(f'recorded obstacle {obstacle}', course)

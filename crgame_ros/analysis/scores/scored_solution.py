@@ -18,8 +18,8 @@ from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.nuplan import NuplanScore, NuplanScorer
 from crgame_ros.analysis.scores.plan_record import find_goal
 from crgame_ros.analysis.scores.planner import PlannerScores, REMARKS
-from crgame_ros.analysis.scores.run_expert import recorded_expert
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
+from crgame_ros.analysis.scores.scored_drives import recorded_expert
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.solution_judge import poses_of, SolutionJudge, speeds_of
 from crgame_ros.analysis.scores.trajectory_feasibility import check_feasibility, simulated

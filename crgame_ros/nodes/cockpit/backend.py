@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 from crgame_ros.cockpit.client import Client, Sound
 from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.seen_view import SeenView
+from crgame_ros.cockpit.page_messages import SeenView
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.task_documents import PageTimes, TaskReport
 from crgame_ros.nodes.cockpit.feed import CockpitFeed

@@ -2,23 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report section on conditions: means with intervals, and a plot of each measure."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.report.text import free, note, number, plain, table
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER
-from crgame_ros.study.data.condition_means import (
-    condition_means,
-    ConditionMean,
-    ConditionMeans,
-    participant_means,
-)
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS
 from crgame_ros.study.trial_plan import conditions_of
 import numpy as np
+from numpy.typing import NDArray
 
+LEVEL = 0.95
 # Sizes of the plot, which is scaled as a whole [px].
 WIDTH, _PLOT, _TOP, _BOTTOM, _LEFT = 420, 170, 10, 22, 52
 # Height of a text line, and width of a character [px].
@@ -26,6 +23,123 @@ _LINE, _CHARACTER = 17, 8.3
 # Points of equal height are drawn side by side up to this distance from the middle [px].
 _SPREAD, _NEAR = 26.0, 7.0
 _LONGEST_NAME = 60
+# The driving measures that are shown, by their names in the table of vehicles; the others are
+# only in the tables.
+SHOWN = ('mean_speed', 'max_speed', 'min_acceleration', 'worst_ttc', 'worst_thw',
+         'worst_min_distance', 'worst_drac', 'worst_pet_s', 'tet_s', 'drive_sdlp',
+         'drive_lane_changes', 'drive_srr_visual', 'drive_tlc_min', 'drive_time_above_limit',
+         'drive_jerk_sd', 'drive_throttle_mean', 'drive_brake_mean', 'score_comfort')
+_SCORES, _DRIVING, _TASKS = 'Questionnaires', 'Driving', 'Tasks'
+
+
+@dataclass(frozen=True)
+class ConditionMean:
+    """
+    A condition's mean over participants.
+
+    :param condition: its name.
+    :param mean: of the participants' means.
+    :param half: half of the interval's width; NaN without an interval.
+    :param points: the participants' means, by their ids.
+    """
+
+    condition: str
+    mean: float
+    half: float
+    points: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ConditionMeans:
+    """
+    The means of all conditions.
+
+    :param conditions: in the order of the study.
+    :param within: whether the intervals are within participants; otherwise each is computed from
+        its own participants alone.
+    :param used: ids of the participants of intervals within participants.
+    """
+
+    conditions: tuple[ConditionMean, ...]
+    within: bool
+    used: tuple[str, ...]
+
+
+def condition_means(values: Mapping[tuple[str, str], float],
+                    conditions: Sequence[str]) -> ConditionMeans:
+    """
+    Compute the means of conditions over participants, with 95 % intervals.
+
+    If two or more participants have a value in each condition, means and intervals use only these
+    participants. The intervals are Cousineau's (2005) with Morey's (2008) correction: the values
+    less the participant's mean plus the grand mean, variances times C / (C - 1). Otherwise they
+    are Student's intervals of each condition by itself.
+
+    :param values: of participants in conditions; NaN and infinite ones count as missing.
+    :param conditions: in their order.
+    """
+    people = sorted({person for person, _ in values})
+    table = np.array([[values.get((person, condition), math.nan) for condition in conditions]
+                      for person in people], dtype=np.float64).reshape(len(people),
+                                                                       len(conditions))
+    table[~np.isfinite(table)] = math.nan
+    whole = np.asarray(~np.isnan(table).any(axis=1))
+    within = len(conditions) > 1 and int(whole.sum()) >= 2
+    used = tuple(person for person, has in zip(people, whole.tolist(), strict=True) if has) \
+        if within else ()
+    halves = within_halves(table[whole]) if within else [
+        _half(column[~np.isnan(column)]) for column in table.T]
+    return ConditionMeans(tuple(ConditionMean(
+        condition, _mean(table[whole, place] if within else table[:, place]), float(half),
+        {person: float(value) for person, value in zip(people, table[:, place], strict=True)
+         if not math.isnan(value)})
+        for place, (condition, half) in enumerate(zip(conditions, halves, strict=True))),
+        within, used)
+
+
+def within_halves(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Return the half widths of the 95 % intervals within participants.
+
+    :param table: (N, C) of N >= 2 participants in C >= 2 conditions, without gaps.
+    :return: (C)
+    """
+    people, conditions = table.shape
+    normed = table - table.mean(axis=1, keepdims=True) + table.mean()
+    variances = normed.var(axis=0, ddof=1) * conditions / (conditions - 1)
+    return np.asarray(_t(people - 1) * np.sqrt(variances / people))
+
+
+def participant_means(rows: Iterable[Mapping[str, Any]],
+                      column: str) -> dict[tuple[str, str], float]:
+    """
+    Compute the mean of a column for each participant in each condition, over repetitions.
+
+    :param rows: of the table of trials; missing and infinite values are left out.
+    """
+    found: dict[tuple[str, str], list[float]] = {}
+    for row in rows:
+        value = row.get(column)
+        if value is not None and math.isfinite(value):
+            found.setdefault((row['participant'], row['condition']), []).append(float(value))
+    return {key: sum(values) / len(values) for key, values in found.items()}
+
+
+def _half(values: NDArray[np.float64]) -> float:
+    count = len(values)
+    return math.nan if count < 2 else float(
+        _t(count - 1) * values.std(ddof=1) / math.sqrt(count))
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _t(freedom: int) -> float:
+    # A slow import.
+    from scipy.stats import t
+    return float(t.ppf(0.5 + LEVEL / 2.0, freedom))
 
 
 def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) -> str:
@@ -57,7 +171,7 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
                      f'<title>{plain(each.condition)}</title>{spans}</text>')
         marks += _points(each, middle, wide, y)
         if not math.isnan(each.mean):
-            marks.append(_mean(each, middle + min(0.32 * wide, 40.0), y))
+            marks.append(_mean_mark(each, middle + min(0.32 * wide, 40.0), y))
     told = '; '.join(f'{each.condition}: mean {number(each.mean, digits)}' + (
         '' if math.isnan(each.half) else f' ± {number(each.half, digits)}')
         for each in conditions)
@@ -83,7 +197,7 @@ def _points(each: ConditionMean, middle: float, wide: float,
     return marks
 
 
-def _mean(each: ConditionMean, x: float, y: Callable[[float], float]) -> str:
+def _mean_mark(each: ConditionMean, x: float, y: Callable[[float], float]) -> str:
     height = y(each.mean)
     bar = '' if math.isnan(each.half) else (
         f'<line class="mean" x1="{x:.1f}" x2="{x:.1f}" '
@@ -107,15 +221,6 @@ def _ticks(numbers: Sequence[float]) -> list[float]:
         low, high = low - margin, high + margin
     ticks = MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     return [float(np.format_float_positional(tick, 12)) + 0.0 for tick in ticks]
-
-
-# The driving measures that are shown, by their names in the table of vehicles; the others are
-# only in the tables.
-SHOWN = ('mean_speed', 'max_speed', 'min_acceleration', 'worst_ttc', 'worst_thw',
-         'worst_min_distance', 'worst_drac', 'worst_pet_s', 'tet_s', 'drive_sdlp',
-         'drive_lane_changes', 'drive_srr_visual', 'drive_tlc_min', 'drive_time_above_limit',
-         'drive_jerk_sd', 'drive_throttle_mean', 'drive_brake_mean', 'score_comfort')
-_SCORES, _DRIVING, _TASKS = 'Questionnaires', 'Driving', 'Tasks'
 
 
 class ShownMeasure(NamedTuple):
