@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How often each planner answers with a plan of its own, in our games and published scenarios.
+The share of a planner's own plans in its answers, in our games and published scenarios.
 
 Each run is exported as well, and each contact of an AV is named with its part in it.
 """

@@ -23,7 +23,7 @@ def _sleep(period_s: float, listening: 'Synchronized[int]', worst: 'Synchronized
 
 
 class BareLoop:
-    """Runs beside what is measured and keeps the worst stall while asked to listen."""
+    """Runs beside the measured program and keeps the worst stall while asked to listen."""
 
     def __init__(self, period_s: float) -> None:
         context = multiprocessing.get_context('fork')
@@ -36,7 +36,7 @@ class BareLoop:
         self._process.start()
 
     def listen(self, on: bool) -> None:
-        """Count stalls from now on, or no longer."""
+        """Start or stop counting stalls."""
         self._listening.value = int(on)
 
     @property

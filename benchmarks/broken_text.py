@@ -15,7 +15,7 @@ VALUES: tuple[Any, ...] = (
     2 ** 64, -2 ** 63, 10 ** 30, '', ' ', 'abc', 'é\u200bx', '../../x', '/dev/zero', '/',
     'x' * 5000, True, False, None, [], {}, [[]], [1, 2], {'a': 1}, 'a:b', 'nan', '1e3',
     '2026-01-01')
-# Written as they are: no dumper would write them.
+# These are written literally: no dumper would write them.
 TEXTS = (
     '2026-13-45', '2026-01-01', '!!python/object/apply:os.getcwd []', '!!binary aGk=',
     '!!set {a, b}', '!!timestamp 2026-01-01', '!!int abc', '!!float []', '"\\ud800"', '"\\0"',
@@ -26,14 +26,14 @@ TEXTS = (
 
 
 def broken_yaml(text: bytes, dice: random.Random) -> tuple[bytes, str]:
-    """Break a YAML file; what was done is given too."""
+    """Break a YAML file; return the change, too."""
     if dice.random() < 0.15:
         return broken_bytes(text, dice)
     document = yaml.safe_load(text)
     done = [dice.choice((_value, _value, _value, _text, _text, _delete, _double, _rename, _swap))(
         document, dice) for _ in range(dice.choice((1, 1, 2)))]
     data = yaml.safe_dump(document, sort_keys=False, allow_unicode=True).encode('utf-8')
-    # A placeholder stands for text that is to be there as it is.
+    # A placeholder stands for text that is inserted literally.
     for place, raw in enumerate(TEXTS):
         data = data.replace(f'RAW{place}WAR'.encode(), raw.encode())
     return data, ' and '.join(done)

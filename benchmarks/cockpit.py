@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The cockpit in a real browser: key to odometry, key to picture, script time, and what it costs.
+The cockpit in a real browser: key to odometry, key to picture, script time, and its costs.
 
 Needs Debian's chromium and chromium-driver. Keys go through the browser's input pipeline, times
 are those of the key event in the page, of the odometry's arrival at another process, and of the
@@ -78,7 +78,7 @@ class Listener:
 
 
 def timing_block(folder: Path, seconds: float, watched: bool) -> dict[str, Any]:
-    """Run the game once, with viewers or without a cockpit; give its timing report."""
+    """Run the game once, with viewers or without a cockpit; return its timing report."""
     game = str(scenarios_directory() / 'cut_in.yaml')
     graph = LiveGraph(folder, [game, '--duration', '100000', '--port', str(free_port())],
                       headless=not watched)
@@ -90,7 +90,7 @@ def timing_block(folder: Path, seconds: float, watched: bool) -> dict[str, Any]:
             closers += [Listener(page, reads).close for reads in (True, False)]
         control = RemoteControl()
         control.wait_until_running()
-        # What was measured while everything started is left to the bag before the reset.
+        # Values from the start-up are left to the bag before the reset.
         time.sleep(2.0)
         control.call('reset')
         control.deafen()

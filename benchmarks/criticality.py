@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What criticality costs at a scenario step, by scenario: median, 99 % and worst.
+The cost of criticality at a scenario step, by scenario: median, 99 % and worst.
 
     python benchmarks/criticality.py [SCENARIO.xml …]
 
-Without a file it is the game with dense traffic. CPU time of one process, and what is left of it
-to profile with --profile.
+Without a file it is the game with dense traffic. CPU time of one process; a profile with
+--profile.
 """
 
 import argparse
@@ -28,7 +28,7 @@ ROUNDS = 3
 
 
 def measure(result: OfflineResult) -> tuple[list[float], list[int], int]:
-    """Observe a run; give each tick's time [s], how many pairs it had, and the vehicles."""
+    """Observe a run; return each tick's time [s], its number of pairs, and the vehicles."""
     criticality = Criticality(observed_run(result.setup))
     per_tick, times_s, pairs = result.setup.scheduler.steps_per_tick, [], []
     for k, (poses, velocities) in enumerate(zip(

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The 100 Hz loop beside 50 agents, perception and a browser: its step error, and why it was late.
+The 100 Hz loop beside 50 agents, perception and a browser: step error, and causes of lateness.
 
-A bare sleeping loop beside it tells what the host itself does to a deadline. `--seconds 7200` is
+A bare sleeping loop beside it measures the host's own effect on deadlines. `--seconds 7200` is
 the long one: no reset that the host does not explain. Needs Debian's chromium and chromium-driver.
 """
 
@@ -18,7 +18,7 @@ from crgame_ros.paths import scenarios_directory
 from live_graph import LiveGraph
 from timing import print_late_steps
 
-# The human's script is that of half a minute: for longer nobody drives.
+# The human's script is that of half a minute: afterwards there is no driver.
 GAME = """
 scenario: {scenarios}/ZAM_DenseMerge-1_1_T-1.xml
 duration: 1000000

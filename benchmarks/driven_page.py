@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A graph, a browser that looks at its page, and somebody who drives there: for benchmarks."""
+"""A graph, a browser that shows its page, and a driver at the page: for benchmarks."""
 
 from collections.abc import Sequence
 import json
@@ -36,7 +36,7 @@ KEYS = {1.0: ('KeyA', 'a', 65), -1.0: ('KeyD', 'd', 68)}
 
 class Browser:
     """
-    A real Chromium that looks at the page.
+    A real Chromium that shows the page.
 
     :param page: its address.
     """
@@ -52,7 +52,7 @@ class Browser:
         self.wait_for('return !!(window.crgame && crgame.store.scene && crgame.world.shown)')
 
     def wait_for(self, script: str, limit_s: float = 30.0) -> None:
-        """Wait until a script gives something true."""
+        """Wait until a script returns a true value."""
         until_s = time.monotonic() + limit_s
         while not self.driver.execute_script(script):
             if time.monotonic() > until_s:
@@ -60,7 +60,7 @@ class Browser:
             time.sleep(0.05)
 
     def drive(self, seat: str) -> None:
-        """Take a seat."""
+        """Claim a seat."""
         self.driver.execute_script(
             f"crgame.connection.request({{type: 'claim', seat: '{seat}'}})")
         self.wait_for(f"return crgame.store.seats.seats?.{seat}?.source === 'cockpit'"
@@ -120,7 +120,7 @@ class DrivenPage:
 
     @property
     def browser(self) -> Browser:
-        """Return the browser that looks at the page."""
+        """Return the browser that shows the page."""
         assert self._browser is not None
         return self._browser
 
@@ -136,7 +136,7 @@ class DrivenPage:
         self.browser.driver.execute_script(logger)
 
     def measure_keys(self, trials: int) -> tuple[list[float], list[float]]:
-        """Press steering keys; give latencies to odometry and to the picture [ms]."""
+        """Press steering keys; return latencies to odometry and to the picture [ms]."""
         if self._probe is None:
             self._probe = OdometryProbe()
             self._probe.listen(1.0)
@@ -145,7 +145,7 @@ class DrivenPage:
         return press_keys(self.browser, self._probe, trials, offset_s)
 
     def stop(self) -> dict[str, Any]:
-        """Close the browser, end the graph in good order; give the last run's timing report."""
+        """Close the browser, end the graph in good order; return the last run's timing report."""
         self.browser.close()
         self._browser = None
         self._graph.stop()
@@ -165,7 +165,7 @@ class DrivenPage:
 
 def press_keys(browser: Browser, probe: OdometryProbe, trials: int,
                offset_s: float) -> tuple[list[float], list[float]]:
-    """Press steering keys at random times; give latencies to odometry and to the picture [ms]."""
+    """Press steering keys at random times; return latencies to odometry and picture [ms]."""
     draw = random.Random(7)
     odometry, picture = [], []
     for trial in range(trials):
@@ -197,7 +197,7 @@ def report(name: str, values: Sequence[float], wanted: str) -> None:
 
 
 def free_port() -> int:
-    """Find a port that nobody uses now."""
+    """Find a port that is free now."""
     with socket.socket() as probe:
         probe.bind(('127.0.0.1', 0))
         return int(probe.getsockname()[1])

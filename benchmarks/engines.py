@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What FastSim's engines cost the live loop: the same game without them and with them, in turns.
+The cost of FastSim's engines in the live loop: a game without and with them, in turns.
 
 With them its AV perceives, tracks its plan by the estimated pose, and so many agents react.
 """
@@ -47,9 +47,9 @@ def write_game(name: str, agents: int, folder: Path) -> Path:
 
 
 def run(game: Path, duration_s: float, folder: Path) -> dict[str, Any]:
-    """Run a game live; give its timing with the number of late ticks, and what nodes report."""
+    """Run a game live; return its timing with the number of late ticks, and the nodes' reports."""
     graph = LiveGraph(folder, [str(game), '--duration', str(duration_s)])
-    # Between a fourth and three fourths of the run everybody has started and nobody has ended.
+    # Between a fourth and three fourths of the run all nodes have started and none has ended.
     time.sleep(STARTING_S + 0.25 * duration_s)
     before = graph.cpu_seconds()
     time.sleep(0.5 * duration_s)

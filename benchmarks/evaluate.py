@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How many cells an hour: for one worker and two, Dask's share, and the client's memory."""
+"""Cells an hour for one worker and two, Dask's share, and the client's memory."""
 
 import argparse
 from pathlib import Path

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Kill and freeze every node of running games, and measure what that costs the others.
+Kill and freeze every node of running games, and measure the effect on the others.
 
     source scripts/env.sh
     $CRGAME_PYTHON benchmarks/faults.py [--games GAME.yaml …] [--faults kill freeze]
@@ -31,14 +31,14 @@ ROOT = Path(__file__).resolve().parents[1]
 GAMES = ('occluded_pedestrian', 'dense_merge', 'two_avs')
 # Quiet before a fault, how long it is watched at most, and how long a frozen node stands [s].
 QUIET_S, WATCHED_S, FROZEN_S = 3.0, 10.0, 3.0
-# Until what a kill has stirred up is quiet again.
+# Until the effects of a kill have ended.
 REST_S = 4.0
 NS = 1e-9
 
 
 class Ear:
     """
-    Listens to what the nodes of a graph say.
+    Listens to the messages of a graph's nodes.
 
     :param avs: ids of the AVs; humans likewise.
     :param page: address of the cockpit.
@@ -63,7 +63,7 @@ class Ear:
         self.first, self.page = humans[0], page
 
     def listen(self, seconds: float, done: Callable[[], bool] = lambda: False) -> None:
-        """Take what comes, for a time or until something holds."""
+        """Receive messages, for a time or until a condition holds."""
         until_s = time.time() + seconds
         while time.time() < until_s and not done():
             for key, slot in self._slots.items():
@@ -115,7 +115,7 @@ class Ear:
 
 
 def try_game(game: Path, faults: list[str], wanted: list[str]) -> Iterator[tuple[str, ...]]:
-    """Try every fault on every node of a game; give a row of the table for each."""
+    """Try every fault on every node of a game; return a row of the table for each."""
     with tempfile.TemporaryDirectory() as name:
         graph = LiveGraph(Path(name) / 'run', [str(game), '--duration', '3600'], headless=False)
         try:
@@ -131,7 +131,7 @@ def try_game(game: Path, faults: list[str], wanted: list[str]) -> Iterator[tuple
             ear.listen(QUIET_S)
             for node in nodes:
                 for fault in faults if not wanted or node in wanted else ():
-                    # Everybody where the game begins: at the end of a road there is nothing to do.
+                    # Put all vehicles at their start: at the end of a road there is nothing to do.
                     control.call('reset')
                     ear.listen(REST_S if fault == 'kill' else QUIET_S)
                     yield game.stem, node, *_strike(graph, ear, node, fault, avs)
@@ -171,7 +171,7 @@ def _strike(graph: LiveGraph, ear: Ear, node: str, fault: str, avs: list[str]) -
 
 
 def _lost(folder: Path) -> tuple[str, ...]:
-    """Sum up what the recordings of all runs of a graph have."""
+    """Sum up the contents of the recordings of all runs of a graph."""
     reports = [json.loads(path.read_text()) for path in folder.rglob('timing.json')]
     return ('', f'{sum(item["cycles"] for item in reports)} cycles recorded',
             f'{sum(item["gaps"] for item in reports)} missing', )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is broken and what is done with it: kinds of file, each with the commands that read it."""
+"""The trials of broken files: kinds of file, each with the commands that read it."""
 
 from collections.abc import Callable, Iterable
 import contextlib
@@ -34,7 +34,7 @@ Breaker = Callable[[bytes, random.Random], tuple[bytes, str]]
 
 
 class WrongResult(Exception):
-    """A broken file was taken for a good one and gave something else."""
+    """A broken file was accepted as a good one and gave another result."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Trial:
     :param share: of all cases.
     :param files: that are broken in turn, relative to the folder of a case, or anywhere.
     :param breaks: how.
-    :param reads: what reads the broken file, whose path it is given.
+    :param reads: function that reads the broken file; it gets the file's path.
     """
 
     share: float
@@ -80,7 +80,7 @@ def warm_up(folder: Path) -> None:
 
 
 def trials(folder: Path, published: Iterable[Path]) -> dict[str, Trial]:
-    """Return the kinds of file, of what `prepare` has made and of scenarios besides."""
+    """Return the kinds of file: those that `prepare` has made, and further scenarios."""
     scenarios = (*sorted(folder.glob('*.xml')), *published)
     timelines = sorted((*folder.glob('*.keys.yaml'), *folder.glob('*.joy.yaml')))
     games = sorted(path for path in folder.glob('*.yaml') if 'scenario:' in path.read_text())
@@ -117,7 +117,7 @@ def command(*words: object) -> None:
     :raises InputError: if the file is refused, with the only line that was printed.
     :raises WrongResult: if it ends in any other way than by success or refusal.
     """
-    # Not of the standard library: what cannot be encoded is to fail here as it does in a terminal.
+    # Not of the standard library: text that cannot be encoded must fail here as in a terminal.
     told = io.TextIOWrapper(io.BytesIO(), 'utf-8')
     complaints = io.TextIOWrapper(io.BytesIO(), 'utf-8', 'backslashreplace')
     with contextlib.redirect_stdout(told), contextlib.redirect_stderr(complaints):
@@ -197,7 +197,7 @@ def _roads(path: Path, dice: random.Random) -> None:
 
 
 def _bag(path: Path, dice: random.Random) -> None:
-    """Look into a recording, turn it into a scenario, finish it, and do both again."""
+    """Describe a recording, convert it to a scenario, finish it, and do both again."""
     bag = path.parent
     refusals = []
     conversion = ('convert', bag, '--out', bag.parent / 'converted.xml')
@@ -218,12 +218,12 @@ def _bag(path: Path, dice: random.Random) -> None:
 
 
 def _compare(log: RunTrajectories, sound: RunTrajectories) -> None:
-    """See that what was read of a broken recording is what was recorded."""
+    """Check that the data read from a broken recording is the recorded data."""
     rows = log.ks - sound.ks[0]
     if rows[0] < 0 or rows[-1] >= len(sound.ks):
         raise WrongResult(f'scenario steps {log.ks[0]} to {log.ks[-1]}')
     told = any('interpolated' in notice for notice in log.notices)
-    # What `recover` could not keep is bridged, and said to be: no result that looks like another.
+    # Data that `recover` could not keep is bridged, with a report: no result imitates another.
     for name in ('object_poses',) if told else ('vehicle_states', 'object_poses'):
         found, recorded = getattr(log, name), getattr(sound, name)[rows]
         if not np.allclose(found, recorded, atol=1e-6, equal_nan=True):

@@ -6,7 +6,7 @@ Steps per second of our environments beside highway-env: the tables of docs/gym.
     python benchmarks/gym.py [--environment DIR] [--steps N] [--write]
 
 One run, in turns, with as many vehicles, the same rates of decisions and of simulation, and an
-observation of the nearest eight vehicles. Processor time: what else runs on the machine doesn't
+observation of the nearest eight vehicles. Processor time: other load of the machine doesn't
 count. highway-env is installed into an environment of its own (made once).
 """
 
@@ -71,7 +71,7 @@ def asked(process: 'subprocess.Popen[str]', name: str, vehicles: int, decisions:
 def motorway(vehicles: int, rate: int) -> Game:
     """Return the game of a motorway with so many vehicles, the agent's among them."""
     game = load_game(scenarios_directory() / 'dense_merge.yaml')
-    # As many come as leave.
+    # The numbers of spawning and leaving vehicles are equal.
     return replace(game, humans=(), duration=20.0,
                    timing=replace(game.timing, rate=float(rate)),
                    traffic=TrafficSpec(agents=vehicles - 1, flow=2000.0,
@@ -79,7 +79,7 @@ def motorway(vehicles: int, rate: int) -> Game:
 
 
 class Ours:
-    """An environment, and how many vehicles were in it at its steps."""
+    """An environment, and its numbers of vehicles at its steps."""
 
     def __init__(self, game: Game) -> None:
         self.env = gymnasium.make(ANY_GAME, disable_env_checker=True, game=game, worlds=1)
@@ -101,14 +101,14 @@ class Ours:
 
 
 def beside(environment: Path, steps: int) -> list[str]:
-    """Measure both in turns; a table."""
+    """Measure both in turns; return a table."""
     lines = ['| vehicles | decisions, simulation [Hz] | ours [steps/s] | highway-v0 | '
              'highway-fast-v0 | ours to highway-v0 |', '|---|---|---|---|---|---|']
     process = theirs(environment)
     for vehicles, decisions, rate in CASES:
         ours = Ours(motorway(vehicles, rate))
         ours.step_s(20)
-        # The road may not hold as many: theirs is to have as many as ours.
+        # The road may not hold as many: theirs must have as many as ours.
         vehicles = round(statistics.mean(ours.vehicles))
         ways: list[Callable[[int], float]] = [ours.step_s, *(
             lambda count, name=name, vehicles=vehicles, decisions=decisions, rate=rate: asked(
@@ -127,7 +127,7 @@ def beside(environment: Path, steps: int) -> list[str]:
 
 
 def together(steps: int) -> list[str]:
-    """Measure games one after the other and together in one process; a table."""
+    """Measure games one after the other and together in one process; return a table."""
     lines = ['| 16 games in one process | one after the other [steps/s] | together [steps/s] | '
              'ratio |', '|---|---|---|---|']
     for name in ('cut_in', 'merge', 'dense_merge'):

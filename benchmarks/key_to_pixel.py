@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the page's sound costs: from a key to the picture, and processor time, with and without.
+The cost of the page's sound: from a key to the picture, and processor time, with and without.
 
 One graph and one browser; blocks with sound and without take turns, each a drive from the same
 start under full throttle. Times from key to picture are those of `cockpit.py`. Processor time is
@@ -22,7 +22,7 @@ SOUND = {'code': 'KeyM', 'key': 'm', 'windowsVirtualKeyCode': 77}
 
 
 def press(browser: Browser, kind: str, key: dict[str, object]) -> None:
-    """Press a key, or let it go, as a person does: it counts as a gesture."""
+    """Press or release a key, as a person does: it counts as a gesture."""
     browser.driver.execute_cdp_cmd('Input.dispatchKeyEvent', {'type': kind, **key})
 
 
@@ -38,7 +38,7 @@ class Blocks:
     """
     Drives from the same start, one after the other.
 
-    :param page: where somebody has a seat.
+    :param page: a page with a seat.
     :param trials: keys in each block.
     """
 
@@ -78,7 +78,7 @@ def main() -> None:
         page.sit_down(LOGGER)
         blocks = Blocks(page, values.trials)
         for number in range(values.rounds):
-            # Who goes first changes: neither has the warmer browser.
+            # The order changes: neither has the warmer browser.
             for sound in (number % 2 == 1, number % 2 == 0):
                 blocks.drive(sound)
     for sound in (False, True):

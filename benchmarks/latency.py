@@ -20,7 +20,7 @@ STEP_S = 0.01
 
 
 class InputProbe(OdometryProbe):
-    """Turns a wheel left and right through an external joy device and waits for the car to."""
+    """Turns a wheel left and right by an external joy device and waits until the car turns."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -29,7 +29,7 @@ class InputProbe(OdometryProbe):
         self._publisher = self.node.create_publisher(Joy, '/hv0/joy', 10)
 
     def turn(self, direction: float) -> float | None:
-        """Turn the wheel; give the time until the odometry of a step that turns with it [s]."""
+        """Turn the wheel; return the time until the odometry of a step that turns with it [s]."""
         # Axes of the generic gamepad: left stick first; triggers rest at 1.
         message = self._joy(axes=[direction, 0.0, 1.0, 0.0, 0.0, 1.0], buttons=[0] * 11)
         sent_s = time.time()

@@ -46,11 +46,11 @@ class LiveGraph:
 
     @property
     def running(self) -> bool:
-        """Whether the launcher has not ended."""
+        """Return whether the launcher still runs."""
         return self._process.poll() is None
 
     def node_pids(self) -> dict[str, int]:
-        """Return the process ids that the launcher has told, by node."""
+        """Return the process ids that the launcher has printed, by node."""
         text = self._log.read_text(encoding='utf-8', errors='replace')
         return {name: int(pid) for name, pid in re.findall(
             r'^(\S+): process (\d+)$', text, re.MULTILINE)}
@@ -67,7 +67,7 @@ class LiveGraph:
         return used
 
     def wait_for(self, pattern: str) -> str:
-        """Wait for a regular expression in what the launcher says; give its last group."""
+        """Wait for a regular expression in the launcher's output; return its last group."""
         until_s = time.monotonic() + START_LIMIT_S
         while time.monotonic() < until_s:
             text = self._log.read_text(encoding='utf-8', errors='replace')
@@ -81,7 +81,7 @@ class LiveGraph:
         return self.wait_for(r'the cockpit is at (http://\S+)')
 
     def wait(self) -> dict[str, Any]:
-        """Wait for the end of the run and give its timing report."""
+        """Wait for the end of the run and return its timing report."""
         code = self._process.wait()
         self._stream.close()
         if code != 0:
@@ -90,7 +90,7 @@ class LiveGraph:
         return report
 
     def stop(self) -> dict[str, Any]:
-        """End the run in good order and give its timing report."""
+        """End the run in good order and return its timing report."""
         self._process.send_signal(signal.SIGINT)
         return self.wait()
 
@@ -142,7 +142,7 @@ class RemoteControl:
         self._rclpy.spin_until_future_complete(self._node, future, timeout_sec=START_LIMIT_S)
 
     def deafen(self) -> None:
-        """Stop listening to the clock, so as not to load what is measured."""
+        """Stop listening to the clock, so as not to load the measured graph."""
         self._node.destroy_subscription(self._subscription)
 
     def close(self) -> None:

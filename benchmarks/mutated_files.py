@@ -51,7 +51,7 @@ file. All else is printed, counted in the table and makes the exit code 1."""
 @dataclass(frozen=True)
 class Outcome:
     """
-    What became of a case.
+    The result of a case.
 
     :param kind: one of `OUTCOMES`.
     :param detail: the message or traceback.

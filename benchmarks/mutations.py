@@ -19,7 +19,7 @@ OFFSETS = ((6.9e5, 5.5e6), (0.0, 5.5e6), (-1e8, 3e8))
 
 
 def mutate(text: bytes, dice: random.Random) -> tuple[bytes, str]:
-    """Break a scenario in one or two places; what was done is given too."""
+    """Break a scenario in one or two places; return the change, too."""
     if dice.random() < 0.01:
         end = dice.randrange(len(text))
         return text[:end], f'cut after {end} bytes'
@@ -33,7 +33,7 @@ def mutate(text: bytes, dice: random.Random) -> tuple[bytes, str]:
 
 
 def _pick(root: etree._Element, dice: random.Random) -> etree._Element:
-    """Choose an element: first a tag, for most elements are points."""
+    """Choose an element: first a tag, because most elements are points."""
     tags = sorted({str(node.tag) for node in root.iterdescendants()})
     return dice.choice(list(root.iter(dice.choice(tags))))
 

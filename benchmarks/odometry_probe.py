@@ -34,7 +34,7 @@ class OdometryProbe:
         self._rates[stamp.sec * 10**9 + stamp.nanosec] = message.velocity[0]
 
     def listen(self, seconds: float) -> None:
-        """Take what comes for a while, and forget it."""
+        """Receive messages for a while, and drop them."""
         until_s = time.monotonic() + seconds
         while time.monotonic() < until_s:
             self._executor.spin_once(timeout_sec=0.002)

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How fast the offline runner is: vehicle steps per second, the cut-in game, and cells of batches.
+The speed of the offline runner: vehicle steps per second, the cut-in game, and cells of batches.
 
-A cell is one run of a game from its file on: loading, placing everybody, the first step. It is
+A cell is one run of a game from its file on: loading, placing all vehicles, the first step. It is
 cold in a process that has run nothing yet, and warm where this scenario has been run before. CPU
 time of one process, all kinds in turns.
 """
@@ -43,12 +43,12 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def microseconds_per_call(work: Callable[[], object], rounds: int) -> list[float]:
-    """Time rounds of STEPS calls; give the microseconds a call for each round."""
+    """Time rounds of STEPS calls; return the microseconds a call for each round."""
     return [seconds(lambda: [work() for _ in range(STEPS)]) / STEPS * 1e6 for _ in range(rounds)]
 
 
 def start_cell() -> Setup:
-    """Start a cell: load game and scenario, place everybody, take the first step."""
+    """Start a cell: load game and scenario, place all vehicles, do the first step."""
     setup = build_setup(effective_game(RunRequest()))
     run_offline(setup, duration_s=setup.scheduler.dt_s)
     return setup

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What perception costs: scans of 4 sensors x 360 rays x 60 objects, a step, and a request."""
+"""The cost of perception: scans of 4 sensors x 360 rays x 60 objects, a step, and a request."""
 
 import argparse
 from collections.abc import Callable
@@ -31,7 +31,7 @@ CALLS = 50
 
 
 class Scene:
-    """An AV in a crowd within 50 m, kerbs on both sides, and slots that nobody fills."""
+    """An AV in a crowd within 50 m, kerbs on both sides, and empty slots."""
 
     def __init__(self) -> None:
         rng = np.random.default_rng(0)
@@ -98,7 +98,7 @@ class Scene:
 
 
 def microseconds(work: Callable[[int], Any], rounds: int) -> list[float]:
-    """Time rounds of CALLS calls; give the microseconds a call for each round."""
+    """Time rounds of CALLS calls; return the microseconds a call for each round."""
     times, call = [], 0
     for _ in range(rounds):
         start = time.perf_counter()

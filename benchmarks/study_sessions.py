@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A study of 4 participants × 8 trials in real browsers, with five kills -9, and what is in its data.
+A study of 4 participants × 8 trials in real browsers, with five kills -9, and a check of its data.
 
     python benchmarks/study_sessions.py --seed 1
 
 At random moments the participant's browser, the simulation, the launcher or the study itself is
 killed; each participant goes on with the same command. Then the tables are written, and every
-trial, answer and marker is looked for in them.
+trial, answer and marker must be in them.
 """
 
 import argparse
@@ -72,7 +72,7 @@ def conduct(session: StudySession, kills: list[tuple[float, str]], log: list[str
 
 
 def check(file: Path, out: Path, sessions: list[StudySession]) -> list[str]:
-    """Return what is wrong with the data; nothing should be."""
+    """Return the faults of the data; there should be none."""
     wrong: list[str] = []
     study = load_study(file)
     for place, session in enumerate(sessions):
@@ -138,7 +138,7 @@ def table(out: Path, name: str) -> list[dict[str, Any]]:
 
 
 def main() -> int:
-    """Run the study, kill, resume, and look at what came of it."""
+    """Run the study, kill, resume, and check the data."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--participants', type=int, default=4)
@@ -179,7 +179,7 @@ def main() -> int:
     print(f"markers and the run's clock when they were set [s]: median "
           f'{statistics.median(errors):.3f}, worst {max(errors):.3f} (wanted <= {MARKER_S})')
     late = [abs(late_s) for session in sessions for _, late_s in marker_errors(session)]
-    # That is how old a picture is.
+    # That is the age of a picture.
     print(f'markers and the clock that the page showed [s]: median {statistics.median(late):.3f}, '
           f'worst {max(late):.3f}')
     for text in wrong:

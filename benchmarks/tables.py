@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of a long run: how long they take, and how much memory."""
+"""The tables of a long run: their time and memory."""
 
 import argparse
 from collections.abc import Iterator, Sequence
@@ -64,7 +64,7 @@ def series(stamp_ns: int, names: Sequence[str], points: Sequence[Sequence[Rows]]
 
 class SyntheticRun:
     """
-    A run on our merging road in which everybody drives round and round, for as long as one likes.
+    A run of any length on our merging road in which all vehicles drive round and round.
 
     :param duration_s: of the run [s]
     :param objects: that drive beside the human and the AV.
@@ -101,7 +101,7 @@ class SyntheticRun:
         return states
 
     def messages(self) -> Iterator[tuple[str, str, int, bytes]]:
-        """Yield what the graph would have published: topic, type, log time and content."""
+        """Yield the messages as the graph would publish them: topic, type, log time, content."""
         setup, scheduler = self.setup, self.scheduler
         for topic, text in (
                 ('/scenario/xml', setup.loaded.xml_text),
@@ -166,7 +166,7 @@ class SyntheticRun:
 
 
 def main() -> int:
-    """Run the benchmark: 0 if it takes no longer and no more than is wanted."""
+    """Run the benchmark; return 0 if time and memory are within their limits."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--duration', type=float, default=1200.0, help='of the run (seconds)')
     parser.add_argument('--objects', type=int, default=60, help='beside a human and an AV')

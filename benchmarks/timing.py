@@ -4,7 +4,7 @@
 CRG table I: our graph beside the naive loop and the paper's numbers, on this machine.
 
 The two alternate in blocks, so that both see the same host; a bare sleeping loop runs beside them
-and tells what the host itself does to a deadline. Why steps of ours were late is told for each
+and measures the host's own effect on deadlines. The causes of our late steps are printed for each
 run. `--max-rate` finds the highest rate instead.
 """
 
@@ -42,7 +42,7 @@ SHOWN = 3
 
 
 def value_of(report: dict[str, Any], key: str) -> float:
-    """Look a dotted key up."""
+    """Return the value of a dotted key."""
     value: Any = report
     for part in key.split('.'):
         value = value[part]
@@ -51,7 +51,7 @@ def value_of(report: dict[str, Any], key: str) -> float:
 
 def paired_run(game: Path, planners: Sequence[str], blocks: int, block_s: float,
                folder: Path) -> tuple[dict[str, Any], dict[str, Any], float]:
-    """Run both loops in turns; give our report, the naive one's and the host's worst stall."""
+    """Run both loops in turns; return our report, the naive one's and the host's worst stall."""
     request = RunRequest(game=game, planners=tuple(planners))
     setup = with_planners(build_setup(effective_game(request)), request.planners)
     naive = NaiveLoop(setup, folder / 'naive')
@@ -101,7 +101,7 @@ def print_table(ours: Sequence[dict[str, Any]], naive: Sequence[dict[str, Any]],
 
 
 def print_late_steps(report: dict[str, Any]) -> None:
-    """Print why steps of a run were late, and the worst of them."""
+    """Print the causes of a run's late steps, and the worst steps."""
     late = report['late_steps']
     causes = ', '.join(f'{cause} {entry["ms"]:.1f} ms (main of {entry["steps"]})'
                        for cause, entry in late['by_cause'].items() if entry['ms'])

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What traffic costs: time for a scenario time step against the number of agents.
+The cost of traffic: time for a scenario time step against the number of agents.
 
 A step is one decision of all agents (10 Hz) and ten steps of their motion (100 Hz), in two
 dimensions: steering, yaw, where every footprint is. On the motorway (three lanes, 25 vehicles per
@@ -9,7 +9,7 @@ kilometre and lane) others start at the same places with the same speeds and des
 nothing is drawn. Each is timed in a process of its own, in processor time.
 
 SUMO (its default models at 0.1 s) moves vehicles along lanes: no steering or yaw, lane changes
-in one step, no footprints; nobody else on the road can be anywhere but in a lane. `positions
+in one step, no footprints; every other vehicle on the road must be in a lane. `positions
 read` also reads all positions, as a user has to. Its town is a grid of as many crossings.
 
 highway-env `as it is` is what its environments do in 0.1 s at a simulation frequency of 100 Hz:
@@ -57,7 +57,7 @@ LARGEST_TOWN = 3000
 WANTED = {10: 0.4, 1000: 4.0, 10000: 40.0}
 STEP_S, SUBSTEPS, LANES, LIMIT = 0.1, 10, 3, 120.0 / 3.6
 PER_KM_AND_LANE = 25.0
-# Road ahead of the first: nobody leaves it during a measurement [m].
+# Road ahead of the first: no agent leaves it during a measurement [m].
 AHEAD = 1500.0
 # Vehicles a crossing in town.
 PER_CROSSING = 8.0
@@ -66,7 +66,7 @@ NOBODY = np.zeros((0, 3))
 
 class Start:
     """
-    How vehicles (N) stand on the motorway at the start.
+    The places of vehicles (N) on the motorway at the start.
 
     Attributes: `lane` (N) from the right, `x` (N) [m], `speed` and `desired` (N) [m/s].
     """
@@ -82,7 +82,7 @@ class Start:
 
 
 def our_motorway(start: Start) -> Traffic:
-    """Put our agents where a start has them."""
+    """Place our agents as given by a start."""
     scenario = loaded('Motorway', motorway(float(start.x.max()) + AHEAD, LANES, LIMIT)).scenario
     adopted = []
     for i, (lane, x, speed, desired) in enumerate(zip(
@@ -101,7 +101,7 @@ def town_size(count: int) -> int:
 
 
 def our_town(count: int) -> Traffic:
-    """Let agents drive through a town; as many come as leave."""
+    """Make agents that drive through a town; a new one spawns for each that leaves."""
     scenario = loaded('Town', town(town_size(count))).scenario
     spec = TrafficSpec(agents=count, flow=900.0, capacity=count)
     return Traffic(spec, RoadNetwork(scenario.lanelet_network), scenario, (), (), STEP_S,
@@ -140,10 +140,10 @@ def others(python: str | None, name: str, place: str, given: dict[str, Any],
 
 
 def report(name: str, count: float, times: list[float], ours: float | None = None) -> float:
-    """Print a row; give the median [ms]."""
+    """Print a row; return the median [ms]."""
     median = statistics.median(times)
     beside = '' if ours is None else f'{median / ours:9.2f}'
-    # A little fewer than asked for may be in town.
+    # The town may have a few less than asked for.
     wanted = next((f'{x:9g}' for n, x in WANTED.items()
                    if ours is None and 0.9 * n <= count <= 1.1 * n), '')
     print(f'{name:34}{count:7.0f}{min(times):10.3f}{median:10.3f}{max(times):10.2f}'
@@ -198,7 +198,7 @@ def town_table(counts: tuple[int, ...], steps: int, python: str | None) -> None:
 
 
 def profile(name: str, traffic: Traffic, steps: int) -> None:
-    """Print where the time goes."""
+    """Print a profile of the time."""
     step = stepper(traffic)
     for _ in range(30):
         step()

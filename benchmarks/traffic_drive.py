@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Driving a scenario with dense traffic and writing down what can be seen of it."""
+"""Drive a scenario with dense traffic and record the observable states."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,9 +26,9 @@ CIRCLE_CORNERS = 16
 @dataclass(frozen=True)
 class Drive:
     """
-    What was driven.
+    The result of a drive.
 
-    :param history: what could be seen.
+    :param history: the observable states.
     :param recording: of all obstacles of the file, as recorded.
     :param scenario: the file.
     """
@@ -43,7 +43,7 @@ def drive(path: Path, spec: TrafficSpec, seconds: float, seed: int = 0,
     """
     Drive a scenario file with traffic alone; recorded vehicles as the spec says.
 
-    What is no agent (pedestrians, parked cars) is where it is recorded, at its time.
+    Objects that are no agents (pedestrians, parked cars) follow the recording in time.
 
     :param recorded: False leaves out whatever moves in the recording.
     """
@@ -89,7 +89,7 @@ def _history(dt_s: float, descriptions: tuple[ObjectDescription, ...], agents: i
 
 
 def _trimmed(history: History) -> History:
-    """Leave out who never came."""
+    """Leave out agents that never came."""
     came = np.flatnonzero(history.present.any(axis=0))
     return replace(
         history, ids=tuple(history.ids[i] for i in came),

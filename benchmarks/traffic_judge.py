@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Dense traffic on anybody's maps, judged from outside.
+Dense traffic on any maps, judged from outside.
 
 Drives CommonRoad files with traffic alone, recorded vehicles as agents, and looks for what must
 not happen, in nothing but states at each scenario time step and the file (package `judge` beside
@@ -66,7 +66,7 @@ def run(task: Task) -> Done:
 
 
 def row(name: str, seed: str, found: Verdict) -> str:
-    """Write what a run showed."""
+    """Format the result of a run as a row."""
     n = found.counts
     overlaps = f'{n["overlap"]} ({n["overlap placed"]}/{n["overlap recorded"]}/' \
         f'{n["overlap struck"]})'

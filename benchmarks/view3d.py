@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The 3D view beside the map: how often and how fast it is drawn, key to picture, and table I.
+The 3D view beside the map: its rate and time of drawing, key to picture, and table I.
 
 Each view has a live run of its own in a real browser, in turns, and so has each version where
 `--against` names another one. What rendered it is stated: a browser without a graphics card draws
@@ -22,7 +22,7 @@ from driven_page import Browser, DrivenPage, report
 import numpy as np
 
 VIEWS = ('map', 'driver', 'chase', 'bird')
-# What was drawn, in each animation frame: when, and the simulation time that it shows.
+# The picture in each animation frame: its time, and the simulation time that it shows.
 LOGGER = """
 window.keyTimes = []; window.frameTimes = []; window.scriptTimes = [];
 addEventListener('keydown', e => keyTimes.push(performance.timeOrigin + e.timeStamp), true);
@@ -41,7 +41,7 @@ let last = -1;
   requestAnimationFrame(log);
 })();
 """
-# The same moment again and again: processor time is what it is, whatever else the machine does.
+# The same moment is drawn repeatedly: processor time does not depend on other load.
 REDRAW = """
 const [count, sharp] = arguments;
 const { picture } = crgame.view3d;
@@ -62,10 +62,10 @@ TABLE = ('mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio', 'busy
 
 def measure(folder: Path, game: Path, view: str, trials: int, seconds: float,
             source: Path | None) -> dict[str, Any]:
-    """Run the game once with a view open; print what it took and give its table I."""
+    """Run the game once with a view open; print its costs and return its table I."""
     with DrivenPage(folder, [str(game)], source) as page:
         show(page.browser, view)
-        # Before somebody holds the seat: a seat's holder would have to press start after it.
+        # Before the seat is taken: a seat's holder would have to press start after it.
         page.control.call('reset')
         page.control.wait_until_running()
         page.sit_down(LOGGER)
@@ -84,7 +84,7 @@ def measure(folder: Path, game: Path, view: str, trials: int, seconds: float,
 
 
 def show(browser: Browser, view: str) -> None:
-    """Open a view, and let it find its resolution."""
+    """Open a view, and wait until it has found its resolution."""
     if view != 'map':
         browser.wait_for('return Boolean(window.crgame?.ready && crgame.view3d)')
         browser.driver.execute_script(
@@ -94,10 +94,10 @@ def show(browser: Browser, view: str) -> None:
 
 
 def redraw(browser: Browser, sharp: bool) -> None:
-    """Print what processor time a picture takes of the process that draws."""
+    """Print the drawing process's processor time for a picture."""
     count = REDRAWN // 4 if sharp else REDRAWN
     browser.driver.set_script_timeout(300.0)
-    # What has changed since the last picture is handed over first.
+    # The changes since the last picture are handed over first.
     browser.driver.execute_script(REDRAW, 6, sharp)
     used_s = browser.processor_s('gpu-process')
     ratio, triangles = browser.driver.execute_script(REDRAW, count, sharp)
@@ -107,7 +107,7 @@ def redraw(browser: Browser, sharp: bool) -> None:
 
 
 def tell(browser: Browser, view: str, used_s: float) -> None:
-    """Print what was drawn since the logger began, and what processor time that took [s]."""
+    """Print the pictures since the logger began, and their processor time [s]."""
     frames, scripts, stats, objects = browser.driver.execute_script(
         'return [frameTimes, scriptTimes, crgame.view3d.stats,'
         ' crgame.store.scene.vehicles.length + crgame.store.scene.objects.length]')

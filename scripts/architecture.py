@@ -7,8 +7,8 @@ Draw the package's folders and their imports into docs/architecture.md and its p
     python3 scripts/architecture.py            write both
     python3 scripts/architecture.py --check    say whether they are up to date, and change nothing
 
-FOLDERS is the order of the house: a folder imports from those above it in the list only. That it
-does is tested; the sentence beside each folder is its own docstring.
+FOLDERS is the order: a folder imports from those above it in the list only. A test checks it;
+the sentence beside each folder is its own docstring.
 """
 
 import argparse
@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / 'crgame_ros'
 DOCUMENT = ROOT / 'docs' / 'architecture.md'
 PICTURE = ROOT / 'docs' / 'images' / 'architecture.svg'
-# Files of the package's own folder that everybody may import, and those that use everybody.
+# Files of the package's own folder that all folders may import, and those that use all folders.
 LOWEST, HIGHEST = 'errors, paths, …', 'cli, doctor'
 AT_THE_TOP = {'cli', 'doctor', 'new_command', 'page_libraries_command', 'replay_command',
               'schema_command'}
@@ -59,7 +59,7 @@ def imports() -> dict[tuple[str, str], list[str]]:
     known = modules()
     found: dict[tuple[str, str], list[str]] = {}
     for path in known.values():
-        # The package's own file loads nothing before somebody asks for it.
+        # The package's own file loads a module only when it is used.
         for name in sorted(_imported(path, known)) if path != PACKAGE / '__init__.py' else ():
             pair = folder_of(path), folder_of(known[name])
             if pair[0] != pair[1]:
@@ -81,7 +81,7 @@ def _imported(path: Path, known: dict[str, Path]) -> set[str]:
 
 
 def sentence(folder: str) -> str:
-    """Return the sentence that a folder says of itself."""
+    """Return the sentence of a folder's own docstring."""
     if folder == LOWEST:
         return 'What everybody uses: errors, paths, the registry, guarded YAML.'
     if folder == HIGHEST:

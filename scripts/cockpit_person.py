@@ -21,9 +21,9 @@ __all__ = ['Browser', 'Person', 'open_browser']
 # code, key and Windows key code, as the browser's input pipeline wants them.
 KEYS = {'throttle': ('KeyW', 'w', 87), 'brake': ('KeyS', 's', 83),
         'left': ('KeyA', 'a', 65), 'right': ('KeyD', 'd', 68)}
-# How far ahead a person looks [s], and at least [m].
+# Look-ahead of a person [s], and at least [m].
 LOOK_AHEAD_S, LOOK_AHEAD_M = 1.1, 8.0
-# Keys are for coarse hands: what is nearer than this to the wish is good enough.
+# Keys are coarse: a value nearer than this to the wanted one is good enough.
 STEERING_TOLERANCE_DEG, SPEED_TOLERANCE = 0.25, 0.6
 POINTS_PER_PIECE = 40
 POLL_S = 0.02
@@ -41,7 +41,7 @@ FloatArray = NDArray[np.float64]
 
 class Person:
     """
-    Somebody at a page that is open.
+    A person at a page that is open.
 
     :param browser: shows the page.
     """

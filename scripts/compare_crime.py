@@ -6,7 +6,7 @@ commonroad-crime's THW, TTC and PET beside ours: a table for docs/criticality.md
     python scripts/compare_crime.py SCENARIO.xml … [--environment DIR] [--write]
 
 Every moving obstacle of a scenario is the subject once. commonroad-crime is installed into an
-environment of its own (made once, some minutes), for it wants packages of other versions.
+environment of its own (made once, some minutes), because it needs packages of other versions.
 """
 
 import argparse
@@ -38,9 +38,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / 'docs' / 'criticality.md'
 PACKAGE = 'commonroad-crime==0.4.5'
 MARKS = '<!-- crime: begin -->', '<!-- crime: end -->'
-# Of a scenario at most so many pairs and steps, spread evenly.
+# At most so many pairs and steps of a scenario are used, spread evenly.
 MOST = 30
-# Values so near are the same: half a length of a car is 2 m at least.
+# Values this near count as the same: half a length of a car is 2 m at least.
 NEAR_S = 0.05
 
 
@@ -52,7 +52,7 @@ def subjects(loaded: LoadedScenario) -> list[DynamicObstacle]:
 
 
 def measured(loaded: LoadedScenario, moving: list[DynamicObstacle]) -> dict[str, Any]:
-    """Measure everybody against everybody, as driven vehicles; ids are places in the list."""
+    """Measure all against all, as driven vehicles; ids are places in the list."""
     scheduler = ScenarioScheduler(round(loaded.scenario.dt * 1e9), 1, 0, 0)
     vehicles = tuple(ObjectDescription(
         str(item.obstacle_id), 'car', Role.HUMAN,
@@ -97,7 +97,7 @@ def crime_python(environment: Path) -> Path:
 
 
 def theirs(python: Path, file: Path, wanted: dict[str, Any]) -> dict[str, Any]:
-    """Have commonroad-crime compute the same."""
+    """Compute the same by commonroad-crime."""
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
             [python, str(Path(__file__).with_name('crime_values.py')), str(file.resolve())],

@@ -24,14 +24,14 @@ STEP_S, SUBSTEPS = 0.1, 10
 # Detectors on every ring, evenly spaced.
 DETECTORS = 8
 NOBODY = np.zeros((0, 3))
-# Enough for full speed on rings: they are to be like straight roads [m/s^2].
+# Enough for full speed on rings: they must behave like straight roads [m/s^2].
 LATERAL = 6.0
 
 
 @dataclass(frozen=True)
 class Flow:
     """
-    What detectors saw on rings (R).
+    The detectors' measurements on rings (R).
 
     :param density: vehicles over circumference, as set up [1/m]
     :param flow: vehicles that pass a detector in a second, mean of all detectors [1/s]
@@ -46,7 +46,7 @@ class Flow:
 def measure(model: str, counts: Sequence[int], circumference: float, limit: float,
             settle_s: float, measure_s: float, seed: int = 0) -> Flow:
     """
-    Let vehicles of one length and one desired speed settle on rings, and count them.
+    Run vehicles of one length and one desired speed on rings until steady, and count them.
 
     :param model: of car following.
     :param counts: vehicles on each ring.
@@ -88,7 +88,7 @@ def _starts(counts: Sequence[int], radius: float, limit: float, seed: int) -> li
                     radius * math.sin(angle), angle + 0.5 * math.pi)
             speed = min(0.9 * limit, 0.4 * max(gap - 2.0, 0.0))
             way = (-math.sin(angle), math.cos(angle), 0.0)
-            # The fastest of a recording is what its driver wants.
+            # The highest speed in a recording is the driver's desired speed.
             starts.append(Adopted(
                 ObjectDescription(f'o{len(starts)}', 'car', Role.RECORDED,
                                   Shape.rectangle(LENGTH, 1.8)), 0, np.array([pose, pose]),
@@ -98,7 +98,7 @@ def _starts(counts: Sequence[int], radius: float, limit: float, seed: int) -> li
 
 def _detect(angles: FloatArray, radius: float) -> tuple[float, float]:
     """
-    Let detectors count.
+    Count by detectors.
 
     :param angles: (ticks, vehicles) of one ring, continuous [rad]
     :return: flow [1/s] and harmonic mean of the speeds [m/s]

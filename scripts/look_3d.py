@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Look at the 3D view on any roads: all viewpoints, lights and sizes, with what they cost.
+Take pictures of the 3D view on any roads: all viewpoints, lights and sizes, with their costs.
 
     scripts/look_3d.py pictures scenarios/*.xml --light day dusk fog --size 1280x720 390x844
 
@@ -28,14 +28,14 @@ COST = 'const { draw_calls, triangles } = crgame.view3d.stats; return [draw_call
 
 
 def look(person: Person, where: Path, size: str) -> None:
-    """Take a picture from each viewpoint, and say what they took."""
+    """Save a picture from each viewpoint, and print their times."""
     width, height = map(int, size.split('x'))
     browser = person.browser
     browser.resize(width, height)
     for viewpoint in VIEWPOINTS:
         frames = browser.run('crgame.view3d.viewpoint = arguments[0];'
                              'return crgame.view3d.stats.frames', viewpoint)
-        # Every mirror has had its turn.
+        # Every mirror has been drawn.
         browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures', 60.0,
                      arguments=(frames,))
         time.sleep(SETTLES_S)
@@ -46,7 +46,7 @@ def look(person: Person, where: Path, size: str) -> None:
 
 
 def visit(roads: Path, light: str, sizes: list[str], folder: Path) -> list[str]:
-    """Sit down in a scenario for a moment; give what the browser's console has said."""
+    """Claim a seat in a scenario for a moment; return the messages of the browser's console."""
     with tempfile.TemporaryDirectory() as temporary:
         game = Path(temporary) / 'game.yaml'
         game.write_text(yaml.safe_dump({
@@ -66,7 +66,7 @@ def visit(roads: Path, light: str, sizes: list[str], folder: Path) -> list[str]:
 
 
 def main() -> int:
-    """Look at all that the command line names."""
+    """Photograph all scenarios of the command line."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folder', type=Path, help='for the pictures')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Write what environments observe and reward into docs/gym.md.
+Write the observations and rewards of environments into docs/gym.md.
 
     python3 scripts/make_gym_docs.py            write the tables
     python3 scripts/make_gym_docs.py --check    say whether they are up to date, change nothing

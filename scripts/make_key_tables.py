@@ -110,7 +110,7 @@ def table(kind: Any) -> str:
 
 
 def value(key: Key, kind: Any) -> str:
-    """Return what may stand there."""
+    """Return the allowed values."""
     if key.mark(Keyed):
         return 'a mapping'
     choices = form_of(kind).choices.get(key.name)
@@ -126,7 +126,7 @@ def value(key: Key, kind: Any) -> str:
 
 
 def default(key: Key) -> str:
-    """Return what holds without the key."""
+    """Return the default without the key."""
     numbered = key.mark(Numbered)
     if numbered is not None:
         return f'{numbered.prefix}0, …'
@@ -141,7 +141,7 @@ def default(key: Key) -> str:
 
 
 def meaning(key: Key, sentences: dict[str, str]) -> str:
-    """Return its sentence, and beside which keys alone it stands."""
+    """Return its sentence, and the only keys beside which it may stand."""
     beside = key.mark(OnlyWith)
     only = '' if beside is None or key.name in beside.keys \
         else f'(with {", ".join(f"`{name}`" for name in beside.keys)}) '
@@ -154,7 +154,7 @@ def escaped(text: str) -> str:
 
 
 def pages() -> dict[Path, str]:
-    """Return every page with tables of keys, as it has to be."""
+    """Return every page with up-to-date tables of keys."""
     found = {REFERENCE: reference()}
     for page in sorted(DOCS.glob('*.md')):
         text = page.read_text(encoding='utf-8') if page != REFERENCE else ''

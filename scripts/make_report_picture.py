@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def photograph(browser: Browser, name: str) -> None:
-    """Save what the browser shows, in few colours."""
+    """Save the browser's picture, in few colours."""
     path = browser.screenshot(FOLDER / f'{name}.png')
     with Image.open(path) as image:
         image.convert('RGB').quantize(COLOURS).save(path, optimize=True)

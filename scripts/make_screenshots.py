@@ -32,9 +32,9 @@ ATTEMPTS = 4
 WIDE_PX = 2000
 # Until the camera, the plots and the messages about what was clicked have come to rest [s].
 SETTLES_S = 1.0
-# A new alarm flashes so long [s].
+# A new alarm flashes for this long [s].
 PULSES_S = 2.5
-# Until the others have come near [s].
+# Time until the others have come near [s].
 DRIVEN_S = 3.0
 HAS_BEGUN = 'window.crgame?.ready && crgame.world.shown && crgame.store.status'
 ALARMS = 'return crgame.alarms.kinds()'
@@ -43,7 +43,7 @@ PAUSE = 'document.querySelector(\'[data-action="pause"]:enabled\')?.click()'
 
 
 class Unlucky(Exception):
-    """A run during which this machine was too slow, or which went another way."""
+    """A run during which this machine was too slow, or that took another course."""
 
 
 class Session(NamedTuple):
@@ -69,7 +69,7 @@ def launched(folder: Path, *arguments: str) -> Iterator[str]:
     with socket.socket() as probe:
         probe.bind(('127.0.0.1', 0))
         port = str(probe.getsockname()[1])
-    # Without a domain in its environment the launcher finds one that nobody uses.
+    # Without a domain in its environment the launcher finds a free one.
     environment = {key: value for key, value in os.environ.items() if key != 'ROS_DOMAIN_ID'}
     log = folder / f'launcher{port}.log'
     with log.open('wb') as stream:
@@ -88,7 +88,7 @@ def launched(folder: Path, *arguments: str) -> Iterator[str]:
 
 
 def address(process: 'subprocess.Popen[bytes]', log: Path) -> str:
-    """Wait until the launcher has told where the page is."""
+    """Wait until the launcher has printed the address of the page."""
     until_s = time.monotonic() + START_LIMIT_S
     while process.poll() is None and time.monotonic() < until_s:
         if (found := re.search(r'http://127\S+', log.read_text(errors='replace'))) is not None:
@@ -125,7 +125,7 @@ def waiting(folder: Path, name: str) -> tuple[str, ...]:
 
 def shoot(browser: Browser, name: str, meant: tuple[str, ...] = ()) -> None:
     """
-    Save what is seen.
+    Save the visible picture.
 
     :param meant: kinds of alarms that belong into the picture.
     :raises Unlucky: if the page shows others, or lacks those.
@@ -152,7 +152,7 @@ def shoot(browser: Browser, name: str, meant: tuple[str, ...] = ()) -> None:
 
 
 def take_driving(folder: Path) -> None:
-    """Somebody overtakes in dense traffic and cuts in."""
+    """Overtake in dense traffic and cut in."""
     with page(folder, 'dark', *waiting(folder, 'traffic')) as person:
         person.take_seat('hv0')
         person.click('[data-action="start"]')
@@ -162,7 +162,7 @@ def take_driving(folder: Path) -> None:
 
 
 def take_light(folder: Path) -> None:
-    """Somebody drives around in front of an AV."""
+    """Drive around in front of an AV."""
     with page(folder, 'light', *waiting(folder, 'roundabout')) as person:
         person.take_seat('hv0')
         person.click('[data-action="start"]')
@@ -190,7 +190,7 @@ def take_people(folder: Path) -> None:
 
 
 def take_4k(folder: Path) -> None:
-    """Somebody drives past parked cars and an AV follows; a large screen."""
+    """Drive past parked cars, followed by an AV; a large screen."""
     with page(folder, 'dark', *waiting(folder, 'parked_cars')) as person:
         person.take_seat('hv0')
         person.click('[data-action="start"]')
@@ -217,7 +217,7 @@ def take_figures(folder: Path) -> None:
 
 
 def take_events(folder: Path) -> None:
-    """Let the pedestrian go in front of the AV; then look for another scenario."""
+    """Release the pedestrian in front of the AV; then open the list of scenarios."""
     with page(folder, 'light', *game('crossing', '--out', str(folder / 'run'))) as person:
         person.click('#tab-events')
         person.browser.run("crgame.world.follow('av0', true)")
@@ -271,7 +271,7 @@ def take_perception(folder: Path) -> None:
 
 
 def take_3d(folder: Path) -> None:
-    """Look from the seat beside parked cars, and from behind."""
+    """Show the view from the seat beside parked cars, and from behind."""
     with page(folder, 'light', *waiting(folder, 'parked_cars')) as person:
         person.take_seat('hv0')
         person.browser.run_async('return await crgame.view3d.show(true)')
@@ -283,7 +283,7 @@ def take_3d(folder: Path) -> None:
         for viewpoint in ('driver', 'chase'):
             frames = person.browser.run('return crgame.view3d.stats.frames')
             person.browser.run('crgame.view3d.viewpoint = arguments[0]', viewpoint)
-            # Every mirror has had its turn.
+            # Every mirror has been drawn.
             person.browser.wait('crgame.view3d.stats.frames >= arguments[0] + 6', 'the pictures',
                                 arguments=(frames,))
             time.sleep(SETTLES_S)
@@ -291,8 +291,8 @@ def take_3d(folder: Path) -> None:
 
 
 def take_over(folder: Path) -> None:
-    """Let a script drive to the end of its game, and see what the page says then."""
-    # Where its files are is in the picture, too: as with run.sh.
+    """Run a script to the end of its game, and show the page then."""
+    # The picture shows the folder of its files, too: as with run.sh.
     with page(folder, 'light', str(scenarios_directory() / 'merge.yaml')) as person:
         person.browser.wait("document.querySelector('.outcome-files[data-complete]')",
                             'the end of the run', START_LIMIT_S)
@@ -310,7 +310,7 @@ SESSIONS = (
 
 
 def main() -> None:
-    """Take the pictures."""
+    """Make the pictures."""
     names = [name for session in SESSIONS for name in session.names]
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--only', choices=names, help='the runs of this picture alone')
@@ -322,7 +322,7 @@ def main() -> None:
 
 
 def take(session: Session) -> None:
-    """Take the pictures of a session, again if the run was unlucky."""
+    """Make the pictures of a session, again if the run was unlucky."""
     for attempt in range(1, ATTEMPTS + 1):
         print(f'{", ".join(session.names)}: run {attempt} …', flush=True)
         with tempfile.TemporaryDirectory() as folder:

@@ -31,7 +31,7 @@ SETTLES_S = 1.0
 
 
 def shoot(browser: Browser, name: str) -> None:
-    """Save what is seen, in fewer colours than nobody can tell."""
+    """Save the visible picture, with so many colours that no difference is visible."""
     path, seen = FOLDER / f'study_{name}.png', FOLDER / f'.study_{name}.png'
     try:
         browser.screenshot(seen)
@@ -48,7 +48,7 @@ def take_session(folder: Path) -> None:
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     with study_session(folder / 'study' / 'study.yaml', folder / 'data', 'P01', PORT) as session, \
             open_browser(folder / 'profile') as browser:
-        # Somebody who is known already: the link itself was good for once.
+        # A participant that is known already: the link itself was valid only once.
         page = session.link.partition('?')[0]
         browser.open(page)
         name, _, value = session.experimenter.cookie.partition('=')
@@ -66,7 +66,7 @@ def take_session(folder: Path) -> None:
 
 
 def ready(session: StudySession) -> bool:
-    """Return whether the page waits for the participant's word before a trial."""
+    """Return whether the page waits for the participant's confirmation before a trial."""
     return bool(session.browser.run(
         'const button = document.querySelector(".gate:not([hidden]) button.primary");'
         'return button && !button.disabled'
@@ -74,7 +74,7 @@ def ready(session: StudySession) -> bool:
 
 
 def until(session: StudySession, condition: Callable[[], bool]) -> None:
-    """Go on until something is seen."""
+    """Continue until an element is visible."""
     until_s = time.monotonic() + PATIENCE_S
     while not condition():
         if time.monotonic() > until_s:
@@ -93,7 +93,7 @@ def take_report(conducted: Path, folder: Path) -> None:
 
 
 def main() -> None:
-    """Take the pictures."""
+    """Make the pictures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--conducted', type=Path, help='folder of a study with data, for the '
                         'picture of the report; that alone is taken then')

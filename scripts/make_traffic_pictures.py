@@ -58,7 +58,7 @@ def _draw_model(left: Axes, right: Axes, model: str, found: Flow, color: str) ->
 
 
 def merge(path: Path, seconds: float) -> None:
-    """Draw where agents are when on the right lane beside a ramp that ends, with courtesy."""
+    """Draw places and times of agents on the right lane beside an ending ramp, with courtesy."""
     figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.0), layout='constrained', sharey=True)
     for place, cooperative in zip(axes, (True, False), strict=True):
         lines, speeds, from_ramp = _tracks(seconds, cooperative)

@@ -158,7 +158,7 @@ def _turn(incoming: float, outgoing: float) -> str:
 
 
 def _right_of(arms: Sequence[Arm], index: int) -> int | None:
-    # The road on a driver's right hand, whose traffic that driver comes from the left of.
+    # The road on a driver's right; that driver comes from the left of its traffic.
     for number, arm in enumerate(arms, start=1):
         if number - 1 != index and _turn(arms[index].angle, arm.angle) == 'right':
             return INTERSECTION_ID + number

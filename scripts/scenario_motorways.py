@@ -92,7 +92,7 @@ def traffic() -> ScenarioFile:
     curve = clothoids((-250.0, 0.0, 0.0), [(1350.0, 0.0)], 5.0)
     carriageway(roads, curve, (350.0, 700.0, 1050.0), 3, WIDTH, 100 * KMH, *MOTORWAY)
     problem = Problem(PLANNING_PROBLEM_ID, (10.0, 0.0, 0.0), 24.0, (42,))
-    # Type, size, lane from the right, position, speed; nobody ends up close behind the AV.
+    # Type, size, lane from the right, position, speed; no car ends up close behind the AV.
     cars = (('truck', (12.0, 2.5), 0, 45.0, 22.2), ('car', (4.5, 1.8), 0, -60.0, 21.5),
             ('car', (4.5, 1.8), 1, 130.0, 25.0), ('car', (4.8, 1.8), 2, 70.0, 30.0),
             ('car', (4.5, 1.8), 2, -110.0, 26.0), ('truck', (16.0, 2.5), 0, 150.0, 22.2))

@@ -23,7 +23,7 @@ BLOCK = 160.0
 MOUTH = 15.0
 # Ids of one crossing's lanelets are this far from those of the next.
 BLOCK_IDS = 100
-# Beyond those of all lanelets.
+# Greater than the ids of all lanelets.
 SIGN_IDS = 1000000
 WEST, SOUTH, EAST, NORTH = math.pi, -0.5 * math.pi, 0.0, 0.5 * math.pi
 

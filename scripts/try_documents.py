@@ -6,7 +6,7 @@ Run the commands of README.md and docs/ as a reader would: in order, in a clean 
 
     python3 scripts/try_documents.py [FILE.md …]
 
-What goes on until somebody ends it (a game, a page) gets Ctrl-C once it is up, and has to end
+A command that runs until it is ended (a game, a page) gets Ctrl-C once it is up, and has to end
 well. Every command must exit with 0, without a traceback or an error; those that need what this
 machine lacks (ros2, rviz2, a wheel) are named as not run.
 """
@@ -24,7 +24,7 @@ import tempfile
 import time
 
 ROOT = Path(__file__).resolve().parents[1]
-# Such a command is up when it says one of these; it gets so long after that, and to end [s].
+# Such a command is up when it prints one of these; it gets so long after that, and to end [s].
 LASTING = re.compile(r'^(\w+=\S+ )*\./run\.sh(?!.*--help)')
 UP = re.compile(r'recording into (\S+)|replay of .* http://')
 # A recording of this size has a second of driving in it [bytes]; one that waits for a person gets
@@ -64,7 +64,7 @@ class Shell:
     failures: int = 0
 
     def run(self, command: str) -> None:
-        """Run a command, say how it went, and count it if it went wrong."""
+        """Run a command, print its result, and count failures."""
         for pattern, why in NOT_RUN.items():
             if re.search(pattern, command) and (reason := why()):
                 print(f'  not run  {command}    ({reason})', flush=True)
@@ -114,7 +114,7 @@ class Shell:
             time.sleep(0.1)
         if process.poll() is None:
             time.sleep(LOOK_S)
-            # As a terminal does: to everybody in the foreground.
+            # As from a terminal: to all processes in the foreground.
             os.killpg(process.pid, signal.SIGINT)
 
     def _judge(self, command: str, process: subprocess.Popen[bytes], number: int,
@@ -125,7 +125,7 @@ class Shell:
             os.killpg(process.pid, signal.SIGKILL)
             code = process.wait()
         output = self._log(number).read_text(errors='replace')
-        # Nobody is here to press Drive.
+        # There is no person to press Drive.
         awaited = code == 1 and '--driver cockpit' in command and NOBODY_DROVE in output
         wrong = (code != 0 and not awaited) or SAID_OF_FAULTS.search(output) is not None
         print(f'  {"FAILED " if wrong else "ok     "}  {command}    '
@@ -136,7 +136,7 @@ class Shell:
                 f'    {line}' for line in output.splitlines()[-30:]), flush=True)
 
     def _remember_run(self) -> None:
-        """Let `runs/NAME` be the last run that has a scenario."""
+        """Make `runs/NAME` stand for the last run that has a scenario."""
         done = [path.parent for path in (ROOT / 'runs').glob('*/*.xml')]
         if done:
             newest = max(done, key=lambda path: path.stat().st_mtime)
@@ -160,7 +160,7 @@ def commands(block: str) -> Iterator[str]:
 
 
 def _places(folder: Path) -> dict[str, str]:
-    """Write the files that a reader would have, from what the documents show of them."""
+    """Write the files that a reader would have, from their texts in the documents."""
     planner = next(blocks((ROOT / 'docs/planners.md').read_text(), 'python'))
     (folder / 'my_planner.py').write_text(planner)
     name = re.search(r'^class (\w+)', planner, re.M)
@@ -175,7 +175,7 @@ def _places(folder: Path) -> dict[str, str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Try the documents; give 1 if a command failed."""
+    """Try the documents; return 1 if a command failed."""
     if {'-h', '--help'} & set(arguments):
         print(__doc__)
         return 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures and tiers of all tests; their ROS traffic stays here, each in a domain of its own."""
+"""Fixtures and tiers of all tests; ROS traffic is local, and each test has its own domain."""
 
 import os
 from pathlib import Path
@@ -16,8 +16,8 @@ from ros_domains import own_domain_id  # noqa: E402 - importable from here on
 
 LONGEST_ID = 100
 ROOT = Path(__file__).resolve().parents[1]
-# Their tests start ROS graphs, servers or browsers; they come first, for they wait more than
-# they compute.
+# Their tests start ROS graphs, servers or browsers; they come first, because they wait more
+# than they compute.
 GRAPH_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
 TIERS = ('quick', 'default', 'all')
 
@@ -32,8 +32,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure() -> None:
     """Prepare the environment before any test imports rclpy, and inherit it to processes."""
     prepare_environment()
-    # A shell starts what runs in the background deaf to Ctrl-C, and so are its children. In such
-    # a process rclpy's own handler now and then fails to wake what waits.
+    # A shell starts background processes with Ctrl-C ignored, and their children inherit this. In
+    # such a process rclpy's own handler sometimes fails to wake waiting calls.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if 'PYTEST_XDIST_WORKER' in os.environ or 'ROS_DOMAIN_ID' not in os.environ:
@@ -46,7 +46,7 @@ def pytest_configure() -> None:
 # Before xdist reads the groups.
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what the tier has not; graphs come first; each file has a worker to itself."""
+    """Leave out tests of other tiers; graphs come first; each file has a worker to itself."""
     tier = config.getoption('--tier')
     kept, left_out, seen = [], [], set[str]()
     for item in items:
@@ -98,7 +98,7 @@ def shared_scenarios() -> Path:
 
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    """Return the test, and the processes it starts, a ROS domain of its own."""
+    """Set a ROS domain of its own for the test and the processes that it starts."""
     domain = own_domain_id()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
     return domain

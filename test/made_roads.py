@@ -10,7 +10,7 @@ from crgame_ros.roads.network import RoadNetwork
 import numpy as np
 from numpy.typing import NDArray
 
-# How wide their lanes are [m].
+# Width of their lanes [m].
 WIDTH = 3.5
 
 

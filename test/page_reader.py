@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A page of HTML, as tests look at it."""
+"""A page of HTML, parsed for tests."""
 
 from html.parser import HTMLParser
 
@@ -8,7 +8,7 @@ VOID = {'meta', 'link', 'img', 'br'}
 
 
 class Page(HTMLParser):
-    """A page, read."""
+    """A parsed page."""
 
     def __init__(self, html: str) -> None:
         super().__init__()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The order of the folders: who may import whom, and the document that shows it."""
+"""The order of the folders: their allowed imports, and the document that shows it."""
 
 import ast
 from pathlib import Path

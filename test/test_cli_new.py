@@ -47,7 +47,7 @@ def test_people_start_where_problems_begin(tmp_path: Path) -> None:
     (['--out', str(TWO_AVS)], 'is there already')])
 def test_what_cannot_be_written_is_said_in_one_line(
         words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit code 2, and no file is written over."""
+    """The exit code is 2, and no file is overwritten."""
     before = TWO_AVS.read_bytes()
     assert main(['new', str(TWO_AVS), *words]) == 2
     error = capsys.readouterr().err

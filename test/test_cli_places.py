@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Places that cannot be written to: told in one line, before the work, and nothing is left."""
+"""Places that cannot be written to: refused in one line, before the work, and nothing is left."""
 
 from pathlib import Path
 import resource
@@ -20,7 +20,7 @@ NAMES = {'roads': 'r.csv', 'offline': 'run.xml'}
 
 
 def refusal(command: str, out: Path, full: bool = False) -> str:
-    """Run a command, on a full disk if asked for, and give the one line that it says."""
+    """Run a command, on a full disk if asked for, and return the one line that it prints."""
     def fill() -> None:
         # No file may grow: to a program this is a full disk, or a quota that is used up.
         resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
@@ -40,7 +40,7 @@ def refusal(command: str, out: Path, full: bool = False) -> str:
 @pytest.mark.matrix
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
-    """Not after the run, and no half-made file or folder stays."""
+    """It is refused at the start, not after the run; no half-made file or folder stays."""
     out = tmp_path / NAMES.get(command, 'out')
     told = refusal(command, out, full=True)
     assert 'File too large' in told
@@ -72,7 +72,7 @@ def test_a_file_system_without_room(command: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize('name', ['file', 'file/below', 'file.xml', 'folder.xml'])
 def test_something_else_in_the_way_is_told_at_the_start(
         command: str, name: str, tmp_path: Path) -> None:
-    """An existing file is never overwritten, nor is a folder taken for a file."""
+    """An existing file is never overwritten, and a folder is never taken for a file."""
     if name == 'folder.xml':
         if command in ('run', 'rasterize', 'roads'):
             pytest.skip('to these it is a folder like any other, or no such file')

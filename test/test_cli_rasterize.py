@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame rasterize`: what it makes, what it says, and what it does not overwrite."""
+"""`crgame rasterize`: its files, its output, and the files that it does not overwrite."""
 
 from pathlib import Path
 import re
@@ -90,7 +90,7 @@ def test_what_is_there_stays(scenario: Path, tmp_path: Path, capsys: pytest.Capt
     ids=['no folder', 'no scenario', 'no number', 'not whole', 'too large', 'nothing'])
 def test_bad_input_is_one_line(words: tuple[str, ...], message: str, scenario: Path,
                                tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit code 2, what and where and how, and nothing is written."""
+    """It has exit code 2 and names fault, place and remedy; nothing is written."""
     out = tmp_path / 'map'
     assert run(*(word.format(scenario=scenario, out=out) for word in words)) == 2
     told = capsys.readouterr()
@@ -109,7 +109,7 @@ def test_a_folder_that_cannot_be_written(scenario: Path, capsys: pytest.CaptureF
 
 def test_long_work_is_reported(scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                capsys: pytest.CaptureFixture[str]) -> None:
-    """After two seconds, then once a second, by a clock that moves on whenever it is read."""
+    """Reports come after two seconds, then once a second, by a clock that advances when read."""
     clock = iter(range(1000))
     monkeypatch.setattr(occupancy_command, 'time',
                         SimpleNamespace(monotonic=lambda: float(next(clock))))

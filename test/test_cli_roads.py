@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame roads`: what it makes, what it says, and what it does not overwrite."""
+"""`crgame roads`: its files, its output, and the files that it does not overwrite."""
 
 from pathlib import Path
 import subprocess
@@ -48,7 +48,7 @@ def test_a_scenario_and_a_line_about_it(table: Path, tmp_path: Path,
     loaded = load_scenario(out)
     assert loaded.benchmark_id == 'ZAM_Mytown-1_1_T-1'
     assert [x.lanelet_id for x in loaded.scenario.lanelet_network.lanelets] == [1, 3, 2]
-    # The same way-points give the same bytes, and none of them says where these were.
+    # The same way-points give the same bytes, which do not contain their path.
     again = tmp_path / 'again' / out.name
     assert run(table, again) == 0
     assert again.read_bytes() == out.read_bytes()
@@ -90,7 +90,7 @@ def test_a_table_of_a_scenario(project_root: Path, tmp_path: Path,
 
 
 def test_lanes_that_are_left_out_take_their_links_along() -> None:
-    """What is kept names nothing that is not there."""
+    """The lanes that are kept have no links to missing ones."""
     links = LaneLinks((2, 3), (4,), left=5, right=2, oncoming_left=6, oncoming_right=3)
     assert links.only({2, 6}) == LaneLinks((2,), (), right=2, oncoming_left=6)
 
@@ -150,7 +150,7 @@ def test_a_refused_table_leaves_the_old_file(table: Path, tmp_path: Path) -> Non
         'start lane', 'nan', 'no way', 'all', 'type of a table'])
 def test_bad_input_is_one_line(words: tuple[str, ...], message: str, table: Path, tmp_path: Path,
                                capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit code 2, what and where and how, and nothing is written."""
+    """It has exit code 2 and names fault, place and remedy; nothing is written."""
     assert run(*(word.format(table=table, out=tmp_path / 'new') for word in words)) == 2
     told = capsys.readouterr()
     assert told.err.startswith('error: ') and message in told.err

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The package imports what pyproject.toml asks pip for and package.xml asks rosdep for."""
+"""The imports of the package match the dependencies in pyproject.toml and package.xml."""
 
 import ast
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-# By imported name: the pip package, and the rosdep key; None: Debian has none that would do.
+# By imported name: the pip package, and the rosdep key; None: Debian has no suitable one.
 THIRD_PARTY = {
     'PIL': ('pillow', 'python3-pil'),
     'aiohttp': ('aiohttp', 'python3-aiohttp'),
@@ -40,7 +40,7 @@ THIRD_PARTY = {
     'yaml': ('pyyaml', 'python3-yaml'),
     'zstandard': ('zstandard', None),
 }
-# What a user asks for by an extra of its own; nothing else of the package imports it.
+# Packages of extras, chosen by the user; no other part of the package imports them.
 EXTRAS = {'evaluate': {'dask', 'distributed'}, 'gym': {'gymnasium', 'pettingzoo'}}
 # Of requirements-planners.txt, by imported name.
 OF_PLANNERS = {'commonroad_idm_planner': 'commonroad-idm-planner',
@@ -56,7 +56,7 @@ NOT_IN_WHEELS = {'tf2_msgs'}
 
 
 def _imported() -> Iterator[str]:
-    """Yield the first part of every module that the package imports, or asks the place of."""
+    """Yield the first part of every module that the package imports or locates."""
     files = [*(ROOT / 'crgame_ros').rglob('*.py'), *(ROOT / 'launch').glob('*.py')]
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
@@ -92,7 +92,7 @@ def _manifest() -> 'etree._Element':
 
 @pytest.mark.slow
 def test_the_metadata_names_what_is_imported(imported: set[str]) -> None:
-    """One line for each third-party import, and none that nothing imports."""
+    """There is one line for each third-party import, and none without an import."""
     third_party = {name for name in imported if not ROS.fullmatch(name)}.difference(
         OF_PLANNERS, *EXTRAS.values())
     assert third_party == set(THIRD_PARTY)
@@ -101,7 +101,7 @@ def test_the_metadata_names_what_is_imported(imported: set[str]) -> None:
 
 
 def test_extras_name_what_they_are_for(imported: set[str]) -> None:
-    """Each extra brings what its part imports, and the base imports none of it by itself."""
+    """Each extra has the imports of its part, and the base imports none of them by itself."""
     for extra, names in EXTRAS.items():
         assert names <= imported
         assert _names(_project()['optional-dependencies'][extra]) == names - OF_EXTRAS
@@ -113,7 +113,7 @@ def test_extras_name_what_they_are_for(imported: set[str]) -> None:
 
 
 def test_packages_of_planners_are_pinned_apart(imported: set[str]) -> None:
-    """What only some planners import, with what it needs; nothing that is not free software."""
+    """Packages of some planners only, with their dependencies; all of them are free software."""
     assert OF_PLANNERS.keys() <= imported
     lines = [line for line in (ROOT / 'requirements-planners.txt').read_text().splitlines()
              if line and not line.startswith('#')]
@@ -123,7 +123,7 @@ def test_packages_of_planners_are_pinned_apart(imported: set[str]) -> None:
 
 
 def test_manifest_names_what_is_imported(imported: set[str]) -> None:
-    """Rosdep keys for what Debian has, every ROS package, and the rest by its pip name."""
+    """It has rosdep keys for Debian's packages, every ROS package, and pip names for the rest."""
     ros = {name for name in imported if ROS.fullmatch(name)}
     keys = {key for _, key in THIRD_PARTY.values() if key is not None}
     declared = {element.text for element in _manifest().iter('exec_depend')}
@@ -137,21 +137,21 @@ def test_manifest_names_what_is_imported(imported: set[str]) -> None:
 
 
 def test_messages_come_with_the_wheels(imported: set[str]) -> None:
-    """Every ROS package that is imported comes with them, but for those that are optional."""
+    """They contain every imported ROS package but the optional ones."""
     missing = {name for name in imported
                if ROS.fullmatch(name) and name != 'launch' and find_spec(name) is None}
     assert missing <= NOT_IN_WHEELS
 
 
 def test_both_name_the_same_people_and_place() -> None:
-    """One maintainer, whose address can be nobody else's, one page, one licence."""
+    """They have one maintainer with an unusable address, one page, one licence."""
     manifest, project = _manifest(), _project()
     maintainer = manifest.find('maintainer')
     assert project['maintainers'] == [{'name': maintainer.text, 'email': maintainer.get('email')}]
     assert project['authors'] == [{'name': manifest.findtext('author')}]
     assert project['urls']['Homepage'] == manifest.find("url[@type='website']").text
     assert project['license'] == manifest.findtext('license')
-    # RFC 6761: nobody can register a name under .invalid, so that nobody gets our mail.
+    # RFC 6761: names under .invalid cannot be registered, so that no stranger gets our mail.
     for address in (maintainer.get('email'), project['urls']['Homepage'].rstrip('/')):
         assert re.fullmatch(r'.*[@/][a-z-]+\.invalid', address)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The checks of `crgame doctor` on this machine and on machines made up from files."""
+"""The checks of `crgame doctor` on this machine and on machines simulated by files."""
 
 from importlib.metadata import PackageNotFoundError, version
 import os
@@ -66,7 +66,7 @@ def test_packages_are_compared_with_their_pins(tmp_path: Path) -> None:
 def test_an_installed_package_is_judged_by_what_it_asks_for(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """
-    Of its metadata, a real dist-info here: ranges, markers, and nothing of the extra `test`.
+    Its metadata, a real dist-info here, counts: ranges, markers, but not the extra `test`.
 
     The pins count where scripts/env.sh has made the environment.
     """
@@ -112,7 +112,7 @@ def test_missing_polygon3_is_no_failure(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 def test_planners_that_pip_left_out_are_no_failure(
         monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """On Python 3.12 two packages are missing after `pip install`: it says which, and the way."""
+    """On Python 3.12 `pip install` omits two packages: the check names them and the remedy."""
     for name in ('commonroad_rp', 'commonroad_idm_planner'):
         (tmp_path / f'needs_{name}.py').write_text(
             f'import sys\nsys.modules["{name}"] = None\nimport {name}.planner\n')
@@ -137,9 +137,9 @@ def test_ros_is_found() -> None:
 
 
 def test_profile_in_force(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Loopback is fine; an open network, another middleware, another profile are said."""
+    """Loopback passes; an open network, another middleware, another profile are reported."""
     assert check_profile().status == 'ok'
-    # The same one, of another copy of the package: where colcon or pip has installed it.
+    # The same profile from another copy of the package, as installed by colcon or pip.
     other = tmp_path / 'fastdds_loopback.xml'
     other.write_bytes(loopback_profile().read_bytes())
     for name in PROFILE_VARIABLES:
@@ -156,11 +156,11 @@ def test_profile_in_force(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> No
 
 
 def test_devices(tmp_path: Path) -> None:
-    """No device, unreadable devices and readable ones are told apart."""
+    """No device, unreadable devices and readable ones are distinguished."""
     assert check_devices(tmp_path).detail == f'none in {tmp_path}'
     (tmp_path / 'event0').touch()
     assert check_devices(tmp_path) == Check('input devices', 'ok', '1 readable')
-    # Dangling, because root may read anything else.
+    # A dangling link, because root may read anything else.
     (tmp_path / 'event1').symlink_to(tmp_path / 'gone')
     check = check_devices(tmp_path)
     assert (check.status, check.detail) == ('warn', '1 of 2 not readable')
@@ -211,7 +211,7 @@ def test_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_processors(tmp_path: Path) -> None:
-    """A governor that saves power is warned of."""
+    """A governor that saves power causes a warning."""
     assert 'virtual machine' in check_processors(tmp_path).detail
     governor = tmp_path / 'cpu0' / 'cpufreq' / 'scaling_governor'
     governor.parent.mkdir(parents=True)

@@ -39,7 +39,7 @@ def test_ruff() -> None:
 
 @pytest.mark.slow
 def test_mypy() -> None:
-    """Everything in the package is annotated, and consistently so (pyproject.toml)."""
+    """Everything in the package is annotated, and consistently (pyproject.toml)."""
     _run('mypy', '--cache-dir', str(ROOT / 'build' / '.mypy_cache'))
 
 

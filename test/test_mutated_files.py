@@ -26,7 +26,7 @@ def mutated_files() -> Iterator[Any]:
     sys.path.insert(0, str(BENCHMARKS))
     import mutated_files
     yield mutated_files
-    # What a harness has set aside.
+    # Garbage that a harness has frozen.
     gc.unfreeze()
     sys.path.remove(str(BENCHMARKS))
 
@@ -47,7 +47,7 @@ def test_broken_files_of_every_kind_are_refused_in_one_line_or_run(
 
 
 def test_sound_files_of_every_kind_are_loaded(mutated_files: Any, tmp_path: Path) -> None:
-    """Otherwise a refusal would say nothing."""
+    """Otherwise a refusal would prove nothing."""
     harness = mutated_files.Harness(tmp_path, 0)
     for kind in harness.kinds:
         case = harness.case(1, kind)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed and where, the pins, and scripts/env.sh."""
+"""The installed files and their places, the pins, and scripts/env.sh."""
 
 import ast
 from collections.abc import Iterator
@@ -59,12 +59,12 @@ def _pip(*arguments: str) -> None:
 
 @pytest.fixture(scope='module')
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Copy what a package is built from."""
+    """Copy the sources of a package."""
     copied = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
                    'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
                    'requirements.txt', 'requirements-planners.txt', 'LICENSE',
                    *(name for name in ('launch', 'scenarios') if (ROOT / name).is_dir()))
-    # As it is where the page has been checked.
+    # As in a tree where the page has been checked.
     foreign = copied / 'test' / 'page' / 'node_modules' / 'somebody'
     foreign.mkdir(parents=True)
     (foreign / 'index.js').touch()
@@ -82,7 +82,7 @@ def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize('options', [[], ['--symlink-install']])
 def test_colcon_makes_executables(source: Path, options: list[str], tmp_path: Path) -> None:
-    """Also where it runs setup.py without pyproject.toml, as for links."""
+    """It makes them also when it runs setup.py without pyproject.toml, as for links."""
     done = subprocess.run(
         [sys.executable, '-m', 'colcon', '--log-base', str(tmp_path / 'log'), 'build',
          '--base-paths', str(source), '--build-base', str(tmp_path / 'build'),
@@ -136,7 +136,7 @@ def test_installed_package_finds_its_data(prefix: Path) -> None:
 
 
 def test_ros2_run_finds_executables(prefix: Path) -> None:
-    """What `ros2 run` starts from lib/crgame_ros hands everything to the script in bin."""
+    """The file in lib/crgame_ros that `ros2 run` starts passes everything to the script in bin."""
     for name in (*NODES, 'crgame'):
         assert os.access(prefix / 'bin' / name, os.X_OK)
         assert os.access(prefix / 'lib' / 'crgame_ros' / name, os.X_OK)
@@ -207,7 +207,7 @@ def test_every_entry_point_resolves(wheel: Path) -> None:
 @pytest.mark.parametrize(('name', 'extras'), [
     ('requirements.txt', []), ('requirements-dev.txt', ['test', 'docs', 'gym', 'evaluate'])])
 def test_requirements_are_pinned_and_serve_the_installation(name: str, extras: list[str]) -> None:
-    """Each with its hashes and no address; they satisfy what pyproject.toml asks for."""
+    """Each has its hashes and no address; they satisfy the requirements of pyproject.toml."""
     text = (ROOT / name).read_text(encoding='utf-8')
     assert '://' not in text
     for package in re.split(r'\n(?! )', text.strip()):
@@ -270,7 +270,7 @@ def _stamped(tree: Path) -> Path:
 
 
 def test_env_sets_the_environment_once(tmp_path: Path) -> None:
-    """A second call changes nothing; what the user had on the paths stays behind ours."""
+    """A second call changes nothing; the user's own entries on the paths stay behind ours."""
     tree = _stamped(tmp_path / 'a tree')
     show = 'env | grep -vE "^(_|SHLVL|PWD|OLDPWD)=" | sort'
     once = _source(tree, show, AMENT_PREFIX_PATH='/overlay')
@@ -293,7 +293,7 @@ def test_env_sets_the_environment_once(tmp_path: Path) -> None:
 
 
 def test_env_opens_the_network_on_request(tmp_path: Path) -> None:
-    """CRGAME_OPEN_NETWORK=1 also takes back what an earlier call has set."""
+    """CRGAME_OPEN_NETWORK=1 also removes the settings of an earlier call."""
     tree = _stamped(tmp_path)
     done = _source(tree, f'export CRGAME_OPEN_NETWORK=1; source "{tree}/scripts/env.sh"; env')
     assert done.returncode == 0, done.stderr
@@ -332,10 +332,10 @@ def test_env_refuses_other_pythons(tmp_path: Path) -> None:
 
 
 def test_env_makes_another_one_beside_an_environment_of_another_python(tmp_path: Path) -> None:
-    """The first, which may be in use, stays as it is; so it does where the second one fails."""
+    """The first, which may be in use, is unchanged, also if the second one fails."""
     tree = _stamped(tmp_path / 'tree')
     other = tmp_path / 'python3.12'
-    # A Python that is there, and cannot make a venv after all.
+    # A Python that exists but cannot make a venv.
     other.write_text('#!/bin/sh\ncase "$*" in *_base_executable*) echo "3.12 $0";; '
                      '*"-m venv"*) exit 1;; esac\n')
     other.chmod(0o755)
@@ -346,7 +346,7 @@ def test_env_makes_another_one_beside_an_environment_of_another_python(tmp_path:
     assert 'cannot make environments: apt install python3-venv' in done.stderr.splitlines()[-1]
     assert (tree / '.venv' / 'stamp').read_text() == before
     assert (tree / '.venv' / 'bin' / 'python').exists()
-    # Complete, it is used where that Python is asked for, and the first where none is.
+    # Complete, it is used if that Python is asked for; the first is used if none is.
     (tree / '.venv-3.12' / 'bin').mkdir()
     (tree / '.venv-3.12' / 'bin' / 'python').symlink_to(sys.executable)
     (tree / '.venv-3.12' / 'stamp').write_text(before)
@@ -378,7 +378,7 @@ def test_a_checkout_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_while_packages_are_installed_is_one_line(tmp_path: Path) -> None:
-    """As a terminal does: the whole group gets the signal."""
+    """The whole group gets the signal, as from a terminal."""
     tree = _copy(tmp_path, 'scripts/env.sh', 'scripts/make_venv.sh', *PINS)
     uv = tmp_path / 'programs' / 'uv'
     uv.parent.mkdir()
@@ -397,7 +397,7 @@ def test_ctrl_c_while_packages_are_installed_is_one_line(tmp_path: Path) -> None
 
 
 def test_help_needs_no_environment(tmp_path: Path) -> None:
-    """Neither packages nor a folder to write to, also through a link."""
+    """It needs no packages and no writable folder, also through a link."""
     tree = _copy(tmp_path / 'tree', 'scripts/env.sh', 'scripts/make_venv.sh', *PINS, 'run.sh',
                  'test.sh', 'crgame')
     (tree / 'crgame_ros').symlink_to(ROOT / 'crgame_ros')
@@ -423,7 +423,7 @@ def _examples() -> Iterator[tuple[Path, str]]:
 
 
 def test_examples_of_crgame_are_true() -> None:
-    """Each calls the command that a clone has, from where the reader is, with valid arguments."""
+    """Each calls the command of a clone, from the reader's folder, with valid arguments."""
     examples = list(_examples())
     assert len(examples) >= 7
     for page, line in examples:
@@ -440,7 +440,7 @@ def test_crgame_runs_from_a_clone(tmp_path: Path) -> None:
     (tree / '.venv' / 'bin' / 'crgame').symlink_to('../../crgame')
     (tree / 'crgame_ros').symlink_to(ROOT / 'crgame_ros')
     (tmp_path / 'link').symlink_to(tree / 'crgame')
-    # This interpreter, with the packages that it has.
+    # This interpreter, with its packages.
     python = tree / '.venv' / 'bin' / 'python'
     python.unlink()
     python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')

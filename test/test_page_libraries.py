@@ -22,7 +22,7 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Let the environment and the user's home be empty; give the folder of the first."""
+    """Make the environment and the user's home empty; return the folder of the first."""
     monkeypatch.setattr(sys, 'prefix', str(tmp_path / 'environment'))
     monkeypatch.setenv('XDG_DATA_HOME', str(tmp_path / 'home'))
     return tmp_path / 'environment' / 'share' / 'crgame_ros'
@@ -30,7 +30,7 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def npm() -> None:
-    """Skip where there is no npm: the one that pip brings has 60 MB."""
+    """Skip without npm: the one from pip has 60 MB."""
     if shutil.which('npm') is None:
         pytest.skip('the libraries are not fetched: npm is missing')
 
@@ -96,7 +96,7 @@ def test_without_plotly_a_report_names_the_command() -> None:
 
 
 def test_the_packages_are_pinned_and_come_from_whatever_registry_is_set() -> None:
-    """An exact version with its checksum each, and no address of a server."""
+    """Each has an exact version and its checksum, and no address of a server."""
     folder = config_directory() / 'page_libraries'
     pins = json.loads((folder / 'package.json').read_text('utf-8'))['dependencies']
     lock = json.loads((folder / 'package-lock.json').read_text('utf-8'))

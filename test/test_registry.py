@@ -92,7 +92,7 @@ def test_entry_points_come_after_the_built_in_names(
     ids=['supplied', 'unknown', 'text', 'number for a switch', 'out of bounds'])
 def test_wrong_options_are_refused_with_their_place(
         registry: ModelRegistry, options: dict[str, object], message: str) -> None:
-    """What the program supplies is no option, and messages name the key of the game."""
+    """Arguments of the program are no options, and messages name the key of the game."""
     with pytest.raises(InputError, match=re.escape(message)) as caught:
         registry.create('lqr', options, 'game.yaml avs[0].tracker', **GIVEN)
     assert str(caught.value).startswith('game.yaml avs[0].tracker: options of tracker lqr: ')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A file has its name only once the disk has what is in it."""
+"""A file gets its name only after its content is on the disk."""
 
 import os
 from pathlib import Path
@@ -14,7 +14,7 @@ import pytest
 
 @pytest.fixture
 def synced(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, frozenset[str]]]:
-    """Note what is given to the disk, and which names were in its folder at that moment."""
+    """Record each sync to the disk, and the names in its folder at that moment."""
     calls: list[tuple[str, frozenset[str]]] = []
     fsync = os.fsync
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What runs on a machine without a compiler.
+Features that work on a machine without a compiler.
 
 Polygon3, which commonroad_dc.boundary imports, is the one package without wheels. Everything here
 runs in processes in which it cannot be imported.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The reader of all YAML files: what is large, deep or no plain data is refused in one line."""
+"""The reader of all YAML files: large, deep or non-plain data is refused in one line."""
 
 from collections.abc import Callable
 import os
@@ -39,9 +39,9 @@ HOSTILE = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize('kind', READERS)
-def test_hostile_yaml_is_refused_in_one_line_by_all_who_read_yaml(
+def test_hostile_yaml_is_refused_in_one_line_by_all_readers(
         kind: str, tmp_path: Path) -> None:
-    """Each within 2 s, in fewer than 500 characters, with the file's name; none is a traceback."""
+    """Each refuses within 2 s, in fewer than 500 characters with the file's name, no traceback."""
     for number, (name, text) in enumerate(HOSTILE.items()):
         # Vehicles and devices are remembered by their names.
         path = tmp_path / str(number) / 'metadata.yaml'
@@ -57,7 +57,7 @@ def test_hostile_yaml_is_refused_in_one_line_by_all_who_read_yaml(
 
 @pytest.mark.parametrize('kind', READERS)
 def test_what_is_no_regular_file_is_not_opened(kind: str, tmp_path: Path) -> None:
-    """Reading a pipe that nobody writes to would wait for ever."""
+    """Reading a pipe without a writer would wait for ever."""
     path = tmp_path / 'metadata.yaml'
     os.mkfifo(path)
     with pytest.raises(InputError, match='is no regular file'):
@@ -65,7 +65,7 @@ def test_what_is_no_regular_file_is_not_opened(kind: str, tmp_path: Path) -> Non
 
 
 def test_plain_values_are_what_yaml_means() -> None:
-    """Dates are text: nobody here wants a date, and 2026-13-45 is a good title."""
+    """Dates are text: no key here is a date, and 2026-13-45 is a good title."""
     text = 'a: 2026-13-45\nb: [1, 2.5, true, null, .inf]\nc: &c {d: é}\ne: *c\nf: 1_000\ng: 0x10'
     assert parse_yaml(text, 'x') == {
         'a': '2026-13-45', 'b': [1, 2.5, True, None, float('inf')], 'c': {'d': 'é'},

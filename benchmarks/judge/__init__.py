@@ -1,3 +1,3 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What traffic may not do, looked for from outside: states and a CommonRoad file, no more."""
+"""Faults of traffic, found from outside: from states and a CommonRoad file alone."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Why somebody braked hard: what was nearest ahead on the way that it drove, and a guess."""
+"""Causes of hard braking: the nearest object ahead on the agent's path, and a guess."""
 
 from judge.history import Event, FloatArray, History
 from judge.lights import RED, Stop, stops
@@ -10,13 +10,13 @@ import numpy as np
 import shapely
 import shapely.ops
 
-# The way looked at: what is driven in the next seconds, then straight on [s, m].
+# The examined path: the path driven in the next seconds, then straight on [s, m].
 NEXT_S = 6.0
 REACH = 60.0
 MARGIN = 0.2
 # Causes lie at most so far back [s].
 RECENT_S = 2.0
-# Hard enough to be forced by what is ahead [m/s^2].
+# Hard enough to be forced by an object ahead [m/s^2].
 FORCED = 3.0
 
 
@@ -38,7 +38,7 @@ def hard_brakings(history: History, roads: JudgedRoads) -> list[Event]:
 
 
 def _way(history: History, row: int, agent: int) -> shapely.LineString:
-    """Return the centre's way from a time on, straight on from where it is later."""
+    """Return the centre's path from a time on, straight on from its later place."""
     until = row + round(NEXT_S / history.time_step_s)
     rows = np.arange(row, min(until, len(history) - 1) + 1)
     rows = rows[history.born[rows, agent] == history.born[row, agent]]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What was seen of a run: where everybody was at each time step, and what lights showed."""
+"""Observations of a run: the poses of all objects at each time step, and the lights' states."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,7 +35,7 @@ class Event:
 
     :param what: its kind, a key of the summary.
     :param at_s: since the start of the run.
-    :param ids: who was part of it.
+    :param ids: objects that were part of it.
     :param place: x, y of the first of them [m]
     :param value: how much of it; the unit is in the note.
     :param note: for people.
@@ -62,7 +62,7 @@ class History:
     :param poses: (T, N, 3) of the centres [m, rad]; NaN where absent.
     :param velocities: (T, N, 3) [m/s, rad/s]
     :param light_ids: (L) of the traffic lights.
-    :param lights: (T, L) what they show, in CommonRoad's spelling.
+    :param lights: (T, L) their states, in CommonRoad's spelling.
     """
 
     time_step_s: float
@@ -80,7 +80,7 @@ class History:
 
     @cached_property
     def present(self) -> BoolArray:
-        """Return who (T, N) is there."""
+        """Return which objects (T, N) are present."""
         return np.isfinite(self.poses).all(axis=2)
 
     @cached_property

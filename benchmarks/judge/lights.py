@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Who drives over a line at red.
+Agents that drive over a line at red.
 
 The line is the lanelet's stop line, or its end. The movement is the one that is driven
 afterwards: the way through the junction that the centre follows best, with the direction that
@@ -24,10 +24,10 @@ TURN = 0.5
 # Ways through a junction are followed this far, at most so many of them [m].
 FAR = 60.0
 MOST_WAYS = 64
-# Centres tell ways apart that differ by this on average [m].
+# Centres distinguish ways that differ by this on average [m].
 APART = 0.4
 ASIDE = 0.3
-# Whoever would have had to brake harder when the light left green could not stop [m/s^2],
+# An agent that would have had to brake harder when the light left green could not stop [m/s^2],
 # if it crosses in the first moments of red [s].
 COULD_NOT = 3.0
 MOMENTS_S = 3.0
@@ -130,7 +130,7 @@ def _turn(roads: JudgedRoads, lane: int, path: list[int]) -> str:
 
 
 def red_lines(history: History, roads: JudgedRoads) -> list[Event]:
-    """Report `red` for each crossing at red, `red unavoidable` for who could not stop."""
+    """Report `red` for each crossing at red, `red unavoidable` if the agent could not stop."""
     if history.lights is None or not history.light_ids:
         return []
     crossings: dict[tuple[int, int], list[tuple[int, Stop]]] = {}
@@ -161,7 +161,7 @@ def _crossings(history: History, stop: Stop) -> IntArray:
 
 def _driven(history: History, agent: int, found: list[tuple[int, Stop]]
             ) -> Iterator[tuple[int, Stop, set[str]]]:
-    """Yield the lines that an agent did pass, of those that lie over each other one."""
+    """Yield the lines that an agent did pass, one of those that lie over each other."""
     window = round(1.0 / history.time_step_s)
     while found:
         row = found[0][0]
@@ -181,7 +181,7 @@ def _fits(history: History, agent: int, row: int, stop: Stop) -> list[tuple[floa
     rows = row + np.flatnonzero(np.cumprod(born[row:] == born[row]))
     points = history.poses[rows, agent, :2]
     gone = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    # One point a metre: who stands does not count more.
+    # One point a metre: a standing agent does not count more.
     _, first = np.unique(np.floor(gone), return_index=True)
     points, gone = shapely.points(points[first]), gone[first]
     return [(float(shapely.distance(way.line, points[gone < FAR]).mean()), way.movement)
@@ -220,7 +220,7 @@ def needed_braking(history: History, agent: int, row: int, left_green: int) -> f
     """
     Return the deceleration that would have stopped an agent before the line it passes after row.
 
-    From where and how fast it was when its light left green, or when it appeared if that is
+    From its place and speed when its light left green, or when it appeared if that is
     later, one time step after that for seeing it [m/s^2].
     """
     start = max(left_green, int(history.born[row, agent]))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How agents move: in curves, beyond the road, braking, jerk.
+The motion of agents: in curves, beyond the road, braking, jerk.
 
 Lateral acceleration is speed times yaw rate, both from poses by central differences over two time
 steps, of agents that drive (faster than 0.5 m/s). Braking is the forward difference of the

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who drives through whom."""
+"""Overlaps of agents with other objects."""
 
 from judge.history import BoolArray, Event, FloatArray, History, IntArray, wrapped
 import numpy as np

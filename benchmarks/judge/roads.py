@@ -73,7 +73,7 @@ class JudgedRoads:
         self._drivable = np.array([not x.lanelet_type & NO_LANE for x in self.lanelets])
 
     def _meet(self, lane: int, onto: int) -> bool:
-        """Return whether a lane does begin where another ends; some files say so of others."""
+        """Return whether a lane begins where another ends; some files link other lanes."""
         gap = self.lanes[onto].vertices[0] - self.lanes[lane].vertices[-1]
         return lane != onto and float(np.hypot(*gap)) < MEET
 
@@ -125,7 +125,7 @@ class JudgedRoads:
 
     @cached_property
     def crossed(self) -> list[bool]:
-        """Tell of each lane whether it shares ground with one that is not beside it."""
+        """Return for each lane whether it shares ground with one that is not beside it."""
         result = [False] * len(self.lanelets)
         one, other = shapely.STRtree(self.areas).query(self.areas, predicate='intersects')
         for i, j in zip(one.tolist(), other.tolist(), strict=True):
@@ -140,7 +140,7 @@ class JudgedRoads:
         """
         List the lanes that begin and that end at the map's edge.
 
-        One beside which another of its direction goes on ends on the road instead.
+        A lane beside one of its direction that goes on ends on the road instead.
         """
         return ([i for i in range(len(self.lanelets))
                  if not any(self.predecessors[j] for j in self.same_way(i))],

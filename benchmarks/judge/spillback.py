@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Queues behind junctions that leave no room for who waits before them.
+Queues behind junctions that leave no room for agents that wait before them.
 
-Nobody enters a junction that it cannot leave: whoever stands behind it, without a length and
-`GAP` between its rear and the last crossing, explains who is first before it. Of several ways on
-the one counts that was taken later; of who never got on, any.
+No agent enters a junction that it cannot leave: an object that stands behind it, with less than
+a length and `GAP` between its rear and the last crossing, explains the first agent before it. Of
+several ways on the one that was taken later counts; for an agent that never got on, any.
 """
 
 from judge.history import FloatArray, History, IntArray
@@ -13,17 +13,17 @@ from judge.roads import JudgedRoads
 import shapely
 
 GAP = 4.0
-# Whoever's centre is nearer to the way that was taken stood on it [m].
+# An object whose centre is nearer to the way that was taken stood on it [m].
 ON_WAY = 1.5
-# So far ahead one looks [m]: over the junction and a length behind it.
+# The distance examined ahead [m]: over the junction and a length behind it.
 REACH = 70.0
 
 
 class Spillback:
     """
-    Who at a time leaves no room behind a junction.
+    The objects that leave no room behind a junction at a time.
 
-    :param here: columns of those who stand, those who are no agents included.
+    :param here: columns of standing objects, those that are no agents included.
     """
 
     def __init__(self, history: History, roads: JudgedRoads, row: int, here: IntArray) -> None:
@@ -46,7 +46,7 @@ class Spillback:
         return shapely.LineString(places if len(places) > 1 else places[[0, 0]])
 
     def before(self, agent: int) -> int:
-        """Find who leaves an agent that stands no room behind the junction before it, or -1."""
+        """Find the object that leaves a standing agent no room behind the next junction, or -1."""
         lane = self._lane.get(agent, -1)
         if lane < 0:
             return -1

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Who stands for long, and whether anything explains it.
+Agents that stand for long, and the explanations.
 
-Once a second: whoever has not got away by 3 m from a place stands there. A stand is explained at
-that moment by a light that is not green within 25 m ahead, by a human nearby (on foot, or
-driving), or by a queue: what stands right ahead, or leaves no room behind the junction ahead, is
-explained itself, or has not stood for long itself. The first of a queue counts for all of it; a
-circle of waiting explains nobody. Behind something that is no agent and stands, one is `blocked`,
-which is told apart.
+Once a second: an agent that has not moved 3 m away from a place stands there. A stand is explained
+at that moment by a light that is not green within 25 m ahead, by a human nearby (on foot, or
+driving), or by a queue: the object that stands right ahead, or leaves no room behind the junction
+ahead, is explained itself, or has not stood for long itself. The first of a queue counts for all
+of it; a circle of waiting explains no agent. An agent behind a standing object that is no agent
+is `blocked`, which is reported separately.
 """
 
 from judge.history import BoolArray, Event, FloatArray, History, IntArray
@@ -19,7 +19,7 @@ import numpy as np
 
 LONG_S = 90.0
 AWAY = 3.0
-# Who has stood unexplained for so long: is there room behind the junction?
+# After so long an unexplained stand the room behind the junction is checked.
 ASKED_S = 30.0
 LIGHT_AHEAD = 25.0
 QUEUE_GAP = 12.0
@@ -67,7 +67,7 @@ def stands(history: History, roads: JudgedRoads) -> list[Event]:
 
 def _reasons(history: History, roads: JudgedRoads, lines: list[Stop], row: int,
              waiting: IntArray, unexplained: FloatArray) -> dict[int, tuple[str, str]]:
-    """Return the state of everybody who stands at a time, and who is ahead."""
+    """Return the states of all agents that stand at a time, and the objects ahead of them."""
     ahead = dict(zip(waiting.tolist(), _ahead(history, row, waiting).tolist(), strict=True))
     lit = dict(zip(waiting.tolist(), (_at_light(history, lines, row, waiting) | _human(
         history, row, waiting)).tolist(), strict=True))
@@ -104,12 +104,12 @@ def _reasons(history: History, roads: JudgedRoads, lines: list[Stop], row: int,
 
 
 def _stand(history: History, row: int) -> IntArray:
-    """List who stands at a time."""
+    """List the objects that stand at a time."""
     return np.flatnonzero(history.present[row] & (np.abs(history.speed[row]) < SLOW))
 
 
 def _ahead(history: History, row: int, agents: IntArray) -> IntArray:
-    """Find who stands right ahead of agents (A), or -1."""
+    """Find the objects that stand right ahead of agents (A), or -1."""
     poses, here = history.poses[row], _stand(history, row)
     along, aside = _seen(poses[agents], poses[here])
     turn = poses[here, 2] - poses[agents, 2, None]
@@ -126,7 +126,7 @@ def _ahead(history: History, row: int, agents: IntArray) -> IntArray:
 
 
 def _at_light(history: History, lines: list[Stop], row: int, agents: IntArray) -> BoolArray:
-    """Tell of agents (A) whether a light that is not green lies ahead."""
+    """Return for agents (A) whether a light that is not green lies ahead."""
     front, yaw = history.fronts[row, agents], history.poses[row, agents, 2]
     result = np.zeros(len(agents), dtype=bool)
     for stop in lines:
@@ -142,7 +142,7 @@ def _at_light(history: History, lines: list[Stop], row: int, agents: IntArray) -
 
 
 def _human(history: History, row: int, agents: IntArray) -> BoolArray:
-    """Tell of agents (A) whether a human is near and not behind."""
+    """Return for agents (A) whether a human is near and not behind."""
     humans = [i for i, kind in enumerate(history.kinds)
               if kind in HUMANS and history.present[row, i]]
     along, aside = _seen(history.poses[row, agents], history.poses[row, humans])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All that an outsider finds in a run."""
+"""All faults that are found in a run from outside."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from judge.roads import JudgedRoads
 from judge.standing import stands
 import numpy as np
 
-# What must not happen at all.
+# Events that must not happen at all.
 FORBIDDEN = ('overlap', 'red', 'off road', 'unexplained', 'jump', 'vanished')
 LATERAL_P99 = 2.5
 HARD_SHARE = 1e-4
-# Who leaves does so this near to an end of the map [m].
+# An agent that leaves does so this near to an end of the map [m].
 NEAR_END = 20.0
 
 
 @dataclass(frozen=True)
 class Verdict:
     """
-    What one run showed.
+    The result of one run.
 
     :param events: in order of time.
     :param lateral_p99: of all agents that drive, over time; `lateral_max` [m/s^2]
@@ -76,9 +76,9 @@ class Verdict:
 
 def judge(history: History, roads: JudgedRoads, recording: History | None = None) -> Verdict:
     """
-    Look at a run.
+    Judge a run.
 
-    :param recording: of the vehicles that became agents, to tell which overlap there already.
+    :param recording: of the vehicles that became agents, to find those that overlap there already.
     """
     agents = history.agents
     away_events, away = off_road(history, roads)
@@ -101,7 +101,7 @@ def judge(history: History, roads: JudgedRoads, recording: History | None = None
 
 
 def vanished(history: History, roads: JudgedRoads) -> list[Event]:
-    """Report who disappears where no road ends, as `vanished`."""
+    """Report agents that disappear where no road ends, as `vanished`."""
     ends = np.array([roads.lanes[i].vertices[-1] for i in roads.ends[1]]).reshape(-1, 2)
     events = []
     for life in history.lives:

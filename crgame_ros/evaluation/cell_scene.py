@@ -174,7 +174,7 @@ def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
         files.append(image)
     files += code_neighbours(file)
     if sum(each.stat().st_size for each in files) > MOST_BYTES:
-        raise InputError(f'has more than {MOST_BYTES // 2**20} MiB with what it names beside it',
+        raise InputError(f'has more than {MOST_BYTES // 2**20} MiB, with the files it imports',
                          str(file), 'install the planner where the workers are, and name it '
                          'module:Class')
     for each in files:

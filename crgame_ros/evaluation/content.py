@@ -112,7 +112,7 @@ class ContentStore:
             found = next((Content(name, files) for name in files
                           if Content(name, files).digest == digest), None)
             if found is None:
-                raise InputError('is not what its name says', f'content {digest}',
+                raise InputError('does not match its digest', f'content {digest}',
                                  'start the evaluation again')
             self.put(found)
 

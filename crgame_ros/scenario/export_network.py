@@ -107,8 +107,8 @@ def write_roads(loaded: LoadedScenario, shift: int, notices: list[str]) -> Writt
     if errors:
         raise InputError(f'the roads cannot be written as a valid scenario '
                          f'({"; ".join(errors[:3])})', loaded.source, 'correct the scenario')
-    notices.append('the roads of the original are not as the CommonRoad 2020a schema has them and '
-                   'are written anew from what was read')
+    notices.append('the roads of the original violate the CommonRoad 2020a schema and were '
+                   'rewritten from the loaded scenario')
     notices += remarks
     return WrittenRoads(kept, lanelets)
 

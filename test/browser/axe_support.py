@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What axe finds in a page: barriers that WCAG 2.2 names, of levels A and AA."""
+"""Violations that axe finds in a page: barriers of WCAG 2.2, levels A and AA."""
 
 from functools import cache
 from pathlib import Path
@@ -29,7 +29,7 @@ def _axe() -> str:
 
 
 def barriers(browser: Browser) -> list[str]:
-    """Return what stands in the way of somebody who reads the page as it is now."""
+    """Return the barriers of the page in its present state."""
     if not browser.run('return "axe" in window'):
         # The page's own policy refuses scripts from elsewhere.
         browser.driver.execute_cdp_cmd('Runtime.evaluate', {'expression': _axe()})

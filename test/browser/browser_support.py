@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One headless Chromium, and what tests of the page ask of it."""
+"""One headless Chromium, and the operations that tests of the page need."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ _FLAGS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no
 
 
 def missing_programs() -> list[str]:
-    """Name what a browser test needs and this machine lacks."""
+    """Return the names of tools that browser tests need and this machine lacks."""
     missing = [] if _chromium() else ['chromium']
     missing += [] if shutil.which('chromedriver') else ['chromedriver']
     missing += [] if importlib.util.find_spec('selenium') else ['the Python package selenium']
@@ -41,7 +41,7 @@ class Browser:
     """
     One browser window.
 
-    :param driver: its selenium driver, for what is not wrapped here.
+    :param driver: its selenium driver, for calls that are not wrapped here.
     """
 
     def __init__(self, driver: 'WebDriver') -> None:
@@ -49,11 +49,11 @@ class Browser:
         self._errors: list[str] = []
 
     def renew(self) -> None:
-        """Be as if just started: another tab of 1280x720, no key held, nothing remembered."""
+        """Reset to the state of a new start: another tab of 1280x720, no held key, no storage."""
         from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
         ActionBuilder(self.driver).clear_actions()
-        # A page remembers by its address; where there is none yet, there is nothing to forget.
+        # Storage belongs to an address; a tab without one has no storage to clear.
         self.run('try { localStorage.clear(); sessionStorage.clear(); } catch {}')
         before = self.driver.window_handles
         self.driver.switch_to.new_window('tab')
@@ -76,16 +76,16 @@ class Browser:
             'width': width, 'height': height, 'deviceScaleFactor': ratio, 'mobile': False})
 
     def prefer(self, scheme: str) -> None:
-        """Let the system prefer the dark or the light theme."""
+        """Make the system prefer the dark or the light theme."""
         self.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
             'features': [{'name': 'prefers-color-scheme', 'value': scheme}]})
 
     def run(self, script: str, *arguments: Any) -> Any:
-        """Run a function body in the page; what it returns comes back as Python values."""
+        """Run a function body in the page; return its result as Python values."""
         return self.driver.execute_script(script, *arguments)
 
     def run_async(self, script: str, *arguments: Any) -> Any:
-        """Run the body of an async function in the page, and wait for what it returns."""
+        """Run the body of an async function in the page; return its result."""
         self.driver.set_script_timeout(PATIENCE_S)
         answer = self.driver.execute_async_script(
             'const done = arguments[arguments.length - 1];'
@@ -98,10 +98,10 @@ class Browser:
     def wait(self, condition: str, what: str = '', patience_s: float = PATIENCE_S,
              arguments: tuple[Any, ...] = ()) -> Any:
         """
-        Wait until an expression of the page is true; while it throws, it is not.
+        Wait until an expression of the page is true; an exception counts as false.
 
-        :param condition: JavaScript expression; `arguments` holds what is given
-        :param what: said when it stays false
+        :param condition: JavaScript expression; `arguments` holds the further arguments
+        :param what: part of the failure message if it stays false
         :return: its value
         """
         end = time.monotonic() + patience_s
@@ -117,18 +117,18 @@ class Browser:
             time.sleep(_POLL_S)
 
     def console_errors(self) -> list[str]:
-        """Return every error that the page has logged since it was opened, thrown ones too."""
+        """Return every error that the page has logged since it was opened, also thrown ones."""
         self._errors += [entry['message'] for entry in self.driver.get_log('browser')
                          if entry['level'] == 'SEVERE']
         return list(self._errors)
 
     def forget_errors(self) -> None:
-        """Begin anew to collect what `console_errors` gives."""
+        """Clear the list that `console_errors` returns."""
         self.console_errors()
         self._errors.clear()
 
     def screenshot(self, path: Path) -> Path:
-        """Save what is seen as PNG."""
+        """Save the visible page as PNG."""
         self.driver.save_screenshot(str(path))
         return path
 
@@ -146,7 +146,7 @@ def open_browser(profile: Path, width: int = WIDTH, height: int = HEIGHT, *,
     :param width: of the page [CSS px]
     :param height: of the page [CSS px]
     :param sound: let pages make sounds without a click
-    :param trusting: open pages whose certificate nobody has signed
+    :param trusting: open pages with an unsigned certificate
     """
     from selenium import webdriver
     from selenium.webdriver.chrome.options import Options
@@ -160,7 +160,7 @@ def open_browser(profile: Path, width: int = WIDTH, height: int = HEIGHT, *,
         options.add_argument('--autoplay-policy=no-user-gesture-required')
     options.accept_insecure_certs = trusting
     options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
-    # A proxy of the machine is not for pages on this machine.
+    # Pages of this machine are not opened through its proxy.
     environment = {key: value for key, value in os.environ.items()
                    if not key.lower().endswith('_proxy')}
     service = Service(shutil.which('chromedriver'), env=environment)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Real browsers for the tests of the page; skipped, saying so, where there is none."""
+"""Real browsers for the tests of the page, which are skipped if there is none."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -34,20 +34,20 @@ def _opener(factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
 
 @pytest.fixture
 def new_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenBrowser]:
-    """Return a function that opens a browser of its own: as many people as a test needs."""
+    """Return a function that opens another browser, one for each person of a test."""
     yield from _opener(tmp_path_factory)
 
 
 @pytest.fixture(scope='session')
 def only_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Open the one browser that tests use one after the other: a start takes two seconds."""
+    """Open the one browser that tests share in turn, as a start takes two seconds."""
     for open_another in _opener(tmp_path_factory):
         yield open_another()
 
 
 @pytest.fixture
 def browser(only_browser: Browser) -> Browser:
-    """Return a browser of 1280x720 as if it had just been opened."""
+    """Return a browser of 1280x720 in the state of a new start."""
     only_browser.renew()
     return only_browser
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A desk's process, and what participants and experimenters do in a browser."""
+"""A desk's process, and the actions of participants and experimenters in a browser."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ from desk_support import write_study  # noqa: E402, I100
 
 
 class DeskProcess:
-    """A desk's process, with the addresses that it has told."""
+    """A desk's process, with the addresses that it has printed."""
 
     def __init__(self, process: 'subprocess.Popen[str]') -> None:
         self.process = process
@@ -53,7 +53,7 @@ def running(folder: Path, port: int = 0, step_s: float = 0.05, link: str = '',
 
 
 class Participant:
-    """Somebody who has a keyboard only."""
+    """A participant with only a keyboard."""
 
     def __init__(self, browser: Browser) -> None:
         self.browser = browser
@@ -62,7 +62,7 @@ class Participant:
         ActionChains(self.browser.driver).send_keys(*keys).perform()
 
     def tab_to(self, selector: str) -> None:
-        """Go to the next control that fits."""
+        """Move the focus to the next control that fits."""
         for _ in range(80):
             if self.browser.run('return document.activeElement.matches(arguments[0])', selector):
                 return
@@ -77,13 +77,13 @@ class Participant:
         self.press(Keys.ENTER)
 
     def shows(self, what: str, heading: str = '') -> None:
-        """Wait for a page, and that it says a text."""
+        """Wait for a page that shows a text."""
         self.browser.wait('document.body.dataset.show === arguments[0]'
                           ' && document.body.innerText.includes(arguments[1])',
                           f'{what} {heading}', arguments=(what, heading))
 
     def answer_all(self) -> None:
-        """Answer every question of the page: the second option, one step, 30, a few words."""
+        """Answer all questions of the page: with the second option, one step, 30, a few words."""
         kinds = self.browser.run('return [...document.querySelectorAll(".question")].map('
                                  '(node) => [node.dataset.name, node.dataset.kind])')
         for name, kind in kinds:
@@ -93,13 +93,13 @@ class Participant:
 
 
 def finished(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return what is told of each finished item."""
+    """Return the record of each finished item."""
     entries = [entry for entry in read_journal(folder / 'P07') if entry['entry'] == 'finished']
     assert len({entry['item'] for entry in entries}) == len(entries)
     return {entry['item']: entry for entry in entries}
 
 
-# Stands for the cockpit's stage: it tells that it is seated, and keeps what it hears.
+# Stands for the cockpit's stage: it reports that it is seated and keeps received messages.
 STAGE = """<!DOCTYPE html><title>stage</title><input id="wheel"><script>
 window.heard = [];
 window.began = Math.random();
@@ -114,7 +114,7 @@ setTimeout(() => parent.postMessage({ crgame: 1, kind: 'stage', state: {
 
 @contextmanager
 def stage(folder: Path) -> Iterator[str]:
-    """Serve such a page at a port of its own."""
+    """Serve such a page at its own port."""
     (folder / 'index.html').write_text(STAGE, encoding='utf-8')
     handler = functools.partial(QuietHandler, directory=str(folder))
     with ThreadingHTTPServer(('127.0.0.1', 0), handler) as server:
@@ -126,14 +126,14 @@ def stage(folder: Path) -> Iterator[str]:
 
 
 class QuietHandler(SimpleHTTPRequestHandler):
-    """Serves files without a word."""
+    """Serves files without log output."""
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing."""
+        """Drop the log message."""
 
 
 def give_order(person: Participant, name: str, reason: str = '') -> None:
-    """Press an order's button, and give the reason that it asks for."""
+    """Press an order's button and enter the required reason."""
     person.browser.wait('[...document.querySelectorAll("#orders button")].some((button) =>'
                         ' button.textContent === arguments[0] && !button.disabled)',
                         arguments=(name,))
@@ -145,7 +145,7 @@ def give_order(person: Participant, name: str, reason: str = '') -> None:
 
 
 def give_reason(person: Participant, reason: str) -> None:
-    """Type a reason into the dialog that has opened."""
+    """Type a reason into the open dialog."""
     person.browser.wait('document.querySelector("dialog[open] #reason")')
     person.browser.run('document.querySelector("#reason").focus()')
     person.press(reason, Keys.ENTER)

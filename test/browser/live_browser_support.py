@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A running graph, the pages that people have open on it, and what their hands do there."""
+"""A running graph, the pages that people have open on it, and their input."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,7 +27,7 @@ from live_support import is_node, Launcher, SCENARIOS, wait_until  # noqa: E402
 
 __all__ = ['Graph', 'live_graph', 'LivePage', 'PATIENCE_S', 'SCENARIOS']
 
-# How long to wait for what will come [s]: many times what an idle machine takes.
+# Timeout of events that must come [s]: many times the duration on an idle machine.
 PATIENCE_S = 45.0
 _POLL_S = 0.05
 THROTTLE, BRAKE, STEERING = 0, 1, 2
@@ -35,7 +35,7 @@ _TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state')
 
 
 class Graph(NamedTuple):
-    """A graph with a cockpit, a peer that listens to it, and the address of its page."""
+    """A graph with a cockpit, a peer that subscribes to it, and the address of its page."""
 
     launcher: Launcher
     peer: Peer
@@ -60,7 +60,7 @@ class Graph(NamedTuple):
             obeyed, f'{vehicle} to obey {low:g} to {high:g} in column {column}', PATIENCE_S)
 
     def wait_for_steps(self, steps: int) -> None:
-        """Wait until the simulation has gone so many steps on."""
+        """Wait for the simulation to run a number of steps."""
         self.peer.listen()
         last = self.peer.n + steps
         self.peer.wait_until(lambda: self.peer.n >= last, f'n = {last}', PATIENCE_S)
@@ -83,7 +83,7 @@ def live_graph(game: Path, out: Path, *options: str) -> Iterator[Graph]:
             yield Graph(launcher, peer, address)
         finally:
             # Killed nodes would leave their shared memory behind. Nobody needs what the launcher
-            # makes of the recordings after their end.
+            # launcher makes of the recordings after their end.
             launcher.signal(signal.SIGINT)
             wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started),
                        'the end of the nodes', PATIENCE_S)
@@ -91,9 +91,9 @@ def live_graph(game: Path, out: Path, *options: str) -> Iterator[Graph]:
 
 class LivePage:
     """
-    The page of a running graph in a browser, and a person before it.
+    The page of a running graph in a browser, used by one person.
 
-    :param graph: whose page it is.
+    :param graph: the graph of the page.
     :param browser: of the person.
     """
 
@@ -104,7 +104,7 @@ class LivePage:
         self.open()
 
     def open(self) -> None:  # noqa: A003
-        """Load the page, and wait until all its parts are there and it shows the scene."""
+        """Load the page, and wait until all its parts exist and it shows the scene."""
         self.browser.open(self.graph.address)
         self.wait('window.crgame?.ready && crgame.world.shown && crgame.store.status'
                   ' && crgame.store.me.id && Object.keys(crgame.store.seats).length > 0',
@@ -119,21 +119,21 @@ class LivePage:
         return self.browser.run_async(script, *arguments)
 
     def wait(self, condition: str, what: str = '', *arguments: Any) -> Any:
-        """Wait until an expression of the page is true, and give its value."""
+        """Wait until an expression of the page is true; return its value."""
         return self.browser.wait(condition, what, PATIENCE_S, arguments)
 
     def text(self, selector: str) -> str:
-        """Return the text of an element, as the page holds it; empty where there is none."""
+        """Return the text of an element, as the page holds it; empty without the element."""
         return str(self.run(
             'return document.querySelector(arguments[0])?.textContent ?? ""', selector))
 
     def wait_for_text(self, selector: str, part: str) -> None:
-        """Wait until an element says something."""
+        """Wait until an element has a text."""
         self.wait('document.querySelector(arguments[0])?.textContent.includes(arguments[1])',
                   f'{selector} to say {part!r}', selector, part)
 
     def click(self, selector: str) -> None:
-        """Click an element with the mouse once it is there and can be clicked."""
+        """Click an element with the mouse once it exists and is clickable."""
         end = time.monotonic() + PATIENCE_S
         while True:
             try:
@@ -143,7 +143,7 @@ class LivePage:
                     return
                 problem = 'disabled'
             except WebDriverException as error:
-                # Lists are rebuilt when something changes: it is looked up anew.
+                # Changes rebuild the lists, so the element is looked up again.
                 problem = str(error).splitlines()[0]
             if time.monotonic() > end:
                 pytest.fail(f'{selector} cannot be clicked: {problem}')
@@ -159,7 +159,7 @@ class LivePage:
         ActionChains(self.driver).key_down(key).perform()
 
     def release(self, key: str) -> None:
-        """Let a key go."""
+        """Release a key."""
         ActionChains(self.driver).key_up(key).perform()
 
     def seat(self, seat: str) -> dict[str, Any]:
@@ -171,7 +171,7 @@ class LivePage:
         return f'li[data-seat="{seat}"] [data-action="{action}"]'
 
     def claim(self, seat: str) -> None:
-        """Take a seat by its button, and wait until the hands are on its controls."""
+        """Claim a seat by its button, and wait until the hands are on its controls."""
         self.tab('drive')
         self.click(self.seat_button(seat, 'claim'))
         self.wait('crgame.driving.seat === arguments[0] && crgame.driving.away === null'
@@ -179,7 +179,7 @@ class LivePage:
                   f'the seat {seat}', seat)
 
     def give_back(self, seat: str) -> None:
-        """Give a seat back by its button."""
+        """Release a seat by its button."""
         self.tab('drive')
         self.click(self.seat_button(seat, 'release'))
         self.wait('crgame.driving.seat === null'
@@ -187,7 +187,7 @@ class LivePage:
                   f'{seat} to be given back', seat)
 
     def order(self, action: str) -> None:
-        """Press a button of the run control, and agree if asked."""
+        """Press a button of the run control, and confirm if asked."""
         self.click(f'#run-control [data-action="{action}"]')
         if action in ('reset', 'stop'):
             self.click('dialog.confirm[open] .danger')
@@ -197,30 +197,30 @@ class LivePage:
         self.wait('crgame.store.status.run === arguments[0]', f'a run that is {state}', state)
 
     def reset(self) -> None:
-        """Begin anew by the button, and wait until the new run is shown and goes on."""
+        """Reset by the button, and wait until the new run is shown and running."""
         epoch = self.run('return crgame.store.status.epoch')
         self.order('reset')
         self.wait('crgame.store.status.epoch > arguments[0]'
                   ' && ["running", "paused"].includes(crgame.store.status.run)', 'a reset', epoch)
         if self.run('return crgame.store.status.run') == 'paused':
-            # The game's driver is somebody in a browser: it begins when they say so.
+            # The game's driver is a person in a browser, who starts the run.
             self.order('start')
         self.wait('crgame.store.status.n > 0 && crgame.store.status.run === "running"'
                   ' && crgame.world.shown?.epoch === crgame.store.status.epoch', 'a new run')
 
     def vehicle(self, index: int) -> NDArray[np.float64]:
-        """Return the 13 numbers of a vehicle as it was drawn last."""
+        """Return the 13 numbers of a vehicle as last drawn."""
         row = self.run('const at = 13 * arguments[0];'
                        'return [...crgame.world.shown.vehicles.subarray(at, at + 13)];', index)
         return np.array([np.nan if value is None else value for value in row], dtype=float)
 
     def follow(self, vehicle_id: str) -> None:
-        """Keep the camera on a vehicle, and wait until it has arrived."""
+        """Follow a vehicle with the camera, and wait until the camera has arrived."""
         self.run('crgame.world.follow(arguments[0], true);', vehicle_id)
         self.wait('!crgame.world.camera.moves', 'the camera to arrive')
 
     def picture(self, half_px: int = 150) -> NDArray[np.int64]:
-        """Take a screenshot of what lies before the followed vehicle, (rows, columns, 3)."""
+        """Return a screenshot of the area ahead of the followed vehicle, (rows, columns, 3)."""
         x, y = self.run("""
             const { camera } = crgame.world;
             const box = document.querySelector('#world').getBoundingClientRect();

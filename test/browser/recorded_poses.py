@@ -12,7 +12,7 @@ from crgame_ros.recording.reader import BagReader
 import numpy as np
 from numpy.typing import NDArray
 
-# Of a simulation step and of a scenario step of the games used here [s].
+# Durations of a simulation step and a scenario step of the games used here [s].
 DT_S, DT_C_S = 0.01, 0.1
 
 
@@ -31,7 +31,7 @@ class Recorded(NamedTuple):
         return self.vehicles[before] + share * change
 
     def objects_at(self, t: float, k: int) -> NDArray[np.float64]:
-        """Move the objects on from their scenario step."""
+        """Extrapolate the objects from their scenario step."""
         poses, velocities = self.objects[k]
         return poses + (t - (k - self.k0) * DT_C_S) * velocities
 

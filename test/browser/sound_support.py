@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the page's sound graph gives in an offline context of a real browser, as samples."""
+"""Samples that the page's sound graph renders in an offline context of a real browser."""
 
 import base64
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 RATE_Hz = 44100
 FloatArray = NDArray[np.float64]
 
-# The graph as a page builds it, fed at times with what is heard then. A context of two channels;
-# each update happens when the rendering has come to its time, as live.
+# The graph as a page builds it, in a context of two channels. Each update of the heard sounds
+# happens when the rendering reaches its time, as it does live.
 _RENDER = """
 const [seconds, gain, updates] = arguments;
 const { SoundGraph } = await import('/static/js/sound/sound_graph.js');
@@ -37,7 +37,7 @@ for (const update of updates) {
 }
 const buffer = await context.startRendering();
 """
-# Base64 of all channels, one after the other: an array of numbers would take seconds.
+# Base64 of all channels in sequence, as an array of numbers would take seconds.
 _RETURN = """
 const samples = new Float32Array(buffer.numberOfChannels * buffer.length);
 for (let i = 0; i < buffer.numberOfChannels; i += 1) {
@@ -55,26 +55,26 @@ NO_TROUBLE = {'collision': False, 'offRoad': False, 'kerb': 0}
 
 
 def own_vehicle(**values: Any) -> dict[str, Any]:
-    """Return a car that stands with a silent engine, but for what is said."""
+    """Return a standing car with a silent engine, with given changes."""
     return {'id': 'hv0', 'train': 'CAR', 'gear': 0, 'rpm': 800, 'load': 0.0, 'speed': 0.0,
             'deceleration': 0.0, 'lateral': 0.0, 'lights': 0} | values
 
 
 def other_vehicle(**values: Any) -> dict[str, Any]:
-    """Return a car that passes ahead, but for what is said."""
+    """Return a car that passes ahead, with given changes."""
     return {'id': 'av0', 'train': 'CAR', 'rpm': 1500, 'speed': 15.0, 'lights': 0,
             'distance': 4.0, 'pan': 0.0, 'doppler': 1.0} | values
 
 
 def update(at: float = 0.0, own: dict[str, Any] | None = None,
            others: Sequence[dict[str, Any]] = (), **trouble: float) -> dict[str, Any]:
-    """Return what is heard from a time on [s]."""
+    """Return an update of the heard sounds at a time [s]."""
     return {'at': at, 'own': own or own_vehicle(), 'others': list(others),
             'trouble': NO_TROUBLE | trouble}
 
 
 def decoded(answer: Any) -> FloatArray:
-    """Return the samples (channels, n) that a script has returned."""
+    """Decode the samples (channels, n) that a script has returned."""
     channels, text = answer
     samples = np.frombuffer(base64.b64decode(text), dtype='<f4').astype(np.float64)
     return samples.reshape(channels, -1)
@@ -83,10 +83,10 @@ def decoded(answer: Any) -> FloatArray:
 def render(browser: Browser, updates: Sequence[dict[str, Any]], seconds: float = 1.0,
            gain: float = 1.0) -> FloatArray:
     """
-    Render what the whole graph gives.
+    Render the output of the whole graph.
 
-    :param updates: what is heard, in order of time.
-    :param gain: of the volume; 0 leaves the graph shut, as it is while sound is off.
+    :param updates: heard sounds, in order of time.
+    :param gain: of the volume; 0 keeps the graph closed, as while sound is off.
     :return: (2, n) samples, left and right.
     """
     return decoded(browser.run_async(_RENDER + _RETURN, seconds, gain, list(updates)))
@@ -113,7 +113,7 @@ def render_voice(browser: Browser, module: str, name: str, state: dict[str, Any]
 
 
 def strongest_Hz(samples: FloatArray, low: float = 20.0, high: float = 8000.0) -> float:
-    """Find the strongest tone between two frequencies, between the bins of the FFT [Hz]."""
+    """Return the strongest tone between two frequencies, interpolated between FFT bins [Hz]."""
     spectrum = np.abs(np.fft.rfft(samples * np.hanning(len(samples))))
     bins_Hz = np.fft.rfftfreq(len(samples), 1.0 / RATE_Hz)
     allowed = np.flatnonzero((bins_Hz >= low) & (bins_Hz <= high))

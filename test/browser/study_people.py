@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A study's session from outside: its program, its pages in a browser, and what may be killed."""
+"""A study's session from outside: its program, its pages, and the processes to kill."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
@@ -21,7 +21,7 @@ from crgame_ros.study.session_journal import read_journal
 from study_robot import StudyRobot
 import websocket
 
-# What can be killed: the participant's browser, and three processes of the program.
+# Targets for a kill: the participant's browser, and three processes of the program.
 VICTIMS = ('page', 'simulation', 'launcher', 'study')
 _LOOK_S = 0.2
 
@@ -29,15 +29,15 @@ _LOOK_S = 0.2
 class _KeepRedirect(urllib.request.HTTPRedirectHandler):
 
     def redirect_request(self, *_: Any) -> None:
-        """Follow nothing: the cookie is in the answer."""
+        """Follow no redirect, as the cookie is in the answer."""
 
 
 class Experimenter:
     """
     The experimenter's connection.
 
-    :param link: that the program has printed; it lets one in, once.
-    :ivar cookie: by which the same person comes in again, name=value.
+    :param link: printed by the program; it admits one browser, once.
+    :ivar cookie: admits the same person again, name=value.
     """
 
     def __init__(self, link: str) -> None:
@@ -51,7 +51,7 @@ class Experimenter:
         self._count = 0
 
     def order(self, kind: str, **fields: Any) -> None:
-        """Send an order, over a connection of its own: nothing else is listened to."""
+        """Send an order over its own connection, which reads nothing else."""
         self._count += 1
         with closing(websocket.create_connection(
                 f'{self._address.replace("http", "ws", 1)}/ws/experimenter', cookie=self.cookie,
@@ -61,7 +61,7 @@ class Experimenter:
 
 class StudySession:
     """
-    A participant in a browser, who goes on after whatever is killed.
+    A participant in a browser that continues after every kill.
 
     :param file: study file.
     :param out: folder of its data.
@@ -74,7 +74,7 @@ class StudySession:
                         '--participant', participant, '--out', str(out), '--port', str(port)]
         self.folder = out / 'participants' / participant
         self.answers: dict[str, Any] = {}
-        # (name, run's clock as the page shows it, of what was sent at that moment) [s]
+        # (name, run's clock as the page showed it when the message was sent) [s]
         self.marked: list[tuple[str, float]] = []
         self._browser: Browser | None = None
         self._end_browser: Any = None
@@ -106,11 +106,11 @@ class StudySession:
 
     @property
     def entries(self) -> list[dict[str, Any]]:
-        """Return what the journal has."""
+        """Return the content of the journal."""
         return read_journal(self.folder)
 
     def act(self) -> str:
-        """Do what the page asks for now, and keep the program running."""
+        """Answer the page's present request, and keep the program running."""
         assert self._process is not None
         if self._process.poll() is not None and not self.is_over:
             self._start()
@@ -128,7 +128,7 @@ class StudySession:
         return self._robot.time_s()
 
     def mark(self, name: str) -> None:
-        """Set a marker while the page drives, and note the clock that the page shows then."""
+        """Set a marker while the page drives, and note the clock that the page shows."""
         time_s = self._robot.time_s()
         if time_s is not None:
             with suppress(OSError, websocket.WebSocketException):
@@ -136,7 +136,7 @@ class StudySession:
                 self.marked.append((name, time_s))
 
     def kill(self, victim: str) -> bool:
-        """Kill one of `VICTIMS` (-9); tell whether there was one."""
+        """Kill one of `VICTIMS` (-9); return whether one existed."""
         if victim == 'page':
             _kill_with_profile(self._profile)
             return True
@@ -149,7 +149,7 @@ class StudySession:
         found = re.findall(r'sim_node: process (\d+)', logs[-1].read_text()) if logs else []
         with suppress(OSError, IndexError):
             pid = int(found[-1])
-            # The launcher is its parent.
+            # The launcher is the parent process.
             if victim == 'launcher':
                 pid = int(Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[1])
             os.kill(pid, signal.SIGKILL)
@@ -160,7 +160,7 @@ class StudySession:
         """
         Go through the whole session.
 
-        :param each: told what the page shows, each time.
+        :param each: called each time with the shown page.
         """
         until_s = time.monotonic() + patience_s
         while not self.is_over:
@@ -171,7 +171,7 @@ class StudySession:
         self._process.wait(120.0)
 
     def close(self) -> None:
-        """End what still runs."""
+        """End the processes that still run."""
         self._close_browser()
         if self._process is not None and self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
@@ -188,7 +188,7 @@ class StudySession:
 
 @contextmanager
 def study_session(file: Path, out: Path, participant: str, port: int) -> Iterator[StudySession]:
-    """Begin or resume a participant's session, and end it."""
+    """Begin or resume a participant's session, and end it afterwards."""
     session = StudySession(file, out, participant, port)
     try:
         yield session

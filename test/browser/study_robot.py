@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Somebody who takes part in a study in a real browser, and always answers in the same way."""
+"""A participant of a study in a real browser that always answers in the same way."""
 
 import time
 from typing import Any, Protocol
@@ -10,8 +10,8 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 from urllib3.exceptions import HTTPError
 
-# Answers are chosen by the question's name, so that a test can say what they must be; told are
-# the chosen ones. Radio buttons are clicked, the others typed.
+# The question's name determines the answer, so that a test knows the expected one; the chosen
+# answers are returned. Radio buttons are clicked, other answers typed.
 _ANSWER = """
 const told = {};
 for (const node of document.querySelectorAll('#sheet .question[data-name]')) {
@@ -36,7 +36,7 @@ return told;
 """
 
 
-# The page around the drive is told of its clock; the first call begins to listen.
+# The page around the drive receives its clock; the first call subscribes.
 _CLOCK = """
 if (window.heard === undefined) {
   window.heard = {};
@@ -50,12 +50,12 @@ return document.body.dataset.show === 'drive' && state && state.run === 'running
 """
 
 
-# Steering, and the answer to a light that may be there.
+# Steering, and the answer to a light that may be on.
 _TOUCHED = (Keys.ARROW_RIGHT, Keys.ENTER, Keys.ARROW_LEFT)
 
 
 class Page(Protocol):
-    """What a browser has to do for the robot."""
+    """The operations that the robot needs of a browser."""
 
     driver: Any
 
@@ -69,8 +69,8 @@ class StudyRobot:
 
     :param browser: with the participant's page.
     :param text: the answer to every question that takes text.
-    :ivar answers: as given, by item; of its last time.
-    :ivar drives: items that were begun, in their order.
+    :ivar answers: last given answers, by item.
+    :ivar drives: items that were begun, in order.
     """
 
     def __init__(self, browser: Page, text: str = '<b>"a"</b>\n😀') -> None:
@@ -83,26 +83,26 @@ class StudyRobot:
 
     def act(self) -> str:
         """
-        Do what the page asks for now, if anything.
+        Answer the page's present request, if any.
 
-        :return: what it shows; empty where there is no page that can be used.
+        :return: shown page; empty without a usable page.
         """
         try:
             shown = self._act()
             self._refused = 0
             return shown
         except (WebDriverException, HTTPError):
-            # It is just changing, or gone.
+            # The page is changing or gone.
             self._refused += 1
             return ''
 
     @property
     def lost(self) -> bool:
-        """Return whether the browser does not answer any more."""
+        """Return whether the browser no longer answers."""
         return self._refused > 3
 
     def time_s(self) -> float | None:
-        """Return the run's clock as the frame of the drive tells it [s]; None between drives."""
+        """Return the run's clock as reported by the drive's frame [s]; None between drives."""
         try:
             time_s = self._browser.run(_CLOCK)
         except (WebDriverException, HTTPError):
@@ -120,7 +120,7 @@ class StudyRobot:
             self.answers[what] = self._browser.run(_ANSWER, self._text)
         if shown == 'drive':
             self._drive(what)
-            # A key that meets a frame just as it is loaded anew may wait for it for a minute.
+            # A key sent to a frame during its reload may block for a minute.
             if self.time_s() is not None:
                 self._tap(_TOUCHED[self._acts % len(_TOUCHED)])
         elif shown in ('language', 'page', 'questions', 'break', 'device', 'elsewhere'):
@@ -130,7 +130,7 @@ class StudyRobot:
         return str(shown)
 
     def _tap(self, key: str) -> None:
-        """Touch a key: the way from hands to the picture is measured where they do something."""
+        """Touch a key, as the input latency is measured at input only."""
         self._acts += 1
         ActionChains(self._browser.driver).key_down(key).pause(0.03).key_up(key).perform()
 
@@ -149,5 +149,5 @@ class StudyRobot:
             self.hold(Keys.ARROW_UP)
 
     def hold(self, key: str) -> None:
-        """Hold a key from now on, in whatever has the focus."""
+        """Hold a key from now on, in the element with the focus."""
         ActionChains(self._browser.driver).key_down(key).perform()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Participants' and experimenters' pages can be read and used by everybody: WCAG 2.2, AA."""
+"""Participants' and experimenters' pages are accessible: WCAG 2.2, AA."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ return [document.body.dataset.show ?? '', document.querySelector('#step')?.textC
 
 
 def found_in(browser: Browser, where: str) -> list[str]:
-    """Look in both themes."""
+    """Check the page in both themes."""
     found = []
     for theme in THEMES:
         browser.prefer(theme)
@@ -36,7 +36,7 @@ def test_every_page_of_a_session(new_browser: OpenBrowser, tmp_path: Path, size:
     found: list[str] = []
     with running(tmp_path) as desk:
         browser.open(desk.participant)
-        # The robot must not be through with a page that nobody has looked at yet.
+        # The robot must not finish a page before its check.
         browser.wait('document.body.dataset.show')
         robot = StudyRobot(browser, 'a few words')
         for _ in range(LIMIT):

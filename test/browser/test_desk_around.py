@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Around a session: the stage in its frame, the experimenter's page, answers by a wheel."""
+"""Parts around a session: the framed stage, the experimenter's page, answers by a wheel."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from selenium.webdriver.common.keys import Keys
 
 pytestmark = pytest.mark.exhaustive
 
-# Stands for the hardware that a test has not: a wheel whose buttons a test presses.
+# Stands for missing hardware: a wheel whose buttons a test presses.
 WHEEL = """
 const wheel = { id: 'Wheel (Vendor: 046d Product: c24f)', index: 0, connected: true, mapping: '',
   axes: [0, 0, 1, 1], timestamp: 0,
@@ -24,9 +24,9 @@ window.dispatchEvent(new Event('gamepadconnected'));
 """
 
 
-def test_the_stage_stays_loaded_between_drives_and_knows_when_somebody_is_ready(
+def test_the_stage_stays_loaded_between_drives_and_knows_readiness(
         browser: Browser, tmp_path: Path) -> None:
-    """The gate opens when the stage is seated; the frame gets the focus, and is never reloaded."""
+    """The gate opens when the stage is seated; the frame gets the focus and is not reloaded."""
     person = Participant(browser)
     blocks = [{'name': 'main', 'settings': {'game': 'x.yaml'}, 'after_trial': [
         {'questions': 'van_der_laan'}]}]
@@ -54,13 +54,13 @@ def test_the_stage_stays_loaded_between_drives_and_knows_when_somebody_is_ready(
         person.shows('questions')
         assert browser.run('return getComputedStyle(document.getElementById("drive")).visibility'
                            ) == 'hidden'
-        # What lies below is not in the way of the keys.
+        # The hidden frame below receives no keys.
         person.answer_all()
         person.go_on()
         person.shows('drive', 'Drive 2 of 2')
         browser.driver.switch_to.frame(0)
         assert browser.run('return began') == began
-        # No other page is heard.
+        # Messages of other pages are ignored.
         browser.driver.switch_to.default_content()
         browser.run('window.postMessage({crgame: 1, kind: "stage", state: {seated: false}}, "*")')
         assert not browser.run('return document.querySelector(".gate button").disabled')
@@ -68,7 +68,7 @@ def test_the_stage_stays_loaded_between_drives_and_knows_when_somebody_is_ready(
 
 
 def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> None:
-    """Notes and markers by keys, hold, skip, repeat, and an end that is asked twice."""
+    """The page has notes and markers by keys, hold, skip, repeat, and a confirmed end."""
     person = Participant(browser)
     with running(tmp_path, languages=[]) as desk:
         browser.open(f'{desk.participant}experimenter')
@@ -98,7 +98,7 @@ def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> 
         person.go_on()
         person.shows('wait')
         browser.driver.switch_to.window(own)
-        # Orders are about what the experimenter sees: one about the item before is refused.
+        # Orders refer to the item on screen; one for the previous item is refused.
         browser.wait('document.querySelector("#items tr:nth-child(2)").dataset.state === "now"')
         give_order(person, 'Skip this item', 'asked elsewhere')
         browser.wait('document.querySelector("#items tr:nth-child(2)").dataset.state'
@@ -115,7 +115,7 @@ def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> 
         give_order(person, 'End the session', 'asked to stop')
         assert finished(tmp_path).keys() == {'fields'}
         browser.wait('document.querySelector("dialog h2").textContent === "Really end it?"')
-        # The button that ends it is not the one that a second Enter presses.
+        # A second Enter does not press the button that ends the session.
         person.tab_to('dialog button.primary')
         person.press(Keys.ENTER)
         browser.wait('document.getElementById("now-title").textContent.includes("ended")')
@@ -126,7 +126,7 @@ def test_the_experimenter_sees_and_directs(browser: Browser, tmp_path: Path) -> 
 
 
 def test_what_comes_again_is_asked_anew(browser: Browser, tmp_path: Path) -> None:
-    """A questionnaire repeated from the gate after it has no answers, and times of its own."""
+    """A questionnaire repeated from the gate after it has no answers and has new times."""
     person = Participant(browser)
     before = [{'questions': 'van_der_laan'}]
     with running(tmp_path, languages=[], fields=[], before=before) as desk:
@@ -148,7 +148,7 @@ def test_what_comes_again_is_asked_anew(browser: Browser, tmp_path: Path) -> Non
         browser.driver.switch_to.window(there)
         person.shows('questions')
         assert browser.run('return document.querySelectorAll("input:checked").length') == 0
-        # A reload in the middle of it keeps what is typed now.
+        # A reload in the middle keeps the present input.
         person.question('useful')
         person.press(Keys.ARROW_RIGHT)
         browser.driver.refresh()
@@ -165,7 +165,7 @@ def test_what_comes_again_is_asked_anew(browser: Browser, tmp_path: Path) -> Non
 
 
 def test_questions_are_answered_by_a_wheel(browser: Browser, tmp_path: Path) -> None:
-    """The paddles choose, the first button confirms; what is moved passes the check."""
+    """The paddles choose, the first button confirms; moved controls pass the check."""
     person = Participant(browser)
     before = [{'questions': 'van_der_laan'}, {'device_check': {}}]
 
@@ -191,7 +191,7 @@ def test_questions_are_answered_by_a_wheel(browser: Browser, tmp_path: Path) -> 
         person.shows('device')
         assert [*finished(tmp_path)['before/1']['answers'].values()] == [2] * 8 + [1]
         browser.wait('document.querySelectorAll(".device-check input").length === 2')
-        # Whose button has brought somebody here is chosen.
+        # The device whose button led to this page is chosen.
         for axes in ([-1, 0, 1, 1], [1, 0, 1, 1], [0, 0, -1, 1], [0, 0, 1, -1], [0, 0, 1, 1]):
             browser.run_async('wheel.axes = arguments[0]; await new Promise((done) =>'
                               ' requestAnimationFrame(() => requestAnimationFrame(done)));', axes)
@@ -205,9 +205,9 @@ def test_questions_are_answered_by_a_wheel(browser: Browser, tmp_path: Path) -> 
 @pytest.mark.parametrize('moved', [
     'wheel.buttons[9] = {pressed: arguments[0], value: +arguments[0]}',
     'wheel.axes = [0.7 * arguments[0], 0, 1, 1]'])
-def test_a_wheel_that_is_touched_is_chosen_but_not_against_somebodys_word(
+def test_a_touched_wheel_is_chosen_but_not_against_a_choice(
         browser: Browser, tmp_path: Path, moved: str) -> None:
-    """Whoever chooses the keyboard keeps it, whatever is touched then."""
+    """A chosen keyboard stays chosen when another device is touched."""
     person = Participant(browser)
     touch = (f'{moved}; await new Promise((done) => requestAnimationFrame(() =>'
              ' requestAnimationFrame(done)));'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A participant's whole session in a real browser, by keyboard alone, and what may go wrong."""
+"""A participant's whole session in a real browser, by keyboard alone, and its failures."""
 
 import os
 from pathlib import Path
@@ -22,7 +22,7 @@ TEXT += 'x' * (10_000 - len(TEXT))
     ('de', 'Ich stimme zu', 'Fahrt 2 von 2', 'Vielen Dank')])
 def test_a_whole_session_by_keyboard(browser: Browser, tmp_path: Path, language: str, agree: str,
                                      drive: str, thanks: str) -> None:
-    """Every kind of item; what is typed comes back as it was, with plausible times."""
+    """Every kind of item works; input is stored unchanged, with plausible times."""
     person = Participant(browser)
     with running(tmp_path) as desk:
         browser.open(desk.participant)
@@ -83,7 +83,7 @@ def answer_kinds(person: Participant) -> None:
     person.question('distance')
     person.press('12000,5')
     person.question('words')
-    # Ten thousand characters, many of which no key gives, come from the clipboard.
+    # Ten thousand characters, many without a key, come from the clipboard.
     person.browser.driver.execute_cdp_cmd('Input.insertText', {'text': TEXT})
     person.go_on()
 
@@ -114,7 +114,7 @@ def drive_and_rate(person: Participant, last: str) -> None:
 
 
 def check_told(told: dict[str, dict[str, Any]], language: str) -> None:
-    """Look at what the journal has of such a session."""
+    """Check the journal of such a session."""
     assert told['fields']['answers'] == {'age': 42, 'licence': 'no'}
     assert told['before/1']['agreed'] is True
     assert told['before/3']['device'] == 'keyboard'
@@ -136,7 +136,7 @@ def check_told(told: dict[str, dict[str, Any]], language: str) -> None:
 @pytest.mark.exhaustive
 def test_nothing_is_lost_or_asked_twice_after_a_kill_and_a_reload(browser: Browser,
                                                                   tmp_path: Path) -> None:
-    """The page comes back by itself with what was typed; what was kept is not asked again."""
+    """The page returns by itself with the typed input; stored answers are not asked again."""
     person = Participant(browser)
     with running(tmp_path) as desk:
         browser.open(desk.participant)
@@ -174,7 +174,7 @@ def test_nothing_is_lost_or_asked_twice_after_a_kill_and_a_reload(browser: Brows
 @pytest.mark.exhaustive
 def test_a_second_tab_and_a_double_click_do_nothing_twice(browser: Browser,
                                                           tmp_path: Path) -> None:
-    """The tab that was opened last is used; the first one takes over when asked to."""
+    """The tab opened last is used; the first one takes over on request."""
     person = Participant(browser)
     with running(tmp_path, languages=[]) as desk:
         browser.open(desk.participant)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A questionnaire answered by a mouse and by a finger, as the browser takes them."""
+"""A questionnaire answered by mouse and by touch events of the browser."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ ANSWERS = {'trust': 7, 'often': 4, 'tired': 50, 'vehicles': ['truck']}
 
 class Pointer:
     """
-    Presses what is on the page where it is drawn, not by a script.
+    Presses elements where they are drawn, not by a script.
 
     :param browser: with the participant's page.
     :param kind: of the pointer, `mouse` or `touch`.
@@ -30,7 +30,7 @@ class Pointer:
         self._browser, self._kind = browser, kind
 
     def press(self, selector: str) -> None:
-        """Press the middle of the last element that fits, once it is in sight."""
+        """Press the middle of the last element that fits, once it is visible."""
         x, y = self._browser.run(
             'const [node] = [...document.querySelectorAll(arguments[0])].reverse();'
             'node.scrollIntoView({block: "center", behavior: "instant"});'
@@ -49,7 +49,7 @@ class Pointer:
 @pytest.mark.parametrize('kind', ['mouse', 'touch'])
 def test_a_questionnaire_is_answered_by_a_pointer(browser: Browser, tmp_path: Path,
                                                   kind: str) -> None:
-    """Every kind of field that needs no keys; presses land where people see them."""
+    """Every kind of field without keys can be answered by presses at its drawn place."""
     person, pointer = Participant(browser), Pointer(browser, kind)
     with running(tmp_path, languages=[], fields=[],
                  before=[{'questions': 'kinds.yaml'}]) as desk:
@@ -59,7 +59,7 @@ def test_a_questionnaire_is_answered_by_a_pointer(browser: Browser, tmp_path: Pa
                     ' (event) => kinds.add(event.pointerType + event.isTrusted), true);')
         for name in QUESTIONS:
             pointer.press(f'[data-name={name}] :is(.option, input[type=range])')
-        # A line without a mark takes one in its middle; texts need keys.
+        # A line without a mark gets one in its middle; texts need keys.
         for name, text in (('distance', '12'), ('words', 'x')):
             pointer.press(f'[data-name={name}] :is(input, textarea)')
             person.press(text)

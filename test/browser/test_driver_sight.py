@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the small map beside the driver's view tells of AVs and of whom fog hides."""
+"""The small map beside the driver's view: AVs, and vehicles hidden by fog."""
 
 from collections.abc import Iterator
 import math
@@ -16,9 +16,9 @@ from world_support import RecordedRun, RunBackend, Served, served
 
 pytestmark = pytest.mark.exhaustive
 
-# How far from the human's vehicle one sees in these tests [m].
+# Range of sight from the human's vehicle in these tests [m].
 VISIBILITY_M = 30.0
-# A point of the plan's band, ahead of the AV and beside its line: as it is on the small map.
+# A point on the plan's band, ahead of the AV and beside its line, on the small map.
 PIXEL = """
 const { camera } = crgame.world;
 const canvas = document.querySelector('#world');
@@ -49,7 +49,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 
 @pytest.fixture
 def page(cockpit: Served, browser: Browser) -> Browser:
-    """Open the page, and keep what it tells the server of its picture."""
+    """Open the page, and keep its messages to the server about its picture."""
     if find_libraries() is None:
         pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     browser.open(cockpit.address)
@@ -65,7 +65,7 @@ def page(cockpit: Served, browser: Browser) -> Browser:
 
 
 def drawn(page: Browser) -> None:
-    """Wait until the small map has been drawn as it is now."""
+    """Wait until the small map has been drawn in its present state."""
     page.run_async("""
         for (let i = 0; i < 4; i += 1) {
           await new Promise(requestAnimationFrame);
@@ -74,7 +74,7 @@ def drawn(page: Browser) -> None:
 
 
 def told_plans(page: Browser, shown: str) -> int:
-    """Return what was told last, of this picture, of plans in it."""
+    """Return the number of plans in the last message about this picture."""
     page.run('window.told.length = 0')
     page.wait('window.told.some(({ type, shown }) => type === "view" && shown === arguments[0])',
               arguments=(shown,))
@@ -84,7 +84,7 @@ def told_plans(page: Browser, shown: str) -> int:
 
 def test_the_small_map_shows_plans_and_perception_when_asked_in_the_3d_view(
         cockpit: Served, run: RecordedRun, page: Browser) -> None:
-    """By the one switch of that view, whatever layers the map has; what is recorded agrees."""
+    """One switch of that view shows them, for any layers of the map; the recording agrees."""
     x, y, yaw = run.states[0, 1, :3]
     times = 0.1 * np.arange(31)
     plan = np.column_stack([x + 8.0 * times * math.cos(yaw), y + 8.0 * times * math.sin(yaw),
@@ -96,7 +96,7 @@ def test_the_small_map_shows_plans_and_perception_when_asked_in_the_3d_view(
     drawn(page)
     road = page.run(PIXEL, *beside)
     cockpit.call(cockpit.backend.send_plan, 1, plan)
-    # Its planner has been told of nobody: on the map all others are outlines.
+    # Its planner's request has no other vehicle: on the map all others are outlines.
     cockpit.call(cockpit.backend.hub.send_frame, 'seen:1', encode_seen(0, 0, 0, 0.0, 1, []))
     page.wait('crgame.store.plans.size === 1 && crgame.store.perceived.seenBy(1, 0) !== null')
     found = []
@@ -109,16 +109,16 @@ def test_the_small_map_shows_plans_and_perception_when_asked_in_the_3d_view(
         page.wait('document.querySelector(".hud-seen").hidden !== arguments[0]',
                   arguments=(switched,))
     assert found == [(False, False, 0), (True, True, 1), (False, False, 0)]
-    # The map itself has the layers that its buttons say.
+    # The map itself has the layers of its buttons.
     assert not page.run_async('return await crgame.view3d.show(false)')
     drawn(page)
     assert page.run('return crgame.perception.hollow.includes("hv0")')
     assert told_plans(page, 'map') == 1
 
 
-def test_who_drives_sees_as_far_as_fog_lets_them_and_a_director_sees_all(
+def test_fog_limits_the_drivers_sight_and_a_director_sees_all(
         cockpit: Served, run: RecordedRun, page: Browser) -> None:
-    """On the map, on the small map beside the driver's eyes, and in words."""
+    """The limit holds on the map, on the small map of the driver's view, and in words."""
     poses = np.concatenate([run.states[0, :, :2], run.objects[0, :, :2]])
     away = np.hypot(*(poses - poses[0]).T)
     present = np.isfinite(away)
@@ -130,7 +130,7 @@ def test_who_drives_sees_as_far_as_fog_lets_them_and_a_director_sees_all(
               arguments=(VISIBILITY_M,))
     page.run("crgame.world.follow('hv0', true)")
     drawn(page)
-    # Nobody sits anywhere: the map is all that is known.
+    # No seat is taken, so the map shows everything.
     assert page.run(THERE) == present.tolist()
     assert page.run_async('return await crgame.view3d.show(true)')
     drawn(page)
@@ -151,12 +151,12 @@ def test_who_drives_sees_as_far_as_fog_lets_them_and_a_director_sees_all(
 
 
 def ids(run: RecordedRun, wanted: Any) -> set[str]:
-    """Return the ids of those that are wanted, but for the own vehicle's."""
+    """Return the ids of the wanted vehicles, without the own one."""
     every = [item['id'] for item in (*run.scene['vehicles'], *run.scene['objects'])]
     return {name for name, take in list(zip(every, wanted, strict=True))[1:] if take}
 
 
 def named(page: Browser, run: RecordedRun) -> set[str]:
-    """Return whom the words beside the map name, but for the own vehicle."""
+    """Return the vehicles that the words beside the map name, without the own one."""
     words = page.run('return crgame.around.describe()').replace(',', ' ').split()
     return ids(run, np.ones(len(run.states[0]) + len(run.objects[0]), dtype=bool)) & set(words)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Headlights in a real picture: at dusk and in fog they are on, by day they are not."""
+"""Headlights in a real picture: on at dusk and in fog, off by day."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +13,7 @@ from world_support import RecordedRun, RunBackend, Served, served
 
 pytestmark = pytest.mark.exhaustive
 
-# The road from the driver's seat, and how many pixels of the tail lamps are seen from behind.
+# The road from the driver's seat, and the number of tail lamp pixels seen from behind.
 PICTURE = """
 const [ahead] = arguments;
 const { picture } = crgame.view3d;
@@ -61,7 +61,7 @@ def cockpit() -> Iterator[Served]:
 
 @pytest.fixture(scope='module')
 def pictures(cockpit: Served, module_browser: Browser) -> dict[str, Any]:
-    """Return what is seen by day, at dusk and in fog."""
+    """Return the measurements by day, at dusk and in fog."""
     if find_libraries() is None:
         pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     page = module_browser
@@ -97,7 +97,7 @@ def test_tail_lamps_shine_at_dusk_and_in_fog(pictures: dict[str, Any]) -> None:
 
 
 def test_lights_cost_three_calls_a_picture(pictures: dict[str, Any]) -> None:
-    """Lamps, glow and beams of everybody: each is one call."""
+    """Lamps, glow and beams of all vehicles take one call each."""
     calls = {name: picture['calls'] for name, picture in pictures.items()}
     assert calls['day'] < calls['dusk'] <= calls['day'] + 3
     assert max(calls.values()) <= 150

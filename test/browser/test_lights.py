@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Indicators and horn in the page: keys that are sent, corners that blink, signs that say it."""
+"""Indicators and horn in the page: sent keys, blinking corners, signs."""
 
 from collections.abc import Iterator
 import os
@@ -14,14 +14,14 @@ import pytest
 from selenium.webdriver.common.action_chains import ActionChains
 from world_support import RecordedRun, RunBackend, Served, served
 
-# Of the BMW 320i: where its left front and its right rear lamp are, from the centre [m].
+# The left front and the right rear lamp of the BMW 320i, from the centre [m].
 LEFT_FRONT, RIGHT_REAR = (1.9, 0.87), (-1.9, -0.87)
 LIGHTS = 12
 
 
 @pytest.fixture(scope='module')
 def page(module_browser: Browser) -> Iterator[Served]:
-    """Open the page before a run that stands at its start, with a seat that nobody has."""
+    """Open the page before a run that stands at its start, with a free seat."""
     with served(RunBackend(RecordedRun(scenarios_directory() / 'cut_in.yaml', 7.0))) as server:
         module_browser.open(server.address)
         module_browser.wait('window.crgame?.ready && crgame.world.shown && crgame.world.followed')
@@ -59,7 +59,7 @@ def amber(browser: Browser, at: tuple[float, float]) -> bool:
 
 
 def sign(browser: Browser, name: str) -> tuple[bool, str]:
-    """Return whether a sign over the speed is lit, and what it is called."""
+    """Return whether a sign over the speed is lit, and its name."""
     lit, label = browser.run("""
         const sign = document.querySelector(`.sign-${arguments[0]}`);
         return [sign.hasAttribute('data-on'), sign.getAttribute('aria-label')];""", name)
@@ -70,7 +70,7 @@ def sign(browser: Browser, name: str) -> tuple[bool, str]:
     (0, 0, False, False), (200, 1, True, False), (400, 2, False, True), (600, 7, True, True)])
 def test_corners_blink_in_simulation_time(page: Served, module_browser: Browser, start: int,
                                           lights: int, left: bool, right: bool) -> None:
-    """Of three periods in 2 s lit after 0.1 s, dark after 0.5 s; the sign's name tells none."""
+    """Of 3 periods in 2 s corners are lit after 0.1 s, dark after 0.5 s; the name is constant."""
     for n, shining in ((start + 10, True), (start + 50, False)):
         show(page, module_browser, lights, n)
         assert amber(module_browser, LEFT_FRONT) == (left and shining)
@@ -83,7 +83,7 @@ def test_corners_blink_in_simulation_time(page: Served, module_browser: Browser,
 
 def test_keys_of_the_lever_are_sent_and_do_not_drive(page: Served,
                                                      module_browser: Browser) -> None:
-    """Comma, period, J and G, each pressed and let go; no driving key is held with them."""
+    """Comma, period, J and G are sent on press and release, without a driving key."""
     me = module_browser.run('return crgame.store.me.id')
     page.publish('seats', {'seats': {'hv0': {
         'source': 'cockpit', 'driver': 'cockpit', 'holder': me, 'holder_name': 'A',

@@ -15,13 +15,13 @@ from selenium.webdriver.support.select import Select
 import yaml
 
 PEDESTRIAN = "crgame.store.scene.objects.findIndex(({ id }) => id === 'o201')"
-# Between a colour's blue and its red: the road is grey, the AV's plan is blue.
+# Difference of blue and red: the road is grey, the AV's plan is blue.
 GREY, BLUE = 25, 60
 
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
-    """Keep one graph of the crossing, in which nobody drives the human's car at first."""
+    """Keep one graph of the crossing, whose human's car has no driver at first."""
     folder = tmp_path_factory.mktemp('control')
     game = yaml.safe_load((SCENARIOS / 'crossing.yaml').read_text())
     game |= {'scenario': str(SCENARIOS / game['scenario']), 'duration': 3600}
@@ -39,9 +39,9 @@ def only_page(graph: Graph, module_browser: Browser) -> LivePage:
 
 @pytest.fixture
 def page(only_page: LivePage) -> Iterator[LivePage]:
-    """Return the page of a run that goes on."""
+    """Return the page of a running run."""
     if only_page.run('return crgame.store.status.run') == 'paused':
-        # Left by a test that failed.
+        # State left by a failed test.
         only_page.order('start')
     only_page.wait_for_run('running')
     yield only_page
@@ -58,7 +58,7 @@ def new_run(page: LivePage) -> LivePage:
 @pytest.mark.exhaustive
 def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
         page: LivePage, new_browser: OpenBrowser) -> None:
-    """By the buttons alone: asked for, handed over, given back; one drives at a time."""
+    """Buttons alone request, hand over and release a seat; one client drives at a time."""
     graph = page.graph
     other = LivePage(graph, new_browser(1000, 640))
     name = other.driver.find_element(By.ID, 'my-name')
@@ -72,7 +72,7 @@ def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
     page.hold('w')
     graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
     page.click(page.seat_button('hv0', 'hand_over'))
-    # It is an offer: he may not want it, and nothing changes until he has said so.
+    # It is an offer, which may be declined; nothing changes until it is accepted.
     other.wait_for_text('.drive-news', 'offers you hv0')
     other.click(other.seat_button('hv0', 'decline'))
     page.wait_for_text('.drive-news', 'You keep hv0')
@@ -81,7 +81,7 @@ def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
     page.click(page.seat_button('hv0', 'hand_over'))
     other.click(other.seat_button('hv0', 'accept'))
     other.wait("crgame.driving.seat === 'hv0'", 'the seat that was handed over')
-    # The key of the one who had it is still down.
+    # The previous driver's key is still down.
     graph.wait_for_command('hv0', THROTTLE, 0.0, 0.0)
     other.hold('s')
     graph.wait_for_command('hv0', BRAKE, 1.0, 1.0)
@@ -98,7 +98,7 @@ def test_a_seat_is_claimed_and_handed_over_between_two_browsers(
 
 @pytest.mark.exhaustive
 def test_an_av_is_taken_over_and_given_back(new_run: LivePage) -> None:
-    """It brakes by the key, and its planner drives it on from where it was left."""
+    """It brakes by the key, and its planner drives on from that state."""
     page, graph = new_run, new_run.graph
     page.wait('crgame.world.shown.vehicles[13 + 3] > 5', 'the AV to drive')
     page.claim('av0')
@@ -114,12 +114,12 @@ def test_an_av_is_taken_over_and_given_back(new_run: LivePage) -> None:
     assert np.isnan(graph.commands('av0')[1][-1][:4]).all()
     page.wait_for_text('li[data-seat="av0"]', 'Driven by the planner idm')
     left = page.vehicle(1)[3]
-    # The road before it is free for 30 m: the IDM speeds up again.
+    # The road ahead is free for 30 m, so the IDM accelerates again.
     page.wait('crgame.world.shown.vehicles[13 + 3] > arguments[0] + 1', 'the planner', left)
 
 
 def test_pause_and_step(page: LivePage) -> None:
-    """While it pauses not one pixel changes; a step is one of the scenario's, N simulated ones."""
+    """No pixel changes in a pause; a step is one scenario step of N simulation steps."""
     graph = page.graph
     page.follow('hv0')
     page.order('pause')
@@ -130,7 +130,7 @@ def test_pause_and_step(page: LivePage) -> None:
     graph.peer.listen_for(0.3)
     assert graph.peer.n == n == page.run('return crgame.world.shown.n')
     np.testing.assert_array_equal(page.picture(), before)
-    # A tick's whole N steps, from wherever the pause caught it.
+    # The N steps of a whole tick, from any step of the pause.
     page.order('step')
     graph.peer.wait_until(lambda: graph.peer.n == n + 10, 'ten steps')
     page.wait('crgame.world.shown.n === arguments[0]', 'the step in the picture', n + 10)
@@ -141,7 +141,7 @@ def test_pause_and_step(page: LivePage) -> None:
 
 @pytest.mark.clock
 def test_the_real_time_factor(page: LivePage) -> None:
-    """At a fifth of the pace a second of simulated time takes five of the clock."""
+    """At factor 0.2 a second of simulated time takes five seconds."""
     graph = page.graph
     factor = Select(page.driver.find_element(By.CSS_SELECTOR, '#run-control select'))
     factor.select_by_value('0.2')
@@ -156,7 +156,7 @@ def test_the_real_time_factor(page: LivePage) -> None:
 
 
 def test_reset_begins_anew(page: LivePage) -> None:
-    """Everything is back at step 0 of another epoch, in the picture too."""
+    """A reset returns to step 0 of a new epoch, also in the picture."""
     graph = page.graph
     graph.wait_for_steps(50)
     begin = graph.peer.games[-1].epoch
@@ -165,7 +165,7 @@ def test_reset_begins_anew(page: LivePage) -> None:
     graph.peer.listen()
     assert graph.peer.games[-1].epoch == begin + 1 == page.run('return crgame.world.shown.epoch')
     assert page.vehicle(0)[0] < x
-    # Asked and not agreed to, nothing happens.
+    # A declined confirmation changes nothing.
     page.click('#run-control [data-action="reset"]')
     page.click('dialog[open] button:not(.danger)')
     graph.wait_for_steps(20)
@@ -174,7 +174,7 @@ def test_reset_begins_anew(page: LivePage) -> None:
 
 @pytest.mark.exhaustive
 def test_a_planner_is_stopped_and_goes_on(page: LivePage) -> None:
-    """By the switch beside its numbers."""
+    """The switch beside its numbers stops and starts a planner."""
     page.tab('timing')
     page.wait_for_text('tbody[data-av="av0"] .tag', 'running')
     page.click('.planner-switch')
@@ -194,7 +194,7 @@ def trigger(page: LivePage, label: str) -> None:
 
 @pytest.mark.exhaustive
 def test_a_trigger_lets_the_pedestrian_go(new_run: LivePage) -> None:
-    """He stands as drawn until the button is pressed, and walks across the road then."""
+    """The pedestrian stands until the button is pressed, and then crosses the road."""
     page = new_run
     at = f'crgame.world.shown.objects[6 * {PEDESTRIAN} + 1]'
     page.wait(f'Number.isFinite({at})', 'the pedestrian')
@@ -212,7 +212,7 @@ def test_a_trigger_lets_the_pedestrian_go(new_run: LivePage) -> None:
 
 
 def plan_color(page: LivePage) -> int:
-    """Return how blue the picture is where the AV's plan leads in a second's time."""
+    """Return the blue of the picture at the plan's place one second ahead."""
     page.wait('crgame.store.plans.size > 0 && crgame.store.status.n === crgame.world.shown.n'
               ' && !crgame.world.camera.moves && crgame.store.plans.get(1).t'
               ' + crgame.store.plans.get(1).points.at(-1) > crgame.world.shown.t + 1', 'a plan')
@@ -233,7 +233,7 @@ def plan_color(page: LivePage) -> int:
 
 @pytest.mark.exhaustive
 def test_an_event_blanks_the_plan_in_the_picture(new_run: LivePage) -> None:
-    """And another shows it again; both act at the next scenario step."""
+    """One event hides the plan, another shows it; both act at the next scenario step."""
     page = new_run
     page.follow('av0')
     page.wait('crgame.store.plans.get(1)?.n > 30', 'plans')

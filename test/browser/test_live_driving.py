@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A person drives in a browser: real keys, a real graph, and every way to take the hands off."""
+"""A person drives in a browser: real keys, a real graph, and every way of hands off."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -23,7 +23,7 @@ import pytest
 from recorded_poses import DT_C_S, DT_S, read_recorded
 from selenium.webdriver.common.keys import Keys
 
-# The person stands on the lane that leads to -x, so that the heading is at the border of +-pi;
+# The person stands on the lane towards -x, so that the heading is at the border of +-pi;
 # the AV, the leader and the pedestrian are 400 m ahead.
 GAME = f"""
 scenario: {SCENARIOS / 'ZAM_Crossing-1_1_T-1.xml'}
@@ -33,7 +33,7 @@ humans:
 avs:
   - {{id: av0, planning_problem: 100, planner: idm}}
 """
-# Half a second of cycles: so long the pedals may be held after the hands are gone.
+# Half a second of cycles: pedals may stay pressed so long after hands off.
 AT_ONCE = 50
 # A pixel of a road marking and one of the road differ by more than this in some colour.
 OTHER_COLOR = 25
@@ -41,7 +41,7 @@ OTHER_COLOR = 25
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
-    """Keep one graph, whose run waits for somebody in a browser."""
+    """Keep one graph, whose run waits for a driver in a browser."""
     folder = tmp_path_factory.mktemp('driving')
     (folder / 'game.yaml').write_text(GAME)
     with live_graph(folder / 'game.yaml', folder / 'run') as running:
@@ -55,7 +55,7 @@ def only_page(graph: Graph, module_browser: Browser) -> LivePage:
 
 
 def take_the_wheel(page: LivePage) -> None:
-    """Put the hands on the controls of hv0 in a run that goes on."""
+    """Set the hands on the controls of hv0 in a running run."""
     if page.run('return crgame.driving.seat') is None:
         page.claim('hv0')
     if page.run('return crgame.store.status.run') == 'paused':
@@ -65,11 +65,11 @@ def take_the_wheel(page: LivePage) -> None:
 
 @pytest.fixture
 def page(only_page: LivePage) -> Iterator[LivePage]:
-    """Return the page of somebody who drives."""
+    """Return the page of a driver."""
     take_the_wheel(only_page)
     yield only_page
     for tab in only_page.driver.window_handles[1:]:
-        # Left open by a test that failed.
+        # Left open by a failed test.
         only_page.driver.switch_to.window(tab)
         only_page.driver.close()
     only_page.driver.switch_to.window(only_page.driver.window_handles[0])
@@ -78,7 +78,7 @@ def page(only_page: LivePage) -> Iterator[LivePage]:
 
 
 def test_the_run_waits_for_a_person_and_shows_what_will_be_driven(only_page: LivePage) -> None:
-    """Opened: no error, the vehicles of step 0; driven and started by the two buttons."""
+    """The page opens without error at step 0; two buttons take the seat and start the run."""
     page = only_page
     assert page.browser.console_errors() == []
     page.wait_for_run('paused')
@@ -94,7 +94,7 @@ def test_the_run_waits_for_a_person_and_shows_what_will_be_driven(only_page: Liv
 
 
 def test_holding_w_moves_the_car_and_the_picture(page: LivePage) -> None:
-    """Before that nothing moves, not one pixel; let go, the throttle closes."""
+    """No pixel changes before the key press; a release closes the throttle."""
     page.follow('hv0')
     page.wait('Math.abs(crgame.world.shown.vehicles[3]) < 1e-9', 'the standing car')
     before, x = page.picture(), page.vehicle(0)[0]
@@ -104,7 +104,7 @@ def test_holding_w_moves_the_car_and_the_picture(page: LivePage) -> None:
               ' && document.querySelector(".cap-KeyW[data-on]")', 'the key in the picture')
     page.graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
     page.wait('crgame.world.shown.vehicles[0] < arguments[0] - 4', 'a way of 4 m', x)
-    # The lines repeat every few metres, so that in one picture they may stand where they were.
+    # The lines repeat every few metres, so a single picture may show them at the old places.
     moved = max(_share_changed(before, page.picture()) for _ in range(3))
     assert moved > 0.002
     page.release('w')
@@ -118,7 +118,7 @@ def _share_changed(before: NDArray[np.int64], after: NDArray[np.int64]) -> float
 
 
 def test_every_driving_key_does_what_it_says(page: LivePage) -> None:
-    """Steering to the left is positive (CRG 19); arrows and space do the same."""
+    """Keys steer, with left positive (CRG 19), and drive; arrows and space do the same."""
     for key, column, low, high in (
             ('a', STEERING, 0.3, 0.65), ('d', STEERING, -0.65, -0.3), ('s', BRAKE, 0.5, 1.0),
             (Keys.ARROW_LEFT, STEERING, 0.3, 0.65), (' ', BRAKE, 0.5, 1.0)):
@@ -129,7 +129,7 @@ def test_every_driving_key_does_what_it_says(page: LivePage) -> None:
 
 
 class Leaving(NamedTuple):
-    """How the hands leave the controls, what the page says then, and how they come back."""
+    """A way to take the hands off the controls, the page's text, and the way back."""
 
     reason: str
     leave: Callable[[LivePage], object]
@@ -169,7 +169,7 @@ LEAVINGS = {
                              lambda page: page.run('crgame.connection.interrupt();'),
                              _get_the_seat_back),
 }
-# Notes at which step the hands leave, and what the page says of its hands.
+# Notes the step at which the hands leave, and the page's messages about its hands.
 WATCH = """
 window.left = null;
 window.said = [];
@@ -197,7 +197,7 @@ if (!Object.hasOwn(crgame.connection, 'send')) {
 @pytest.mark.clock
 @pytest.mark.parametrize('leaving', LEAVINGS.values(), ids=LEAVINGS.keys())
 def test_hands_off_lets_go_at_once(page: LivePage, leaving: Leaving) -> None:
-    """From the whole pedal to nothing within 0.5 s, though the key is still down."""
+    """The full pedal is released within 0.5 s, although the key is still down."""
     graph = page.graph
     page.run(WATCH)
     page.hold('w')
@@ -215,12 +215,12 @@ def test_hands_off_lets_go_at_once(page: LivePage, leaving: Leaving) -> None:
     held = commands[:, THROTTLE] > 0.0
     assert commands[held, THROTTLE][-1] == 1.0, 'a ramp instead of letting go'
     assert left - AT_ONCE < n[held][-1] <= left + AT_ONCE
-    # Where the page still can it says so; never again that the key is down.
+    # The page reports hands off if it still can, and never again that the key is down.
     down = [message.get('keys') == [1, 0, 0, 0] for message in said]
     after = said[len(down) - down[::-1].index(True):]
     assert leaving.reason == 'connection' or after[0].get('away')
     assert all(message.get('away') or message['keys'] == [0, 0, 0, 0] for message in after)
-    # The key that was down all the time must be pressed anew.
+    # The key that was down all the time must be pressed again.
     page.wait('crgame.driving.away === null', 'the hands back on the controls')
     assert page.run('return crgame.driving.keyboard.keys') == [0, 0, 0, 0]
     page.release('w')
@@ -230,7 +230,7 @@ def test_hands_off_lets_go_at_once(page: LivePage, leaving: Leaving) -> None:
 
 @pytest.mark.clock
 def test_a_closed_tab_lets_go_at_once(page: LivePage) -> None:
-    """The seat is left, too: somebody else may claim it."""
+    """The seat is left too, and another client may claim it."""
     graph, first = page.graph, page.driver.current_window_handle
     page.give_back('hv0')
     page.driver.switch_to.new_window('tab')
@@ -249,7 +249,7 @@ def test_a_closed_tab_lets_go_at_once(page: LivePage) -> None:
     page.release('w')
 
 
-# Collects what was drawn in each frame, and between which samples of the run that was.
+# Collects the drawn poses of each frame, and the samples of the run around them.
 COLLECT = """
 window.drawn = [];
 window.collecting = true;
@@ -271,10 +271,10 @@ requestAnimationFrame(collect);
 
 @pytest.mark.clock
 def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
-    """To a micrometre, in each frame that stood between two samples of the run."""
+    """They agree to a micrometre in each frame between two samples of the run."""
     page = only_page
     take_the_wheel(page)
-    # The leader's recording is short: it is to drive all the time.
+    # The leader's recording is short, and the leader must move all the time.
     page.reset()
     page.wait('crgame.driving.away === null', 'the hands on the controls')
     page.run(COLLECT)
@@ -290,7 +290,7 @@ def test_poses_as_drawn_are_those_of_the_bag(only_page: LivePage) -> None:
     bag = run_folder(page.graph.launcher.out, epoch) / 'bag'
     page.graph.launcher.wait_for(f'messages in .*{bag.parent.name}/bag')
     recorded = read_recorded(bag, epoch)
-    # The others ran ahead of what had come: on a busy machine some do.
+    # The other frames were ahead of the newest sample, as happens on a busy machine.
     between = [frame for frame in frames if frame['before'] >= 0 and frame['after'] >= 0
                and frame['step'] == recorded.k0 + int(frame['t'] / DT_C_S + 1e-9)]
     assert len(between) > max(10, 0.2 * len(frames))

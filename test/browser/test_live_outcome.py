@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""An afternoon at the page: one run after the other, what it says of each, and their files."""
+"""A session at the page: several runs in sequence, their result cards and files."""
 
 from collections.abc import Iterator
 import json
@@ -33,7 +33,7 @@ SHORT_S = 3.0
 
 
 def write_games(folder: Path) -> Path:
-    """Write the first game, one in which the AV hits the human's car, and one of traffic alone."""
+    """Write the first game, one in which the AV hits the human's car, and one of only traffic."""
     games: dict[str, dict[str, Any]] = {
         'first': {'scenario': f'{CUT_IN}.xml', 'humans': [{'id': 'hv0', 'driver': 'idle'}]},
         'crash': {
@@ -61,7 +61,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
 
 @pytest.fixture(scope='module')
 def page(graph: Graph, module_browser: Browser) -> LivePage:
-    """Open the page once; the tests are one afternoon, in their order."""
+    """Open the page once; the tests are one session, in their order."""
     return LivePage(graph, module_browser)
 
 
@@ -76,7 +76,7 @@ def start(page: LivePage, name: str) -> None:
 
 
 def wait_for_card(page: LivePage) -> str:
-    """Wait until the run is over and its files are written; give what the card says."""
+    """Wait until the run is over and its files are written; return the card's text."""
     page.wait_for_run('ended')
     page.wait('document.querySelector(".outcome-files[data-complete]")', 'the files of the run')
     return page.text('#outcome')
@@ -88,7 +88,7 @@ def folder_on_card(page: LivePage) -> Path:
 
 
 def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) -> None:
-    """The crash at the second that the gap gives; no alarm is left; everything goes on."""
+    """The card has the crash at the time given by the gap; no alarm stays, no node ends."""
     page.tab('scenario')
     start(page, 'crash.yaml')
     text = wait_for_card(page)
@@ -100,7 +100,7 @@ def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) 
     (told,) = re.findall(r'hv0 with av0 at ([0-9.]+) s|av0 with hv0 at ([0-9.]+) s', text)
     # The page rounds to 0.1 s and learns of it within the next 0.1 s.
     assert float(told[0] or told[1]) == pytest.approx(gap / av.speed, abs=0.3)
-    # The report names each one's part as offline runs do.
+    # The report names each vehicle's part, as for offline runs.
     assert '(front of av0; could have avoided it: av0)' in text
     accepted = int(re.search(r'(\d+) plans accepted', text)[1])
     assert 0.5 * 10 * SHORT_S < accepted <= 10 * SHORT_S
@@ -114,7 +114,7 @@ def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) 
 
 
 def test_the_card_has_score_links_and_the_last_seconds(page: LivePage) -> None:
-    """The score is that of `crgame score`, the files are the run's, and its end is seen again."""
+    """The score is that of `crgame score`, the files are the run's, the end can be replayed."""
     page.wait('document.querySelector(".score[data-state=told]")', 'the score')
     folder = page.graph.launcher.out / 'run_2'
     expected = scores_of(read_run_record(folder / 'bag'), {}, drives_only=True)
@@ -141,7 +141,7 @@ def test_the_card_has_score_links_and_the_last_seconds(page: LivePage) -> None:
 
 @pytest.mark.exhaustive
 def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
-    """The run before is shown again in another tab, and deleted; the last one stays."""
+    """The previous run is replayed in another tab and deleted; the last one stays."""
     out = page.graph.launcher.out
     page.tab('runs')
     page.wait('document.querySelectorAll(".run").length === 2'
@@ -167,7 +167,7 @@ def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
     finally:
         page.driver.close()
         page.driver.switch_to.window(own)
-    # The first run is finished only when another one has ended.
+    # The first run is complete only after the end of another one.
     page.wait('!document.querySelector(`[data-run="${arguments[0]}"] [data-action=delete]`)'
               '.disabled || (crgame.runs.refresh(), false)', 'the first run to be finished',
               keys[1])
@@ -181,7 +181,7 @@ def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
 
 @pytest.mark.exhaustive
 def test_again_another_and_the_next_game(page: LivePage) -> None:
-    """The same once more, then traffic by itself; the card gives way to each run."""
+    """The same game runs again, then only traffic; each run hides the card."""
     page.click('#outcome [data-action=again]')
     page.wait('crgame.store.status.run === "running"'
               ' && document.querySelector("#outcome").hidden', 'the run, without the card')
@@ -203,13 +203,13 @@ def test_again_another_and_the_next_game(page: LivePage) -> None:
               'the game after the last of the list')
     wait_for_card(page)
     assert folder_on_card(page).name == 'run_5'
-    # An alarm stays to be seen for some seconds.
+    # An alarm stays visible for some seconds.
     page.wait('crgame.alarms.kinds().length === 0', 'the alarms of the run to go')
     assert page.browser.console_errors() == []
 
 
 def test_the_end_of_the_program_is_no_alarm(page: LivePage) -> None:
-    """Somebody ends it at the terminal: the page shows what was last, and says so."""
+    """When the program is ended at the terminal, the page keeps the last state and says so."""
     launcher = page.graph.launcher
     launcher.signal(signal.SIGINT)
     page.wait_for_text('#outcome', 'program has ended')
@@ -221,7 +221,7 @@ def test_the_end_of_the_program_is_no_alarm(page: LivePage) -> None:
 
 @pytest.mark.exhaustive
 def test_each_run_has_its_own_files(graph: Graph) -> None:
-    """Bag, scenario, timing report and game of each, and nothing of another."""
+    """Each run has its own bag, scenario, timing report and game, and no file of another."""
     folders = run_folders(graph.launcher.out)
     assert [folder.name for folder in folders] == ['run', 'run_2', 'run_3', 'run_4', 'run_5']
     # The first one was deleted.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two people drive one game in two browsers, over TLS, while others watch and attack."""
+"""Two people drive one game in two browsers over TLS, with spectators and attackers."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -49,14 +49,14 @@ def graph(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Graph]:
 
 
 def link(graph: Graph, purpose: str) -> str:
-    """Return a link that was printed."""
+    """Return a printed link."""
     found = re.search(rf'to {purpose} +(https://\S+)', graph.launcher.text)
     assert found, graph.launcher.text
     return found[1]
 
 
 class Person(LivePage):
-    """Somebody who came by a link, in a browser that trusts the certificate."""
+    """A person admitted by a link, in a browser that trusts the certificate."""
 
     def __init__(self, graph: Graph, browser: Browser, purpose: str, name: str) -> None:
         super().__init__(graph._replace(address=link(graph, purpose)), browser)
@@ -66,7 +66,7 @@ class Person(LivePage):
             field.send_keys(name, Keys.ENTER)
 
     def ask(self, **message: Any) -> dict[str, Any]:
-        """Send a request whatever the page's buttons allow, and give the reply."""
+        """Send a request regardless of the page's buttons; return the reply."""
         return dict(self.run_async('return crgame.connection.request(arguments[0]);', message))
 
 
@@ -78,7 +78,7 @@ def throttle(graph: Graph, seat: str) -> float:
 
 
 def attack(address: str, number: int) -> bool:
-    """Do what a client without a link may try; tell whether it was refused in words."""
+    """Send the requests of a client without a link; return whether they were refused."""
     host, port = urlsplit(address).hostname or '', urlsplit(address).port or 0
     context = ssl._create_unverified_context()
     try:
@@ -102,7 +102,7 @@ def attack(address: str, number: int) -> bool:
                                  '1\r\nContent-Length: 2\r\n\r\n{}'.encode())
                 answer = peer.recv(100)
     except OSError:
-        # Thrown out: that is what the test is for.
+        # The server closed the connection, as expected.
         return False
     assert answer.startswith(b'HTTP/1.1 403 '), answer
     return True
@@ -110,17 +110,17 @@ def attack(address: str, number: int) -> bool:
 
 @pytest.mark.parametrize('graph', [LONG_S], indirect=True)
 def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> None:
-    """Seats, readiness, countdown, a lost page, a spectator, hostile clients."""
+    """Two people share a game: seats, readiness, countdown, lost page, spectator, attackers."""
     peer, launcher = graph.peer, graph.launcher
     anna = Person(graph, new_browser(1000, 640, trusting=True), 'drive hv0', 'Anna')
     bert = Person(graph, new_browser(1000, 640, trusting=True), 'drive hv1', 'Bert')
     watcher = Person(graph, new_browser(1000, 640, trusting=True), 'watch', '')
 
-    # A link lets one browser in, and says so to the next.
+    # A link admits one browser, and the next one gets the reason.
     status, text = get(link(graph, 'drive hv0'))
     assert status == 403 and 'This link has been used' in text
 
-    # Seats: each their own; the server decides, whatever the page shows.
+    # Each driver has one seat; the server decides, regardless of the page.
     anna.claim('hv0')
     bert.claim('hv1')
     assert 'your link is for hv1' in bert.ask(type='claim', seat='av0', device='')['text']
@@ -139,7 +139,7 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
     button = watcher.driver.find_element(By.CSS_SELECTOR, '#run-control [data-action="reset"]')
     assert not button.is_enabled() and 'Only a director' in (button.get_attribute('title') or '')
 
-    # Ready: one is not enough; both are, after the countdown.
+    # One ready driver is not enough; with both the run starts after the countdown.
     anna.click('.lobby .primary')
     bert.wait('crgame.store.seats.hv0.ready', 'her readiness')
     peer.listen_for(0.5)
@@ -148,7 +148,7 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
     watcher.wait('crgame.store.status.countdown_s > 0', 'the countdown')
     watcher.wait('crgame.store.status.run === "running" && crgame.store.status.n > 10', 'the run')
 
-    # Both drive, each their own vehicle. A driver's P pauses nothing.
+    # Both drive their own vehicles. A driver's P pauses nothing.
     anna.hold('w')
     bert.hold('s')
     graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
@@ -161,7 +161,7 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
     watcher.wait('crgame.store.people.filter((person) => person.input_delay_ms > 0).length === 2',
                  'both delays')
 
-    # Her page is killed: the vehicle brakes by itself, the seat is kept, she comes back to it.
+    # One page is killed: the vehicle brakes by itself, and its driver returns to the kept seat.
     own = anna.driver.current_window_handle
     anna.driver.switch_to.new_window('tab')
     spare = anna.driver.current_window_handle
@@ -180,7 +180,7 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
     anna.hold('w')
     graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
 
-    # Strangers change nothing.
+    # Clients without a link change nothing.
     n = peer.n
     with ThreadPoolExecutor(HOSTILE) as strangers:
         attacks = [strangers.submit(attack, link(graph, 'watch'), number)
@@ -199,7 +199,7 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
 
 @pytest.mark.parametrize('graph', [SHORT_S], indirect=True)
 def test_a_game_ends_for_everybody(graph: Graph, new_browser: OpenBrowser) -> None:
-    """A director's deeds are told to the others by name; at its end each sees how it went."""
+    """Others see a director's actions with the name; at the end each gets the result."""
     dora = Person(graph, new_browser(1000, 640, trusting=True), 'direct', 'Dora')
     drivers = {seat: Person(graph, new_browser(1000, 640, trusting=True), f'drive {seat}', name)
                for seat, name in (('hv0', 'Anna'), ('hv1', 'Bert'))}
@@ -215,7 +215,7 @@ def test_a_game_ends_for_everybody(graph: Graph, new_browser: OpenBrowser) -> No
             person.wait_for_text('#notices', f'Dora {told} the run')
             person.wait_for_run('paused' if deed == 'pause' else 'running')
     assert 'Dora' not in dora.text('#notices'), 'she knows'
-    # After the reset they drive on without another word, up to the end.
+    # After the reset they drive to the end without further confirmation.
     for seat, person in drivers.items():
         person.wait_for_run('ended')
         person.wait('document.querySelector(".score[data-state=told]")', 'the score')
@@ -244,7 +244,7 @@ def crash(person: Person) -> None:
         try:
             person.driver.execute_cdp_cmd('Page.crash', {})
         except WebDriverException:
-            # Nobody is left to answer.
+            # No process is left to answer.
             return
     thread = threading.Thread(target=kill, daemon=True)
     thread.start()
@@ -264,7 +264,7 @@ def get(address: str) -> tuple[int, str]:
 
 
 def check_recording(graph: Graph) -> None:
-    """End everything, and read from the bag who drove."""
+    """End all processes, and read the drivers from the bag."""
     from crgame_ros.recording.run_record import read_drivers
     launcher = graph.launcher
     launcher.signal(signal.SIGINT)

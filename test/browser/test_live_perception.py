@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an AV perceives, in the page of a running graph: a van hides somebody who waits."""
+"""An AV's perception in the page of a running graph: a van hides a waiting pedestrian."""
 
 from collections.abc import Iterator
 from io import BytesIO
@@ -17,10 +17,10 @@ import pytest
 
 pytestmark = pytest.mark.exhaustive
 
-# The pedestrian of the scenario stands at (170, -4.9) until somebody lets him go. Seen from the
+# The pedestrian of the scenario stands at (170, -4.9) until an event starts him. Seen from the
 # lane at y = -1.75, a van from x = 161 to 167 m whose left side is at y = -3.5 covers that place
 # until the front of the AV, which begins at x = 47 m with 12.5 m/s, has come to 163 m; after that
-# nothing hides him any more. The wall is beside the road.
+# nothing hides him. The wall is beside the road.
 GAME = """
 scenario: {scenario}
 duration: 3600
@@ -44,13 +44,13 @@ avs:
 """
 PERSON, VAN = 'o201', 'van'
 WALL, CELL_M = (130.0, 160.0, 10.0, 13.0), 0.25
-# Where the run is held: the AV is 35 m before the van.
+# The run is held here: the AV is 35 m before the van.
 HELD_S = 6.0
-# Whether the page shows all that there is of the last step.
+# True when the page shows all data of the last step.
 SHOWN = ('!crgame.world.camera.moves && crgame.world.shown.n === crgame.store.status.n'
          ' && crgame.perception.estimate?.n === crgame.world.shown.n'
          ' && crgame.perception.fans === 1')
-# Colours of the theme and what is drawn of them agree to rounding.
+# Colours of the theme and drawn colours agree to rounding.
 SAME_COLOR = 6
 
 
@@ -73,7 +73,7 @@ def write_game(folder: Path) -> Path:
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
-    """Keep one graph for all tests; the last lets its run go on."""
+    """Keep one graph for all tests; the last one resumes its run."""
     folder = tmp_path_factory.mktemp('perception')
     with live_graph(write_game(folder), folder / 'run') as running:
         yield running
@@ -81,7 +81,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
 
 @pytest.fixture(scope='module')
 def listener(graph: Graph) -> Iterator[Peer]:
-    """Listen to what the AV perceives."""
+    """Subscribe to the AV's perception."""
     with Peer(graph.launcher.domain, '/scenario/game', ('/<av>/plan_request', 'av0'),
               ('/<av>/localization', 'av0')) as peer:
         peer.wait_until(lambda: peer.games, 'the game')
@@ -92,7 +92,7 @@ def listener(graph: Graph) -> Iterator[Peer]:
 def page(graph: Graph, listener: Peer, module_browser: Browser) -> LivePage:
     """Open the page, follow the AV, and hold the run before the van."""
     opened = LivePage(graph, module_browser)
-    # The run waits for somebody in the seat.
+    # The run waits for a driver in the seat.
     opened.claim('hv0')
     opened.run("crgame.world.follow('av0', true);"
                "crgame.perception.set('rays', true); crgame.perception.set('estimate', true);")
@@ -102,7 +102,7 @@ def page(graph: Graph, listener: Peer, module_browser: Browser) -> LivePage:
 
 
 def go_until(page: LivePage, condition: str) -> None:
-    """Let the run go on until an expression of the page is true, and hold it there."""
+    """Run until an expression of the page is true, and pause there."""
     page.run_async(f"""
       const order = (action) => crgame.connection.request({{ type: 'control', action }});
       await order('start');
@@ -122,7 +122,7 @@ def show(page: LivePage, layer: str, on: bool) -> None:
 
 
 def pixels(page: LivePage, x: float, y: float, half_px: int = 1) -> NDArray[np.int64]:
-    """Take a screenshot of what is around a point of the map, (2 half + 1, 2 half + 1, 3)."""
+    """Return a screenshot around a point of the map, (2 half + 1, 2 half + 1, 3)."""
     px, py = page.run("""
         const { camera } = crgame.world;
         const box = document.querySelector('#world').getBoundingClientRect();
@@ -135,7 +135,7 @@ def pixels(page: LivePage, x: float, y: float, half_px: int = 1) -> NDArray[np.i
 
 
 def share_of(picture: NDArray[np.int64], page: LivePage, color: str) -> float:
-    """Return the share of a picture that has a colour of the theme."""
+    """Return the share of a picture with a colour of the theme."""
     wanted = page.run("""
         const probe = document.createElement('span');
         probe.style.color = `var(--${arguments[0]})`;
@@ -147,7 +147,7 @@ def share_of(picture: NDArray[np.int64], page: LivePage, color: str) -> float:
 
 
 def place_of(page: LivePage, name: str) -> tuple[float, float]:
-    """Return where an object is drawn."""
+    """Return the place at which an object is drawn."""
     x, y = page.run("""
         const at = 6 * crgame.store.scene.objects.findIndex(({ id }) => id === arguments[0]);
         return [...crgame.world.shown.objects.subarray(at, at + 2)];""", name)
@@ -155,7 +155,7 @@ def place_of(page: LivePage, name: str) -> tuple[float, float]:
 
 
 def told(listener: Peer, page: LivePage, name: str) -> bool:
-    """Return whether the planner's newest request at the shown time holds somebody."""
+    """Return whether the planner's newest request at the shown time has an object."""
     scheduler = listener.games[-1].scheduler
     n = page.run('return crgame.world.shown.n')
     request = next(message for message in reversed(listener.messages['/<av>/plan_request'])
@@ -163,15 +163,15 @@ def told(listener: Peer, page: LivePage, name: str) -> bool:
     return f'{name}/x' in request.joint_names
 
 
-def test_who_is_hidden_is_an_outline(page: LivePage, listener: Peer) -> None:
-    """The planner is told of the van only; without the layer the person is drawn as all are."""
+def test_a_hidden_pedestrian_is_an_outline(page: LivePage, listener: Peer) -> None:
+    """The request has the van only; without the layer the person is drawn normally."""
     assert (told(listener, page, VAN), told(listener, page, PERSON)) == (True, False)
     hollow = page.run('return crgame.perception.hollow')
     assert PERSON in hollow and VAN not in hollow and 'av0' not in hollow
     assert page.run('return document.querySelector(\'[data-layer="unseen"]\').hidden') is False
     person = place_of(page, PERSON)
     assert share_of(pixels(page, *person), page, 'vulnerable') == 0.0
-    # The ring around it is there, though.
+    # The ring around the person is visible, though.
     assert 0.02 < share_of(pixels(page, *person, 14), page, 'vulnerable') < 0.4
     show(page, 'unseen', False)
     assert page.run('return crgame.perception.hollow') == []
@@ -180,8 +180,8 @@ def test_who_is_hidden_is_an_outline(page: LivePage, listener: Peer) -> None:
     assert share_of(pixels(page, *person), page, 'vulnerable') == 0.0
 
 
-def test_the_instruments_count_who_is_seen(page: LivePage) -> None:
-    """Of the van and the person within reach of the sensor it sees the van."""
+def test_the_instruments_count_seen_objects(page: LivePage) -> None:
+    """Of the van and the person within the sensor's range the AV sees the van."""
     page.wait('crgame.perception.count', 'what the AV knows of')
     count = page.run('return crgame.perception.count')
     near = page.run("""
@@ -201,7 +201,7 @@ def test_the_instruments_count_who_is_seen(page: LivePage) -> None:
 
 
 def test_the_estimate_is_that_of_the_message(page: LivePage, listener: Peer) -> None:
-    """Pose and ellipse are those of /localization at the step shown: 2 m beside the truth."""
+    """Pose and ellipse are those of /localization at the shown step, 2 m off the truth."""
     shown = page.run('return crgame.perception.estimate')
     scheduler = listener.games[-1].scheduler
     message = next(item for item in listener.messages['/<av>/localization']
@@ -214,7 +214,7 @@ def test_the_estimate_is_that_of_the_message(page: LivePage, listener: Peer) -> 
         2.0 * np.sqrt(np.linalg.eigvalsh(covariance)), abs=1e-9)
     truth = page.vehicle(1)
     assert 0.8 < shown['y'] - truth[1] < 3.2
-    # The cross in the middle of the ellipse.
+    # The cross is in the middle of the ellipse.
     assert share_of(pixels(page, shown['x'], shown['y'], 2), page, 'map-estimate') > 0.1
     show(page, 'estimate', False)
     assert share_of(pixels(page, shown['x'], shown['y'], 2), page, 'map-estimate') == 0.0
@@ -222,7 +222,7 @@ def test_the_estimate_is_that_of_the_message(page: LivePage, listener: Peer) -> 
 
 
 def test_rays_are_drawn_and_switched_off(page: LivePage) -> None:
-    """Free road ahead is tinted as far as the van lets the rays through, nothing behind it is."""
+    """Free road ahead is tinted up to the van, and no road behind it."""
     x = page.vehicle(1)[0]
     ahead, behind_van = (x + 12.0, 3.0), (168.5, -4.0)
     on = [pixels(page, *point) for point in (ahead, behind_van)]
@@ -236,7 +236,7 @@ def test_rays_are_drawn_and_switched_off(page: LivePage) -> None:
 
 
 def test_walls_of_the_map_are_drawn(page: LivePage) -> None:
-    """Where the map is occupied, in its colour; beside it not; and not when switched off."""
+    """Occupied cells of the map are drawn in their colour, unless switched off."""
     page.wait('crgame.perception.occupied > 0', 'the map')
     x0, x1, y0, y1 = WALL
     assert page.run('return crgame.perception.occupied') == \
@@ -249,9 +249,9 @@ def test_walls_of_the_map_are_drawn(page: LivePage) -> None:
     show(page, 'occupancy', True)
 
 
-def test_who_comes_into_view_is_solid(page: LivePage, listener: Peer) -> None:
-    """Past the van the planner is told of the person, and the page draws no outline any more."""
-    # By single steps: the AV drives on, and on a busy machine past the person before the pause.
+def test_a_pedestrian_in_view_is_solid(page: LivePage, listener: Peer) -> None:
+    """Past the van the request has the person, and the page draws no outline."""
+    # By single steps, as the AV could pass the person before a pause on a busy machine.
     solid = f'!crgame.perception.hollow.includes("{PERSON}")'
     for _ in range(60):
         if page.run(f'return crgame.world.shown.t > 8 && {solid}'):
@@ -267,8 +267,8 @@ def test_who_comes_into_view_is_solid(page: LivePage, listener: Peer) -> None:
     assert share_of(pixels(page, *place_of(page, PERSON)), page, 'vulnerable') == 1.0
 
 
-def test_choices_are_remembered_and_nobody_else_pays(page: LivePage) -> None:
-    """A page that is loaded again has its layers; one that follows a human hears no scans."""
+def test_choices_are_remembered_and_cost_no_other_page(page: LivePage) -> None:
+    """A reloaded page keeps its layers; one that follows a human gets no scans."""
     page.open()
     page.run("crgame.world.follow('hv0', true);")
     page.wait('crgame.perception.fans === 0 && crgame.perception.hollow.length === 0'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios that people bring along, good and bad, and texts in them that would be code."""
+"""Uploaded scenarios, valid and invalid, and texts in them that could act as code."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +16,7 @@ import yaml
 SCENARIO = 'ZAM_CutIn-1_1_T-1.xml'
 IMAGE = '<img src=x onerror="window.ran = true">'
 SCRIPT = '<script>window.ran = true</script>'
-# As the server lists it.
+# The server's entry.
 CLEANED = IMAGE.strip('<>')
 UPLOADED = 'ZAM_Brought-7_1_T-1'
 GAME = {
@@ -38,7 +38,7 @@ BAD = {
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
-    """Keep one graph of a game whose texts would be code in a careless page."""
+    """Keep one graph of a game whose texts would run as code in an unsafe page."""
     folder = tmp_path_factory.mktemp('scenarios')
     shutil.copy(SCENARIOS / SCENARIO, folder)
     (folder / 'game.yaml').write_text(yaml.safe_dump(GAME))
@@ -54,21 +54,21 @@ def only_page(graph: Graph, module_browser: Browser) -> LivePage:
 
 @pytest.fixture
 def page(only_page: LivePage) -> Iterator[LivePage]:
-    """Return the page at its scenario panel; no text may have run in it afterwards."""
+    """Return the page at its scenario panel; check afterwards that no text ran as code."""
     only_page.tab('scenario')
     yield only_page
     assert only_page.run('return [window.ran ?? false, document.images.length]') == [False, 0]
 
 
 def choose_file(page: LivePage, path: Path) -> None:
-    """Choose a file of this machine, as with the button of the panel."""
+    """Choose a local file, as by the button of the panel."""
     page.driver.find_element(
         By.CSS_SELECTOR, '#panel-scenario input[type=file]').send_keys(str(path))
 
 
 @pytest.mark.exhaustive
 def test_texts_of_a_game_are_text(page: LivePage) -> None:
-    """Its title in the list, the preview and the header, and the label of its event."""
+    """Its title in list, preview and header, and the label of its event are plain text."""
     title = str(GAME['title'])
     page.wait_for_text('#title', title)
     page.wait_for_text('button.scenario[title="game.yaml"]', CLEANED)
@@ -86,7 +86,7 @@ def test_texts_of_a_game_are_text(page: LivePage) -> None:
 @pytest.mark.parametrize(('content', 'reason'), BAD.values(), ids=BAD.keys())
 def test_bad_files_are_refused_in_words(page: LivePage, tmp_path: Path, content: str,
                                         reason: str) -> None:
-    """The panel says what is wrong, nothing is kept, and the run goes on."""
+    """The panel shows the mistake, no file is kept, and the run goes on."""
     path = tmp_path / f'{IMAGE}.xml'
     path.write_text(content)
     page.run_async('await crgame.scenario.refresh();')
@@ -98,14 +98,14 @@ def test_bad_files_are_refused_in_words(page: LivePage, tmp_path: Path, content:
     page.run_async('await crgame.scenario.refresh();')
     assert page.run('return document.querySelectorAll("button.scenario").length') == before
     page.graph.wait_for_steps(20)
-    # The refusal is an answer of the server that the browser logs, too.
+    # The browser also logs the server's refusal.
     errors = page.browser.console_errors()
     page.browser.forget_errors()
     assert all('/api/upload' in error and '400' in error for error in errors)
 
 
 def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -> None:
-    """Its name, which would be code, is text; who presses the buttons drives in it."""
+    """Its name is shown as text and not run as code; the buttons start a drive in it."""
     path = tmp_path / f'{IMAGE}.xml'
     path.write_text((SCENARIOS / 'ZAM_LaneChange-1_1_T-1.xml').read_text().replace(
         'ZAM_LaneChange-1_1_T-1', UPLOADED))
@@ -133,7 +133,7 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
 
 @pytest.mark.exhaustive
 def test_an_upload_is_deleted_after_a_question(page: LivePage) -> None:
-    """Its bin asks first, and it stays while its run goes on; then it is gone for good."""
+    """Its delete button asks first and is refused during its run; then the file is deleted."""
     row = '#panel-scenario [data-action="delete"]'
     page.wait('document.querySelectorAll(arguments[0]).length === 1', 'the upload', row)
     page.click(row)

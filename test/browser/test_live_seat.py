@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a contact back to the lane, once more from the start, and a device at the machine."""
+"""Return to the lane after a contact, a restart, and a local device."""
 
 from collections.abc import Iterator
 import signal
@@ -22,7 +22,7 @@ from sensor_msgs.msg import Joy
 
 pytestmark = pytest.mark.exhaustive
 
-# The person comes from behind to a vehicle that a joy node drives, which stands askew.
+# The person approaches from behind a vehicle that a joy node drives and that stands askew.
 GAME = f"""
 scenario: {SCENARIOS / 'ZAM_CutIn-1_1_T-1.xml'}
 duration: 3600
@@ -50,7 +50,7 @@ def page(graph: Graph, module_browser: Browser) -> LivePage:
 
 
 def put_backs(page: LivePage) -> list[dict[str, object]]:
-    """Return the events by drivers, as the page knows them."""
+    """Return the events by drivers, as stored in the page."""
     return list(page.run('return crgame.store.fired.filter((event) => event.by === "driver")'))
 
 
@@ -90,7 +90,7 @@ def test_a_vehicle_is_put_back_by_button_and_by_key(page: LivePage) -> None:
 def test_the_delay_of_a_device_at_the_machine_is_shown(page: LivePage, graph: Graph) -> None:
     publisher = graph.peer.publisher('/<hv>/joy', 'hv1')
     for number in range(80):
-        # The left trigger, a little more or less.
+        # The left trigger, with slight changes.
         publisher.publish(Joy(axes=[0.0, 0.0, 0.2 + 0.1 * (number % 2), 0.0, 0.0, 1.0],
                               buttons=[0] * 11))
         graph.peer.listen_for(0.04)
@@ -106,7 +106,7 @@ def test_once_more_needs_no_second_start(page: LivePage) -> None:
     page.release('r')
     page.wait('crgame.store.status.run === "running" && crgame.store.status.n > 0',
               'the run to go on by itself')
-    # Who had it paused wants it to stand.
+    # A run that was paused stays paused.
     page.order('pause')
     page.wait_for_run('paused')
     page.order('reset')
@@ -115,7 +115,7 @@ def test_once_more_needs_no_second_start(page: LivePage) -> None:
 
 
 def test_again_from_the_card_needs_no_second_start(page: LivePage) -> None:
-    """The run has ended; the seat has driven in it, and its next run begins by the one click."""
+    """One click starts the next run after a run in which the seat was driven."""
     page.order('start')
     page.wait_for_run('running')
     page.order('stop')
@@ -130,10 +130,10 @@ def test_again_from_the_card_needs_no_second_start(page: LivePage) -> None:
 
 
 def test_how_it_went_after_a_contact(page: LivePage) -> None:
-    """Held by a button: what happened, and the ways on; the score and files are for the end."""
+    """The card of a held run shows the contact and choices; score and files come at the end."""
     page.reset()
     drive_into_it(page)
-    # A pause that the simulation refuses holds nothing, and shows nothing at a later one.
+    # A refused pause does not hold the run and has no effect on a later pause.
     page.run("""const ask = crgame.connection.request;
         crgame.connection.request = async () => {
           crgame.connection.request = ask;
@@ -161,8 +161,8 @@ def test_how_it_went_after_a_contact(page: LivePage) -> None:
     assert page.browser.console_errors() == []
 
 
-def test_who_only_drives_is_told_why_not(page: LivePage) -> None:
-    """Buttons and the key that the server would refuse say so, and ask nothing of it."""
+def test_a_mere_driver_gets_the_reason_of_a_refusal(page: LivePage) -> None:
+    """Buttons and the key that the server would refuse give the reason and send no request."""
     page.reset()
     drive_into_it(page)
     page.run_async("await crgame.connection.request({type: 'role', role: 'drive'});")
@@ -175,7 +175,7 @@ def test_who_only_drives_is_told_why_not(page: LivePage) -> None:
     page.hold('r')
     page.wait('!document.querySelector(".restart-hint").hidden', 'the hint')
     assert page.text('.restart-hint') == 'Only a director can reset the run; you are a driver.'
-    # Longer than the key is held to begin anew.
+    # Longer than the key must be held for a reset.
     page.graph.peer.listen_for(1.5)
     page.release('r')
     assert page.run('return crgame.store.status.epoch') == epoch
@@ -208,7 +208,7 @@ def test_the_recording_repeats_the_jumps_to_the_last_bit(graph: Graph) -> None:
     assert launcher.wait() == 0, launcher.text
     bag = run_folders(launcher.out)[0] / 'bag'
     fired = read_run_events(bag).fired
-    # It rolls on afterwards, and may touch the other one once more.
+    # The vehicle rolls on afterwards and may touch the other one again.
     assert [event.name for event in fired[:4]] == [
         'contact of hv0 with hv1', 'put back hv0'] * 2
     assert [event.vehicle for event in fired].count('hv0') == 2

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The bare page of somebody who only drives, within a page at another port, on a real graph."""
+"""The bare page for driving only, framed by a page at another port, on a real graph."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,7 +27,7 @@ humans:
 avs:
   - {{id: av0, planning_problem: 100, planner: idm}}
 """
-# What an experimenter's page does: it shows the stage, and keeps what the stage tells.
+# Stands for an experimenter's page: it shows the stage and keeps its messages.
 AROUND = """<!DOCTYPE html><title>around</title><style>iframe {{ width: 900px; height: 500px }}
 </style><button>Ready</button>
 <iframe src="{address}" allow="gamepad; fullscreen; autoplay"></iframe>
@@ -50,7 +50,7 @@ class Around(NamedTuple):
 
 @contextmanager
 def page_around() -> Iterator[Around]:
-    """Serve a page that shows the address that was noted last."""
+    """Serve a page that frames the last noted address."""
     shown: list[str] = []
 
     class Handler(BaseHTTPRequestHandler):
@@ -94,12 +94,12 @@ def graph(tmp_path_factory: pytest.TempPathFactory, around: Around) -> Iterator[
 
 
 def state(browser: Browser) -> dict[str, Any]:
-    """Return what the stage told last."""
+    """Return the stage's last message."""
     return dict(browser.run('return window.told.at(-1)?.state ?? {}'))
 
 
 def wait_for_state(browser: Browser, condition: str) -> dict[str, Any]:
-    """Wait until the stage has told something; `s` is its newest state."""
+    """Wait until the stage has sent a state; `s` is its newest state."""
     try:
         browser.wait(f'((s) => {condition})(window.told.at(-1).state)', condition)
     except pytest.fail.Exception:
@@ -109,7 +109,7 @@ def wait_for_state(browser: Browser, condition: str) -> dict[str, Any]:
 
 
 def seen(peer: Peer) -> dict[str, str]:
-    """Return what was recorded last of the picture in the seat."""
+    """Return the last recorded description of the picture in the seat."""
     return next((read_status(status).values
                  for message in reversed(peer.messages['/diagnostics'])
                  for status in message.status if status.name == 'cockpit_node: hv0 view'), {})
@@ -117,7 +117,7 @@ def seen(peer: Peer) -> dict[str, str]:
 
 @contextmanager
 def within(browser: Browser) -> Iterator[None]:
-    """Look into the frame."""
+    """Switch into the frame."""
     browser.driver.switch_to.frame(browser.driver.find_element(By.TAG_NAME, 'iframe'))
     try:
         yield
@@ -127,7 +127,7 @@ def within(browser: Browser) -> Iterator[None]:
 
 def test_a_driver_takes_the_seat_gets_ready_drives_and_steers_nothing_else(
         graph: Graph, around: Around, module_browser: Browser) -> None:
-    """Seated by the address, ready by the page around, with keys that drive and no others."""
+    """The address seats the driver, the outer page makes it ready, and only driving keys act."""
     browser = module_browser
     around.shown.append(f'{graph.address}?stage=hv0&view=map&lang=de')
     browser.open(around.origin)
@@ -138,7 +138,7 @@ def test_a_driver_takes_the_seat_gets_ready_drives_and_steers_nothing_else(
     assert browser.run('return window.told.every(({ origin, crgame, kind }) => '
                        'origin + "/" === arguments[0] && crgame === 1 && kind === "stage")',
                        graph.address)
-    # The page around asks for readiness, and has the focus for it.
+    # The outer page asks for readiness and has the focus for it.
     assert waiting['trouble'] == ''
     browser.driver.find_element(By.TAG_NAME, 'button').click()
     browser.run("window.order({ kind: 'ready', ready: 'yes' }); window.order({ kind: 'start' });"
@@ -179,7 +179,7 @@ def test_a_driver_takes_the_seat_gets_ready_drives_and_steers_nothing_else(
 
 def test_nothing_is_seen_but_the_view_and_the_dashboard(
         graph: Graph, around: Around, module_browser: Browser) -> None:
-    """No panel, no button, no name; the small map only where it is wanted."""
+    """The stage has no panel, button or name, and the small map only on request."""
     browser = module_browser
     wait_for_state(browser, 's.seated')
     with within(browser):
@@ -202,11 +202,11 @@ def test_nothing_is_seen_but_the_view_and_the_dashboard(
 
 def test_a_new_visit_gets_the_seat_again_and_the_view_of_its_address(
         graph: Graph, around: Around, module_browser: Browser) -> None:
-    """The driver's view where the library is there; else the map, and the page around is told."""
+    """It has the driver's view if the library exists, else the map, and reports it."""
     browser = module_browser
     around.shown.append(f'{graph.address}?stage=hv0&view=driver&map=0')
     browser.open(around.origin)
-    # Nobody can draw it who has not got the library: both are told alike.
+    # The view cannot be drawn without the library: both get the same message.
     told = wait_for_state(browser, 's.seated && (s.view === "driver" || s.missing3d)')
     assert (told['view'] == 'map') is told['missing3d']
     shown = {'shown': told['view'], 'bare': 'true', 'plans': 'false', 'inset': 'false',
@@ -227,7 +227,7 @@ def test_a_new_visit_gets_the_seat_again_and_the_view_of_its_address(
 
 def test_a_seat_that_is_not_there_or_not_free_is_told(
         graph: Graph, around: Around, module_browser: Browser) -> None:
-    """The stage says why nobody drives, to the driver and to the page around."""
+    """The stage gives the reason for the missing seat to the driver and the outer page."""
     browser = module_browser
     around.shown.append(f'{graph.address}?stage=hv7&view=map')
     browser.open(around.origin)
@@ -235,9 +235,9 @@ def test_a_seat_that_is_not_there_or_not_free_is_told(
                           ' && s.trouble.includes("no such")')['seated'] is False
 
 
-def test_who_is_in_an_av_rides_along(
+def test_a_passenger_in_an_av_rides_along(
         graph: Graph, around: Around, module_browser: Browser) -> None:
-    """Its planner keeps it; the picture is that of the AV, and nothing is said to be wrong."""
+    """The AV's planner keeps driving; the picture is the AV's, and no error is shown."""
     browser = module_browser
     around.shown.append(f'{graph.address}?stage=av0&view=map')
     browser.open(around.origin)
@@ -250,7 +250,7 @@ def test_who_is_in_an_av_rides_along(
 
 def test_no_other_page_can_show_the_cockpit(
         graph: Graph, around: Around, module_browser: Browser) -> None:
-    """The same page at another port gets an empty frame, and is told nothing."""
+    """The same page at another port gets an empty frame and no messages."""
     browser = module_browser
     with page_around() as stranger:
         stranger.shown.append(f'{graph.address}?stage=hv0&view=map')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A participant goes through a study in a real browser, whatever is killed on the way."""
+"""A participant completes a study in a real browser despite killed processes."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ import yaml
 
 pytestmark = pytest.mark.exhaustive
 
-# In the first drive alone; the light comes twice.
+# Only in the first drive; the light comes twice.
 TASKS = [
     {'name': 'light', 'detection_response': {'interval': [2.5, 2.6]}, 'when': {'time': 0}},
     {'name': 'radio', 'secondary_task': {'show': True}, 'label': 'Radio',
@@ -64,7 +64,7 @@ def test_each_item_is_finished_once(conducted: StudySession) -> None:
     assert finished == dict.fromkeys(
         ('fields', *(f'main/{trial}{what}' for trial in range(1, 5) for what in ('', '/after/1'))),
         1)
-    # A page that is back within two seconds goes on with its drive.
+    # A page that returns within two seconds continues its drive.
     assert sum(entry['entry'] == 'started' for entry in entries) in (5, 6)
     for entry in entries:
         if entry['entry'] == 'finished':
@@ -98,7 +98,7 @@ def test_the_tables_hold_each_trial_once(conducted: StudySession) -> None:
 def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) -> None:
     folder = conducted.folder.parents[1] / 'data'
     told = [row for row in table(folder / 'events.csv') if row['name'] in ('light', 'radio')]
-    # It was begun several times, for the page and the program were killed in it.
+    # It was begun several times, as the page and the program were killed during it.
     assert len({(row['trial'], row['attempt']) for row in told}) == 1
     assert [(row['kind'], row['time_s'], row['duration_s']) for row in told
             if row['name'] == 'radio'] == [('secondary_task_span', '1.0', '2.0')]
@@ -115,15 +115,15 @@ def test_the_tables_tell_of_tasks_in_drives_that_count(conducted: StudySession) 
         sum(hits) / len(hits) if hits else math.nan, nan_ok=True)
 
 
-def test_who_rides_in_an_av_takes_it_over_when_asked(conducted: StudySession) -> None:
+def test_a_passenger_takes_the_av_over_on_request(conducted: StudySession) -> None:
     trials = table(conducted.folder.parents[1] / 'data' / 'trials.csv')[2:]
     for row in trials:
-        # A drive begins with the planner at the wheel, also after one that ended without it.
+        # A drive begins with the planner in control, also after one that ended without it.
         assert (row['take_over_requests'], row['take_over_requests_taken']) == ('1', '1')
         assert 0.0 < float(row['take_over_first_input_mean_s']) < 4.0
 
 
-def test_who_is_done_is_not_asked_again(conducted: StudySession) -> None:
+def test_a_finished_participant_is_not_asked_again(conducted: StudySession) -> None:
     before = len(read_journal(conducted.folder))
     done = subprocess.run(conducted.command, capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.returncode == 0

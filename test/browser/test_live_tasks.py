@@ -30,7 +30,7 @@ tasks:
   - {{name: call, take_over: {{lead: 2, shown: 30}}, seat: av0, label: Baustelle}}
   - {{name: radio, secondary_task: {{show: true}}, label: Radio}}
 """
-# What the page is compared with: who else looks at the light and at the keys of the same page.
+# Reference for the page: an independent observer of the light and the keys of the same page.
 WATCH = """
 window.seen = [];
 window.pressed = [];
@@ -50,14 +50,14 @@ window.addEventListener('keydown', (event) => {
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
-    """Keep one graph, whose run waits for somebody in a browser."""
+    """Keep one graph, whose run waits for a driver in a browser."""
     folder = tmp_path_factory.mktemp('tasks')
     (folder / 'game.yaml').write_text(GAME)
     with live_graph(folder / 'game.yaml', folder / 'run') as running:
         yield running
 
 
-# Somebody else on the same graph, who has no seat and answers for hv0 all the same.
+# Another client on the same graph has no seat, but answers for hv0.
 STRANGER = """
 const socket = new WebSocket(`ws://${location.host}/ws`);
 await new Promise((resolve) => socket.addEventListener('open', resolve));
@@ -86,7 +86,7 @@ def rows_of(graph: Graph) -> list[TaskEvent]:
 
 def test_lights_requests_and_notes_are_shown_answered_and_recorded(
         graph: Graph, module_browser: Browser) -> None:
-    """Each answer is timed by the page, and found in the recording with its outcome."""
+    """The page times each answer, and the recording has it with its outcome."""
     page = LivePage(graph, module_browser)
     page.run(WATCH)
     page.claim('hv0')
@@ -99,7 +99,7 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
         time.sleep(wait_s)
         press(page)
         page.wait('document.querySelector(".task-light").hidden', 'the light to go out')
-    press(page)  # To no light.
+    press(page)  # An answer without a light.
     page.tab('events')
     page.click('[data-task="radio"] button')
     page.wait_for_text('.task-note', 'Aufgabe: Radio')
@@ -142,7 +142,7 @@ def test_lights_requests_and_notes_are_shown_answered_and_recorded(
     for number in range(3):
         times = lights[number].times
         assert times.response_ms is not None
-        # The light was drawn after it had been changed and before the next picture began.
+        # The light was drawn after its change and before the next picture began.
         entry = seen[number]
         assert pressed[number] - entry['next'] - 1.0 <= times.response_ms
         assert times.response_ms <= pressed[number] - entry['changed'] + 1.0

@@ -355,8 +355,8 @@ async def test_a_client_that_never_reads_is_dropped_and_costs_nothing() -> None:
 @pytest.mark.clock
 @in_loop
 async def test_a_silent_client_is_noticed() -> None:
-    # It reads nothing and answers nothing, but nothing is unsent either: only a ping tells, sent
-    # after 5 s and answered within 2.5 s.
+    # The client neither reads nor answers, but no data is unsent either. Only a ping, sent after
+    # 5 s and due within 2.5 s, detects it.
     class Quiet(PumpBackend):
         async def _pump(self, hub: Any) -> None:
             await asyncio.Event().wait()

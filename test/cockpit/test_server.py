@@ -232,7 +232,7 @@ async def test_names_layers_and_sound_are_kept() -> None:
         assert client.sound == Sound(True, 0.5, 0.25)
         assert client.view == SeenView('chase', inset=True, software=True, width_px=900.0,
                                        height_px=500.0, ratio=0.5, renderer='x')
-        # What was not named stays; who wants more gets the newest of it, also in a pause.
+        # Unnamed layers stay; a client that adds one gets its newest frame, also in a pause.
         wanted = running.hub.send_frame
         wanted('seen:1', b'12345678', only_if=lambda other: other.perceives_as == 'av0')
         await socket.send_json({'type': 'layers', 'perception': 'av0', 'scans': True})

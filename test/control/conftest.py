@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Let the tests of this folder import its helpers."""
+"""Make the helpers of this folder importable by its tests."""
 
 from pathlib import Path
 import sys

@@ -31,7 +31,7 @@ def plan(speed: float, duration_s: float,
     for i in range(round(duration_s / DT_C) * fine):
         a = acceleration((i + 0.5) * h)
         end = v + a * h
-        # A plan that brakes stays where it comes to rest.
+        # A braking plan stays at the place of its stop.
         rests = rests or (v != 0.0 and v * end <= 0.0)
         end = 0.0 if rests else end
         way = 0.5 * (v + end) * h if not rests or v == 0.0 else -0.5 * v * v / a
@@ -52,7 +52,7 @@ def circle(radius: float) -> Callable[[float], float]:
 
 def s_curve(speed: float, lateral_acceleration: float = 2.0,
             period_s: float = 6.0) -> Callable[[float], float]:
-    """Return a sinusoidal curvature that asks for a lateral acceleration [m/s^2]."""
+    """Return a sinusoidal curvature with a given lateral acceleration [m/s^2]."""
     return lambda s: lateral_acceleration / speed ** 2 \
         * math.sin(2.0 * math.pi * s / (speed * period_s))
 

@@ -27,7 +27,7 @@ SPEEDS = [0.5, 5.0, 15.0, 30.0, 60.0]
 
 
 def continuous(speed: float) -> tuple[Array, Array]:
-    """Write the error model down once more: e, psi, d of FS 2 with G_s 0.95, T_delta 0.15."""
+    """Return the error model, independently: e, psi, d of FS 2 with G_s 0.95, T_delta 0.15."""
     return (np.array(((0.0, speed, 0.0), (0.0, 0.0, 0.95 * speed / LENGTH),
                       (0.0, 0.0, -1.0 / 0.15))), np.array(((0.0,), (0.0,), (1.0 / 0.15,))))
 
@@ -50,7 +50,7 @@ def test_error_model_is_the_exact_discretisation(speed: float) -> None:
 
 
 def test_error_model_is_the_linearised_vehicle() -> None:
-    """Differences of FS 2 itself around straight travel, at one step of the simulation."""
+    """It equals the differences of FS 2 around straight travel, at one simulation step."""
     model = DynamicBicycle(VEHICLE)
     a, b = error_model(15.0, LENGTH, DT, DYNAMICS)
     small = 1e-6
@@ -83,7 +83,7 @@ def test_gains_approach_those_of_continuous_time(speed: float) -> None:
 
 
 def test_weights_are_brysons() -> None:
-    """At 15 m/s 2 m/s^2 are atan(2 L / 225) = 0.0229 rad; at 2 m/s 0.3 rad bound them."""
+    """2 m/s^2 at 15 m/s is atan(2 L / 225) = 0.0229 rad; at 2 m/s the bound of 0.3 rad holds."""
     q, r = weights(15.0, 2.579, LQR)
     assert np.diag(q) == pytest.approx((1.0 / 0.3 ** 2, 1.0 / 0.15 ** 2, 0.0))
     assert r[0, 0] ** -0.5 == pytest.approx(0.0229, abs=5e-5)
@@ -93,7 +93,7 @@ def test_weights_are_brysons() -> None:
 @pytest.mark.parametrize('speed', [*TABLE_SPEEDS, 0.7, 11.0, 22.0, 55.0])
 @pytest.mark.parametrize('factor', [0.7, 1.0, 1.5])
 def test_closed_loop_is_stable(speed: float, factor: float) -> None:
-    """At each speed of the table and between: eigenvalues below 1, with wrong lags too."""
+    """Eigenvalues are below 1 at and between the table's speeds, also with wrong lags."""
     tracker = support.tracker()
     assert isinstance(tracker, LqrTracker)
     dynamics = type(DYNAMICS)(0.95, 0.15 * factor, 0.3)
@@ -105,7 +105,7 @@ def test_closed_loop_is_stable(speed: float, factor: float) -> None:
 
 
 def test_closed_loop_without_a_lag_is_stable() -> None:
-    """The kinematic vehicle reaches the angle at once: d of the next step is u."""
+    """The kinematic vehicle reaches the angle at once, so d of the next step is u."""
     tracker = support.tracker()
     assert isinstance(tracker, LqrTracker)
     for speed in TABLE_SPEEDS:
@@ -134,7 +134,7 @@ def test_gains_beyond_the_table_are_held() -> None:
 def test_lateral_error_with_the_dynamic_bicycle(
         speed: float, curvature: Callable[[float], float], bound: float, settled: float) -> None:
     """
-    2 m/s^2 of lateral acceleration; the circle begins at once, the wheels need time to turn.
+    Drive with 2 m/s^2 laterally; the circle begins at once, but the wheels need time to turn.
 
     At 5 m/s they need 0.21 rad: 0.52 s at 0.4 rad/s and the lag of 0.15 s, in which the plan
     leaves the vehicle by up to 0.5 * 0.08 * (5 * 0.6)^2 = 0.36 m.
@@ -159,7 +159,7 @@ def test_without_feed_forward_the_circle_is_left() -> None:
         found[option] = errors[-1, 0]
     assert isinstance(tracker, LqrTracker)
     offset_gain, _, steering_gain = tracker.gain(15.0)
-    # The circle that is driven is wider than the plan's by the offset.
+    # The driven circle is wider than the plan's by the offset.
     angle = math.atan(LENGTH / 0.95 / (112.5 - found[False]))
     assert found[False] == pytest.approx(-(1.0 + steering_gain) * angle / offset_gain, rel=0.01)
     assert abs(found[False]) > 0.3
@@ -176,14 +176,15 @@ def test_a_controller_that_knows_no_slip_leaves_the_circle_too() -> None:
 @pytest.mark.parametrize('offset', [0.5, 2.0, -4.0])
 def test_an_offset_is_taken_back(speed: float, offset: float) -> None:
     """
-    At 0.4 rad/s of steering rate, which large errors exhaust, and still without a limit cycle.
+    Large errors exhaust the steering rate of 0.4 rad/s, but cause no limit cycle.
 
-    At most 12 % beyond (of 2 m at 5 m/s), never steeper than 0.5 rad, and for good.
+    The overshoot is at most 12 % (of 2 m at 5 m/s), the heading error at most 0.5 rad, and the
+    offset does not come back.
     """
     driven, errors, _ = support.track(
         support.plan(speed, 16.0), support.tracker('lqr'),
         start=VehicleState(0.0, offset, 0.0, speed))
-    # The approach under 0.3 rad, 2 s to turn there and back, and an exponential end.
+    # An approach at 0.3 rad, 2 s for turning in and out, and an exponential end.
     within = round((2.0 + abs(offset) / (0.3 * min(speed, 5.0)) + 6.0 / speed) / DT)
     assert np.abs(errors[within:, 0]).max() < 0.05
     assert (errors[:, 0] * -np.sign(offset)).max() < 0.13 * abs(offset)
@@ -193,17 +194,17 @@ def test_an_offset_is_taken_back(speed: float, offset: float) -> None:
 @pytest.mark.parametrize('speed', [2.0, 3.0, 5.0, 8.0, 15.0])
 @pytest.mark.parametrize('yaw', [0.5, -0.8])
 def test_a_heading_error_is_taken_back(speed: float, yaw: float) -> None:
-    """The limited steering rate undoes what the feedback builds up: no swinging, and for good."""
+    """The vehicle settles without oscillation despite the limited steering rate."""
     _, errors, _ = support.track(
         support.plan(speed, 27.0), support.tracker('lqr'),
         start=VehicleState(0.0, 0.0, yaw, speed))
-    # It never comes out further on the other side than a quarter of a metre.
+    # The overshoot to the other side is at most a quarter of a metre.
     assert (errors[:, 0] * -np.sign(yaw)).max() < 0.25
     assert np.abs(errors[2600:, 0]).max() < 0.1
 
 
 def test_kinematic_vehicle_is_tracked_too() -> None:
-    """The controller reckons with a lag and slip that are not there."""
+    """The controller assumes a lag and slip that this vehicle does not have."""
     for speed in (5.0, 15.0, 30.0):
         _, _, execution = support.track(
             support.plan(speed, 12.0, support.s_curve(speed)), support.tracker('lqr'),
@@ -212,7 +213,7 @@ def test_kinematic_vehicle_is_tracked_too() -> None:
 
 
 def test_in_reverse() -> None:
-    """Backwards through a winding path from 0.3 m beside it."""
+    """The vehicle follows a winding path in reverse, starting 0.3 m beside it."""
     states = support.plan(-3.0, 8.0, lambda s: 0.1 * math.sin(s / 3.0))
     _, errors, execution = support.track(
         states, support.tracker('lqr'), start=VehicleState(0.0, 0.3, 0.0, -3.0))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A plan between its states, against the curves that the plans were made from."""
+"""A plan between its states, compared with the curves from which it was made."""
 
 import math
 
@@ -32,12 +32,12 @@ def test_positions_between_states_are_on_the_curve() -> None:
         point = planned.at(time_s)
         assert math.hypot(point.x, point.y - 20.0) == pytest.approx(20.0, abs=5e-5)
         assert point.yaw == pytest.approx(0.5 * time_s, abs=1e-6)
-        # Ways are measured along chords, which are 1e-4 shorter than the arc.
+        # Arc lengths are measured along chords, which are 1e-4 shorter than the arc.
         assert point.s == pytest.approx(10.0 * time_s, abs=1e-3 + 2e-4 * 10.0 * time_s)
 
 
 def test_braking_between_states() -> None:
-    """The way v t - a t^2 / 2 is a cubic too: exact; the way agrees with the position."""
+    """The arc length v t - a t^2 / 2 is exact, as for a cubic, and agrees with the position."""
     planned = track(support.plan(10.0, 2.0, acceleration=lambda t: -3.0))
     for time_s in np.arange(0.0, 2.0, 0.017).tolist():
         point = planned.at(time_s)
@@ -47,7 +47,7 @@ def test_braking_between_states() -> None:
 
 
 def test_headings_go_the_shortest_way() -> None:
-    """Across pi, as planners normalise: never through 0."""
+    """Headings cross pi, as planners normalise them, and never pass through 0."""
     states = support.plan(5.0, 4.0, support.circle(10.0), start=(0.0, 0.0, 2.5))
     states[:, 2] = np.remainder(states[:, 2] + math.pi, 2.0 * math.pi) - math.pi
     assert np.abs(np.diff(states[:, 2])).max() > 6.0
@@ -70,7 +70,7 @@ def test_curvature_is_that_of_the_motion() -> None:
 
 
 def test_curvature_is_finite_around_a_stop() -> None:
-    """Headings that waver by 1e-3 rad at rest are no curve."""
+    """Headings that vary by 1e-3 rad at rest give no curvature."""
     states = support.plan(2.0, 6.0, acceleration=lambda t: -1.0)
     states[:, 2] += 1e-3 * np.random.default_rng(2).standard_normal(len(states))
     planned = track(states)
@@ -79,7 +79,7 @@ def test_curvature_is_finite_around_a_stop() -> None:
 
 @pytest.mark.parametrize('offset', [-1.5, 0.0, 2.0])
 def test_projection_onto_a_circle(offset: float) -> None:
-    """Any point beside the arc: its distance from the centre, its angle, whatever the time."""
+    """A point beside the arc has its distance from the centre and its angle, at any time."""
     planned = track(support.plan(8.0, 6.0, support.circle(30.0)))
     for angle in np.arange(0.02, 1.55, 0.1).tolist():
         radius = 30.0 - offset
@@ -101,7 +101,7 @@ def test_projection_beyond_the_ends_is_straight() -> None:
 
 
 def test_projection_stays_within_the_direction_of_travel() -> None:
-    """Forward 8 m and 8 m back over the same place: time decides which of the two is meant."""
+    """On a path of 8 m forward and 8 m back, time selects one of the two passes."""
     there = support.plan(4.0, 4.0, acceleration=lambda t: -1.0)
     back = support.plan(0.0, 4.0, acceleration=lambda t: -1.0, start=tuple(there[-1, :3]))
     planned = track(np.vstack((there, back[1:])))
@@ -116,7 +116,7 @@ def test_projection_stays_within_the_direction_of_travel() -> None:
 
 
 def test_stops_and_what_comes_after() -> None:
-    """A pause of 2 s: it is the next stop before and within, and not afterwards."""
+    """A pause of 2 s is the next stop before and during it, and not afterwards."""
     pause = support.plan(2.0, 4.0, acceleration=lambda t: -1.0)
     on = support.plan(0.0, 3.0, acceleration=lambda t: 1.0, start=tuple(pause[-1, :3]))
     planned = track(np.vstack((pause, on[1:])))
@@ -130,7 +130,7 @@ def test_stops_and_what_comes_after() -> None:
 
 @pytest.mark.parametrize('distance', [2.0, 7.0, 20.0])
 def test_point_ahead_is_on_the_arc_at_its_distance(distance: float) -> None:
-    """On the circle the chord of length l_d: 2 R sin(angle / 2)."""
+    """On the circle it is at the chord of length l_d = 2 R sin(angle / 2)."""
     planned = track(support.plan(10.0, 8.0, support.circle(40.0)))
     x, y = planned.ahead(VehicleState(0.0, 0.0, 0.0, 10.0), 0.0, distance)
     angle = 2.0 * math.asin(distance / 80.0)

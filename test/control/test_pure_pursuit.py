@@ -31,7 +31,7 @@ def test_the_formula(alpha: float) -> None:
 
 
 def test_the_angle_leads_through_the_point() -> None:
-    """Driven with it, the kinematic model meets the point, forwards and backwards."""
+    """With this angle the kinematic model reaches the point, forwards and in reverse."""
     for sign in (1.0, -1.0):
         angle = steering_angle_to(VehicleState(0.0, 0.0, 0.0, 0.0), sign * 8.0, 3.0,
                                   VEHICLE.wheelbase)
@@ -45,7 +45,7 @@ def test_the_angle_leads_through_the_point() -> None:
 
 
 def test_a_vehicle_on_the_arc_steers_its_curvature() -> None:
-    """The angle is atan(L kappa), whatever the look-ahead distance."""
+    """The angle is atan(L kappa) for any look-ahead distance."""
     states = support.plan(10.0, 6.0, support.circle(40.0))
     reference = Reference(states, support.DT_C)
     pose = VehicleState(*states[10].tolist())
@@ -56,7 +56,7 @@ def test_a_vehicle_on_the_arc_steers_its_curvature() -> None:
 
 @pytest.mark.parametrize('slip', [1.0, 0.9])
 def test_steady_state_on_a_circle(slip: float) -> None:
-    """It settles on sqrt(R^2 + l_d^2 (1 / G_s - 1)): 50 m without slip, 50.08 m with 0.9."""
+    """The radius settles at sqrt(R^2 + l_d^2 (1 / G_s - 1)): 50 m, or 50.08 m with G_s 0.9."""
     states = support.plan(10.0, 20.0, support.circle(50.0))
     model = DynamicBicycle(VEHICLE, slip=slip)
     driven, _, _ = support.track(states, made(look_ahead_time=0.85), model)
@@ -76,7 +76,7 @@ def test_look_ahead_grows_with_speed_between_its_bounds() -> None:
 
 @pytest.mark.parametrize('speed', [5.0, 15.0, 30.0])
 def test_lateral_error_with_the_dynamic_bicycle(speed: float) -> None:
-    """2 m/s^2 in an S-curve; straight on exactly; half a metre taken back within 3 s."""
+    """It is bounded in an S-curve of 2 m/s^2, 0 on a straight; 0.5 m is corrected within 3 s."""
     _, _, straight = support.track(support.plan(speed, 12.0), made())
     _, _, winding = support.track(support.plan(speed, 12.0, support.s_curve(speed)), made())
     _, errors, _ = support.track(support.plan(speed, 12.0), made(),
@@ -90,7 +90,7 @@ def test_lateral_error_with_the_dynamic_bicycle(speed: float) -> None:
 @pytest.mark.parametrize('speed', [2.0, 3.0, 5.0, 15.0, 30.0])
 @pytest.mark.parametrize('offset', [2.0, -8.0])
 def test_a_large_offset_is_taken_back(speed: float, offset: float) -> None:
-    """Further off than the look-ahead distance too: within 10 % and under 25 degrees."""
+    """Offsets even beyond the look-ahead distance end with under 10 % overshoot and 25 degrees."""
     driven, errors, _ = support.track(
         support.plan(speed, 30.0), made(), start=VehicleState(0.0, offset, 0.0, speed))
     assert np.abs(errors[2500:, 0]).max() < 0.05

@@ -20,16 +20,16 @@ SETTINGS = control_settings().speed_control
 
 
 def gentle(deceleration: float, after_s: float) -> object:
-    """Brake from a time on, building the deceleration up within 1 s as people do."""
+    """Brake from a time on; the deceleration builds up within 1 s, as with people."""
     return lambda t: -deceleration * min(1.0, max(0.0, t - after_s))
 
 
 @pytest.mark.parametrize('slope', [1.0, 2.0, -2.0])
 def test_ramps_are_followed(slope: float) -> None:
     """
-    The speed lags a step of a by less than a T_a, in the end by nothing, and the place too.
+    The speed lags a step of a by less than a T_a; both speed and position errors vanish.
 
-    Without the feed-forward the position loop alone would trail a ramp by more.
+    Without the feed-forward the position loop alone would lag a ramp by more.
     """
     states = support.plan(15.0, 12.0, acceleration=lambda t: slope if 1.0 < t < 5.0 else 0.0)
     _, errors, execution = support.track(states, support.tracker())
@@ -43,7 +43,7 @@ def test_ramps_are_followed(slope: float) -> None:
 @pytest.mark.parametrize(('speed', 'deceleration'), [(5.0, 1.0), (15.0, 2.0), (30.0, 4.0),
                                                      (15.0, 6.0)])
 def test_stops_where_the_plan_stops(name: str, speed: float, deceleration: float) -> None:
-    """Within 2 cm, without a step back, without creeping: it stands within 0.3 s of the plan."""
+    """The stop is within 2 cm and 0.3 s of the plan, without rolling back or creeping."""
     states = support.plan(speed, speed / deceleration + 5.0,
                           acceleration=gentle(deceleration, 1.0))  # type: ignore[arg-type]
     driven, _, _ = support.track(states, support.tracker(name))
@@ -64,9 +64,9 @@ def test_stops_where_the_plan_stops(name: str, speed: float, deceleration: float
 def test_stops_of_plans_that_brake_at_once(model: VehicleModel, speed: float,
                                            deceleration: float, miss: float) -> None:
     """
-    The plan brakes hard from its first state, the vehicle's brakes need their time.
+    The plan brakes hard from its first state, but the vehicle's brakes need time.
 
-    With the lag that the controller reckons with it ends within 5 mm of the planned place.
+    With the lag that the controller assumes, it stops within 5 mm of the planned place.
     """
     states = support.plan(speed, speed / deceleration + 3.0,
                           acceleration=lambda t: -deceleration)
@@ -76,7 +76,7 @@ def test_stops_of_plans_that_brake_at_once(model: VehicleModel, speed: float,
 
 
 def test_a_stop_and_a_start_again() -> None:
-    """Stands through the pause, then goes on; the position error of the start is taken back."""
+    """It stands during the pause, then drives on; the initial position error is corrected."""
     there = support.plan(8.0, 7.0, acceleration=lambda t: -2.0)
     on = support.plan(0.0, 12.0, acceleration=lambda t: 1.5 if t < 4.0 else 0.0,
                       start=tuple(there[-1, :3]))
@@ -89,7 +89,7 @@ def test_a_stop_and_a_start_again() -> None:
 
 
 def test_noise_of_an_estimate_moves_no_standing_vehicle() -> None:
-    """After the stop the believed speed wavers by 0.03 m/s: not a millimetre in 5 s."""
+    """The estimated speed varies by 0.03 m/s, but the vehicle moves less than 1 mm in 5 s."""
     random = np.random.default_rng(5)
 
     def noisy(state: VehicleState) -> VehicleState:
@@ -107,7 +107,7 @@ def controller(**settings: float) -> SpeedController:
 
 
 def test_the_law_between_stops() -> None:
-    """a_ref + k_v (v_ref + k_s ds - v) + k_i integral, as documented, in the first call."""
+    """The first call gives a_ref + k_v (v_ref + k_s ds - v) + k_i integral, as documented."""
     reference = Reference(support.plan(10.0, 5.0, acceleration=lambda t: 1.0), DT_C)
     pose = VehicleState(9.8, 0.0, 0.0, 10.5)
     found = controller().command(pose, reference.at(1.0), 9.8)
@@ -126,7 +126,7 @@ def test_the_planned_acceleration_is_taken_a_lag_ahead() -> None:
 
 
 def test_integral_removes_a_steady_error() -> None:
-    """A vehicle that delivers 0.5 m/s^2 less than asked for still holds its speed."""
+    """A vehicle that delivers 0.5 m/s^2 less than commanded still holds its speed."""
     law, reference = controller(position_gain=0.0), Reference(support.plan(10.0, 60.0), DT_C)
     speed, s, a = 10.0, 0.0, 0.0
     for n in range(5900):
@@ -139,9 +139,9 @@ def test_integral_removes_a_steady_error() -> None:
 
 def test_integral_does_not_wind_up() -> None:
     """
-    A minute 20 m/s too slow at full correction, then at the planned speed: no push is left.
+    After a minute at 20 m/s too slow with full correction, no push is left at planned speed.
 
-    Its bound would allow for 1 m/s^2.
+    The integral's bound would allow 1 m/s^2.
     """
     law, reference = controller(), Reference(support.plan(30.0, 80.0), DT_C)
     for n in range(6000):
@@ -163,7 +163,7 @@ def test_commands_stay_within_the_vehicles_limits() -> None:
 
 
 def test_a_vehicle_beyond_the_stop_brakes() -> None:
-    """Half a metre past it at 2 m/s: at least 4 m/s^2; rolling back: forwards as much."""
+    """0.5 m past it at 2 m/s it brakes by at least 4 m/s^2; rolling back, as much forwards."""
     reference = Reference(support.plan(2.0, 5.0, acceleration=lambda t: -1.0), DT_C).at(3.0)
     assert controller().command(VehicleState(2.5, 0.0, 0.0, 2.0), reference, 2.5) <= -4.0
     assert controller().command(VehicleState(2.5, 0.0, 0.0, -2.0), reference, 2.5) == 4.0
@@ -171,7 +171,7 @@ def test_a_vehicle_beyond_the_stop_brakes() -> None:
 
 @pytest.mark.parametrize('name', ['lqr', 'pure-pursuit'])
 def test_forwards_a_stop_and_backwards(name: str) -> None:
-    """A three-point turn's first two moves, in one plan."""
+    """One plan holds the first two moves of a three-point turn, and both are driven."""
     there = support.plan(4.0, 6.0, lambda s: 0.05, lambda t: -1.0 if t < 3.999 else 0.0)
     back = support.plan(0.0, 8.0, lambda s: -0.05, lambda t: -1.0 if t < 3.0 else 1.0,
                         start=tuple(there[-1, :3]))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Execution by tracking as a whole: errors, bias, used-up plans, replanning, real plans."""
+"""Execution by tracking as a whole: errors, bias, expired plans, replanning, real plans."""
 
 import math
 from pathlib import Path
@@ -23,7 +23,7 @@ PLAN = Reference(support.plan(10.0, 1.0), DT_C)
 
 
 class Fixed(Tracker):
-    """Commands one thing."""
+    """Returns a constant command."""
 
     def reset(self) -> None:
         pass
@@ -37,7 +37,7 @@ def execution(name: str = 'lqr') -> TrackedExecution:
 
 
 def test_errors_are_those_of_the_time_after_the_step() -> None:
-    """Straight on at 9 m/s and 0.2 m to the left, the plan at 10: -0.01 m along per step."""
+    """At 9 m/s and 0.2 m to the left of a plan of 10 m/s, the error grows by -0.01 m a step."""
     made = TrackedExecution(VEHICLE, Fixed(VEHICLE, DT), KinematicSingleTrack(VEHICLE), DT)
     yaw = math.pi / 3.0
     state = VehicleState(-0.2 * math.sin(yaw), 0.2 * math.cos(yaw), yaw, 9.0)
@@ -56,7 +56,7 @@ def test_errors_are_those_of_the_time_after_the_step() -> None:
 
 @pytest.mark.parametrize('name', NAMES)
 def test_a_biased_estimate_shifts_the_vehicle_by_the_bias(name: str) -> None:
-    """It believes to be 0.5 m further left and 1 m further ahead, so it is as much behind."""
+    """An estimate 0.5 m left of and 1 m ahead of the truth shifts the vehicle the other way."""
     states = support.plan(10.0, 20.0, start=(0.0, 0.0, 0.7))
     c, s = math.cos(0.7), math.sin(0.7)
 
@@ -74,7 +74,7 @@ def test_a_biased_estimate_shifts_the_vehicle_by_the_bias(name: str) -> None:
 @pytest.mark.parametrize('speed', [10.0, -10.0])
 def test_without_a_plan_it_brakes_along_its_steering_angle(reference: Reference | None,
                                                            speed: float) -> None:
-    """4 m/s^2 after the lag: v^2 / 8 + 0.3 v on the circle of its wheels; then it stands."""
+    """It brakes by 4 m/s^2 after the lag, over v^2 / 8 + 0.3 v on its circle; then it stands."""
     made = execution()
     state = VehicleState(0.0, 0.0, 0.0, speed, 0.1)
     made.reset(state)
@@ -86,7 +86,7 @@ def test_without_a_plan_it_brakes_along_its_steering_angle(reference: Reference 
         assert state.steering_angle == pytest.approx(0.1)
         assert made.errors is None
     assert state.speed == 0.0
-    # The way of FS 2: v t - 2 t^2 + 4 T (t - T), stopped at t = v / 4 + T.
+    # Distance by FS 2: v t - 2 t^2 + 4 T (t - T), stopped at t = v / 4 + T.
     t = 2.5 + 0.3
     assert way == pytest.approx(10.0 * t - 2.0 * t * t + 1.2 * (t - 0.3), abs=0.01)
     assert max(accelerations) == pytest.approx(4.0, abs=0.01)
@@ -97,7 +97,7 @@ def test_without_a_plan_it_brakes_along_its_steering_angle(reference: Reference 
 
 @pytest.mark.parametrize('name', NAMES)
 def test_a_used_up_plan_brakes_after_it(name: str) -> None:
-    """A plan of 2 s at 10 m/s, then nothing: 4 m/s^2 to rest, 20 + 12.5 + 3 m away."""
+    """After a plan of 2 s at 10 m/s it brakes by 4 m/s^2 and stops 20 + 12.5 + 3 m away."""
     driven, errors, _ = support.track(support.plan(10.0, 2.0), support.tracker(name),
                                       duration_s=6.0)
     assert driven[200, 3] == pytest.approx(10.0)
@@ -112,7 +112,7 @@ def test_equal_runs_are_equal_to_the_last_bit(name: str) -> None:
     states = support.plan(12.0, 8.0, support.s_curve(12.0), lambda t: math.sin(t))
     runs = [support.track(states, support.tracker(name))[0] for _ in range(2)]
     assert runs[0].tobytes() == runs[1].tobytes()
-    # A reset leaves nothing of an earlier run either.
+    # A reset also clears the state of an earlier run.
     made = execution(name)
     for _ in range(2):
         state = VehicleState(*states[0].tolist())
@@ -125,7 +125,7 @@ def test_equal_runs_are_equal_to_the_last_bit(name: str) -> None:
 
 @pytest.mark.parametrize('name', NAMES)
 def test_a_plan_from_where_the_vehicle_is_every_tick(name: str) -> None:
-    """Replanned at 10 Hz from its own state onto a circle: the vehicle turns with the plans."""
+    """Replanned at 10 Hz from its own state onto a circle, the vehicle turns with the plans."""
     made = execution(name)
     state = VehicleState(0.0, 0.0, 0.0, 10.0)
     made.reset(state)
@@ -136,17 +136,17 @@ def test_a_plan_from_where_the_vehicle_is_every_tick(name: str) -> None:
         state = made.step(state, reference.at(n % 10 * DT))
     assert state.yaw_rate == pytest.approx(10.0 / 40.0, rel=0.05)
     assert state.speed == pytest.approx(10.0, abs=0.05)
-    # A plan that is a second old wanted the curvature at once: T_delta = 0.15 s late, the heading
-    # lacks v / R T = 0.04 rad, and the way of a second on it is 0.38 m.
+    # A plan made a second ago has the curvature at once. T_delta = 0.15 s late, the heading lags
+    # by v / R T = 0.04 rad, which makes 0.38 m in a second.
     assert 0.1 < made.worst.lateral < 0.38
 
 
 def test_errors_are_against_a_plan_that_is_a_second_old() -> None:
     """
-    Replanned at 10 Hz from its own state onto a circle, the vehicle goes straight on all the same.
+    The vehicle, replanned at 10 Hz from its own state onto a circle, nevertheless drives straight.
 
-    From its newest plan it is never more than 1.2 cm away, and from the circle that it was to be
-    on for a second by now R (1 - cos(1 s v / R)) = 1.24 m.
+    Its error to the newest plan is at most 1.2 cm, but to the circle of the plan made a second
+    ago R (1 - cos(1 s v / R)) = 1.24 m.
     """
     made = TrackedExecution(VEHICLE, Fixed(VEHICLE, DT), KinematicSingleTrack(VEHICLE), DT)
     state = VehicleState(0.0, 0.0, 0.0, 10.0)
@@ -157,18 +157,18 @@ def test_errors_are_against_a_plan_that_is_a_second_old() -> None:
                 10.0, 4.0, support.circle(40.0), start=state[:3]), DT_C)
         state = made.step(state, reference.at(n % 10 * DT))
         if n % 10 == 9 and n > 100:
-            # Made a second before, when the vehicle was 10 m behind.
+            # Made a second ago, when the vehicle was 10 m behind.
             assert made.errors is not None
             c, s = math.cos(0.25), math.sin(0.25)
             dx, dy = 10.0 - 40.0 * s, -40.0 * (1.0 - c)
             expected = (dy * c - dx * s, dx * c + dy * s, -0.25, 0.0)
             assert made.errors == pytest.approx(expected, abs=1e-3)
-    # Until the next plan is old enough the one before it has to do: for 1.09 s.
+    # The previous plan is used until the next one is old enough: for 1.09 s.
     assert made.worst.lateral == pytest.approx(1.458, abs=0.001)
 
 
 def test_short_plans_are_compared_as_long_as_they_last() -> None:
-    """Plans of 0.5 s never grow a second old: the oldest that still says something is taken."""
+    """Plans of 0.5 s end within a second, so the error is against the oldest valid one."""
     made = TrackedExecution(VEHICLE, Fixed(VEHICLE, DT), KinematicSingleTrack(VEHICLE), DT)
     state = VehicleState(0.0, 0.0, 0.0, 10.0)
     made.reset(state)

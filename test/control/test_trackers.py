@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The registry of trackers, and what the documentation says about it."""
+"""The registry of trackers, and its documentation."""
 
 import inspect
 from pathlib import Path
@@ -13,7 +13,7 @@ from crgame_ros.vehicle.models import VEHICLE_MODELS
 import numpy as np
 import pytest
 
-# Of both trackers, listed once.
+# Options of both trackers, listed once.
 SPEED = {'speed_gain', 'integral_gain', 'position_gain', 'acceleration_lag'}
 
 
@@ -36,7 +36,7 @@ def test_the_document_lists_every_name_and_option(document: str) -> None:
 
 
 def test_the_documented_example_tracks(document: str, tmp_path: Path) -> None:
-    """Made as a game does, it takes half a metre back and follows an S-curve within 15 cm."""
+    """Made as in a game, it corrects half a metre and follows an S-curve within 15 cm."""
     code = re.search(r'```python\n(.*?)```', document, re.DOTALL)
     assert code is not None
     file = tmp_path / 'follow.py'

@@ -40,7 +40,7 @@ def outline(shape: Shape, x: float, y: float, yaw: float) -> shapely.Geometry:
 
 def separation(first: Shape, second: Shape, pose: tuple[float, float, float],
                other: tuple[float, float, float]) -> float:
-    """Measure the gap between two shapes [m]; negative: the area or depth of their overlap."""
+    """Return the gap between two shapes [m]; negative: the area or depth of their overlap."""
     a, b = outline(first, *pose), outline(second, *other)
     circles = sum(0.5 * shape.length for shape in (first, second) if shape.kind == 'circle')
     distance = a.distance(b)
@@ -109,8 +109,8 @@ def test_obstacle_hits_between_two_ticks() -> None:
     """
     A crossing pedestrian of 0.35 m at 40 m/s is beside the car at both ticks and in it between.
 
-    He reaches the side of the car, 0.805 m from its centre line, when his centre is 1.155 m
-    away: from 2 m that takes 21.1 ms, and he has left on the other side after 78.9 ms.
+    The pedestrian reaches the side of the car, 0.805 m from its centre line, with the centre
+    1.155 m away: from 2 m that takes 21.1 ms. The contact ends on the other side after 78.9 ms.
     """
     detector = CollisionDetector([CAR], [SHAPES['pedestrian']])
     detector.set_objects(states((0.0, -2.0, 0.0, 0.0, 40.0, 0.0)))
@@ -131,8 +131,8 @@ def test_obstacle_turns_between_two_ticks() -> None:
     assert detector.hits([(0.0, 0.0, 0.0)])[1] == [[0]]
 
 
-def test_absent_objects_and_vehicles_touch_nobody() -> None:
-    """A NaN is absence, of an object, of its velocity, of a vehicle, and before the first tick."""
+def test_absent_objects_and_vehicles_touch_nothing() -> None:
+    """A NaN means absence: of an object, its velocity or a vehicle, also before the first tick."""
     detector = CollisionDetector([CAR, CAR], [CAR, CAR])
     nan = math.nan
     detector.move(0.0)
@@ -143,14 +143,14 @@ def test_absent_objects_and_vehicles_touch_nobody() -> None:
 
 
 def test_wrong_number_of_objects_is_refused() -> None:
-    """States that don't match what was announced would name the wrong objects."""
+    """States that don't match the announced objects would name the wrong ones."""
     detector = CollisionDetector([CAR], [CAR])
     with pytest.raises(InputError, match='of 1 objects'):
         detector.set_objects(states((0.0,) * 6, (0.0,) * 6))
 
 
 def test_polygon_without_area_is_refused() -> None:
-    """Three corners in one line can't collide with anything and are a mistake of the file."""
+    """Three corners in one line can't collide with anything and are an error in the file."""
     line = Shape('polygon', 2.0, 1.0, ((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)))
     with pytest.raises(InputError, match='no area'):
         CollisionDetector([CAR], [line])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Contacts in closed form: which side, which kind, and whether braking would have avoided them."""
+"""Contacts in closed form: the side, the kind, and whether braking would have avoided them."""
 
 import math
 
@@ -27,16 +27,16 @@ def course(x: float, y: float, yaw: float, speed: float, *, braking: float = BRA
 
 
 def absent_until(other: Course, step: int) -> Course:
-    """Let a body appear at a step."""
+    """Make a body that appears at a step."""
     poses = other.poses.copy()
     poses[:step] = np.nan
     return Course(other.shape, poses, other.speeds, other.braking, other.reaction_s)
 
 
-# How the map lies and how far its origin is must not matter; 5e6 m are UTM's.
+# The map's rotation and the distance of its origin must not matter; UTM has 5e6 m.
 @pytest.mark.parametrize(('turn', 'shift'), [(0.0, 0.0), (2.1, 5e6), (-math.pi / 2.0, -700.0)])
 def test_standing_car_ahead(turn: float, shift: float) -> None:
-    """20 m/s on a car that stands 60 m ahead: touched with the front, avoidable from 35 m on."""
+    """At 20 m/s into a car that stands 60 m ahead: a front contact, avoidable from 35 m on."""
     mine = course(0.0, 0.0, 0.0, 20.0, turn=turn, shift=shift)
     other = course(64.0, 0.0, 0.0, 0.0, turn=turn, shift=shift)
     step = 300
@@ -44,14 +44,14 @@ def test_standing_car_ahead(turn: float, shift: float) -> None:
     assert touched_side(other, mine, step) == 'rear'
     assert could_avoid(mine, other, step, DT)
     assert not could_avoid(other, mine, step, DT)
-    # Who needs v tau + v^2 / 2a = 10 m + 25 m finds it too late when it appears 34 m ahead.
+    # v tau + v^2 / 2a = 10 m + 25 m is too long if the car appears 34 m ahead.
     assert could_avoid(mine, absent_until(other, 120), step, DT)
     assert not could_avoid(mine, absent_until(other, 130), step, DT)
     assert not could_avoid(Course(CAR, mine.poses, mine.speeds, 0.0, 0.0), other, step, DT)
 
 
 def test_faster_car_behind() -> None:
-    """Whoever is run into from behind cannot brake it away; whoever runs in could."""
+    """The leader cannot avoid it by braking; the follower that runs into it could."""
     mine, other = course(0.0, 0.0, 0.0, 10.0), course(-24.0, 0.3, 0.0, 20.0)
     step = 200
     assert touched_side(mine, other, step) == 'rear'
@@ -71,18 +71,18 @@ def test_crossing_car_hits_the_side(y: float, yaw: float, side: str) -> None:
 
 
 def test_crossing_car_in_front() -> None:
-    """One who drives into the side of a car that crosses could have braked while it crossed."""
+    """A car that drives into the side of a crossing car could have braked while it crossed."""
     mine, other = course(-23.0, 0.0, 0.0, 10.0), course(0.0, 4.0, -math.pi / 2.0, 2.0)
     step = 200
     assert touched_side(mine, other, step) == 'front'
     assert touched_side(other, mine, step) == 'right'
-    # In my way, 2 m wide, since y < 3 + 2 - 2: from 0.5 s on, 15 m before; it needs 11.25 m.
+    # In the way, 2 m wide, once y < 3 + 2 - 2: from 0.5 s on, 15 m before; the car needs 11.25 m.
     assert could_avoid(mine, other, step, DT)
     assert not could_avoid(course(-23.0, 0.0, 0.0, 10.0, braking=3.0), other, step, DT)
 
 
 def test_overlap_from_the_start() -> None:
-    """Without a step before, the shortest way out tells the side; nobody could brake."""
+    """Without a step before, the shortest way out gives the side; no vehicle could brake."""
     mine, other = course(0.0, 0.0, 0.0, 10.0), course(1.0, 1.8, 0.0, 10.0)
     assert touched_side(mine, other, 0) == 'left'
     assert not could_avoid(mine, other, 0, DT)

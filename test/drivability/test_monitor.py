@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The drivability monitor: who hit what, at which step, and who has to stop."""
+"""The drivability monitor: hits by vehicle, object and step, and requests to stop."""
 
 from dataclasses import replace
 import math
@@ -60,8 +60,8 @@ def test_the_road_is_looked_at_through_the_transform_and_contacts_are_not() -> N
     """
     CRG 28: at y = 4 in simulation coordinates the human is at y = 2.5 in the scenario's.
 
-    The AV beside it, with another transform, is where it seems to be; their contact is what it is
-    in the coordinates that they share.
+    The AV beside it has another transform, and is at its apparent place. Their contact is judged
+    in the shared coordinates.
     """
     shifted = RigidTransform(0.0, 0.0, -1.5)
     humans_av = RigidTransform(0.0, 0.0, 0.5)
@@ -97,7 +97,7 @@ def test_everyone_is_checked_against_everyone(prepared: bool) -> None:
 
 
 def test_hits_are_sorted_and_named() -> None:
-    """All ids that are touched, in the order of their names, whatever the order of the objects."""
+    """All touched ids, in the order of their names, for any order of the objects."""
     monitor = DrivabilityMonitor([AV, HUMAN], [WALKER, TRUCK], None, ALL)
     monitor.set_objects(at((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)))
     verdicts = monitor.check(0, 0.0, vehicles(rear(0.0, 0.0), rear(1.0, 1.0)))
@@ -108,8 +108,8 @@ def test_reference_point_is_the_rear_axle() -> None:
     """
     Turned round on its rear axle, a car reaches 1.4227 + 2.254 m the other way.
 
-    A walker of 0.35 m stands 3.9 m ahead of the rear axle: 3.677 + 0.35 reaches him, and the
-    2.254 - 1.4227 m behind the axle do not.
+    A walker of 0.35 m stands 3.9 m ahead of the rear axle: the 3.677 m ahead of the axle and
+    0.35 m reach the walker, and the 2.254 - 1.4227 m behind the axle do not.
     """
     monitor = DrivabilityMonitor([HUMAN], [WALKER], None, ALL)
     monitor.set_objects(at((3.9, 0.0, 0.0, 0.0)))
@@ -152,7 +152,7 @@ def test_only_a_human_asks_for_a_stop(stop: bool) -> None:
 
 
 def test_absence() -> None:
-    """Vehicles and objects with NaN are absent: valid themselves and hit by nobody."""
+    """Vehicles and objects with NaN are absent: they are valid, and nothing hits them."""
     monitor = DrivabilityMonitor([HUMAN, AV], [WALKER], network(), ALL)
     monitor.prepare(vehicles(rear(0.0, 0.0), [math.nan] * 8))
     monitor.set_objects(at((math.nan, math.nan, math.nan, math.nan)))
@@ -161,13 +161,13 @@ def test_absence() -> None:
 
 
 def test_without_a_road_only_collisions_count() -> None:
-    """No lanelet network: nobody is off the road."""
+    """Without a lanelet network no vehicle is off the road."""
     monitor = DrivabilityMonitor([HUMAN], [], None, ALL)
     assert monitor.check(0, 0.0, vehicles(rear(5e3, 5e3)))[0].is_valid
 
 
 def test_wrong_shapes_are_refused() -> None:
-    """States of another number of vehicles or objects name the wrong ones."""
+    """States of another number of vehicles or objects would name the wrong ones."""
     monitor = DrivabilityMonitor([HUMAN, AV], [WALKER], None, ALL)
     with pytest.raises(InputError, match='2 driven vehicles'):
         monitor.check(0, 0.0, vehicles(rear(0.0, 0.0)))
@@ -176,7 +176,7 @@ def test_wrong_shapes_are_refused() -> None:
 
 
 def test_only_changes_are_reported() -> None:
-    """All at first, then what differs in more than n: begins, ends, or hits somebody else."""
+    """First all hits, then those that differ in more than n: they begin, end, or hit others."""
     monitor = DrivabilityMonitor([HUMAN, AV], [TRUCK, WALKER], None, ALL)
     reported: tuple[VehicleDrivability, ...] = ()
     log = []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Curbs and fences in the drivability monitor: who hits them, judged by shapely and by hand."""
+"""Curbs and fences in the drivability monitor: hits, checked by shapely and by hand."""
 
 import math
 from pathlib import Path
@@ -108,7 +108,7 @@ def test_into_a_fence_and_beside_it() -> None:
         assert human.hit == ((PERMANENT_OBSTACLE,) if hit else ())
         assert (human.collision, human.stop_requested) == (hit, hit)
         assert av.is_valid
-    # Beside other hits it is named last.
+    # If there are other hits, it is named last.
     both = monitor.check(8, 0.0, np.array([rear(-5.0, 2.5, 0.0), rear(-5.0, 1.0)]))
     assert both[0].hit == ('av0', PERMANENT_OBSTACLE)
     assert both[1].hit == ('hv0', 'o4')
@@ -141,7 +141,7 @@ def test_switched_off_absent_and_no_map() -> None:
     assert on.check(0, 0.0, np.array([rear(500.0, 0.0)]))[0].is_valid
     assert DrivabilityMonitor([HUMAN], [], None, DrivabilitySpec()
                               ).check(0, 0.0, state)[0].is_valid
-    # No more than the circle around the car is asked for.
+    # The monitor asks for no more than the circle around the car.
     assert set(asked.asked) == {BMW.shape.radius}
 
 
@@ -150,7 +150,7 @@ def test_a_drive_off_the_road_of_a_real_scenario(tmp_path: Path, project_root: P
     A car drifts out of the right lane of the straight motorway of the cut-in game.
 
     Its curb begins at the road's edge; its cells reach at most one cell further in. The car's
-    right side meets it no later than the edge, and no more than a cell earlier.
+    right side hits it at the edge or at most a cell earlier.
     """
     loaded = load_scenario(project_root / 'scenarios' / 'ZAM_CutIn-1_1_T-1.xml')
     path = write_map(Raster(loaded, RasterSpec()), tmp_path / 'map', 'cut-in').path

@@ -114,7 +114,7 @@ def test_random_keys_follow_the_printed_equations() -> None:
 
 
 def test_look_ahead_commits_nothing() -> None:
-    """look_ahead returns advance's result, any number of times, from the committed state."""
+    """Preview returns advance's result, any number of times, from the committed state."""
     keyboard = KeyboardFilter()
     keyboard.advance(KeyState(throttle=True), DT_S)
     ahead = [keyboard.preview(KeyState(throttle=True), DT_S) for _ in range(3)]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Indicators and horn: the lever, its keys in scripts, maps and pages, and the messages."""
+"""Indicators and horn: the lever; its keys in scripts, maps and pages; and the messages."""
 
 import json
 from pathlib import Path
@@ -38,7 +38,7 @@ def lever(*presses: int) -> IndicatorLever:
     ((RIGHT, RIGHT, LEFT), Light.LEFT), ((HAZARDS,), HAZARD), ((HAZARDS, HAZARDS), 0),
     ((LEFT, HAZARDS), HAZARD), ((LEFT, HAZARDS, HAZARDS), Light.LEFT), ((HORN,), 0)])
 def test_a_press_switches(presses: tuple[int, ...], lights: int) -> None:
-    """The other side takes over; hazard lights leave the lever where it was."""
+    """Pressing the other side switches over; hazard lights do not move the lever."""
     assert lever(*presses).lights == lights
 
 
@@ -67,7 +67,7 @@ def test_a_held_button_switches_once() -> None:
     (RIGHT, (-0.3, 0.0), 0), (RIGHT, (0.3, 0.0), Light.RIGHT), (HAZARDS, (0.9, 0.0), HAZARD)])
 def test_an_indicator_is_off_after_its_turn(button: int, way: tuple[float, ...],
                                             after: int) -> None:
-    """Beyond 0.2 its way and back below 0.1; a small or opposite turn leaves it on."""
+    """It ends after steering past 0.2 and back below 0.1; small or opposite turns keep it on."""
     made = lever(button)
     for steering in way:
         made.turn(steering)
@@ -102,7 +102,7 @@ joy:
     (SCRIPT, {0: 1, 99: 1, 100: 7, 199: 7, 200: 1, 299: 1, 300: 0}),
     (AXES, {0: 0, 49: 0, 50: 2, 199: 2, 200: 6, 249: 6, 250: 0})])
 def test_scripts_switch_lights_for_their_intervals(text: str, given: dict[int, int]) -> None:
-    """On while held, to the nanosecond; the text of the timeline says the same again."""
+    """They are on while held, to the nanosecond; the timeline's text round-trips."""
     for source in (text, timeline_text(parse_timeline(text, 't'))):
         driver = ScriptedDriver.from_text(source, 't')
         assert {n: driver.command(n, DT_S).lights for n in given} == given
@@ -114,7 +114,7 @@ def test_an_unknown_key_is_refused_with_the_known_ones() -> None:
 
 
 def test_every_shipped_map_has_indicators_and_horn() -> None:
-    """All four, none of them twice, and none that changes the gear too."""
+    """Each map has all four functions, each once, and on no button that changes the gear."""
     for device_map in load_device_maps():
         layouts = [device_map.keys] if device_map.keys is not None \
             else [device_map.evdev, device_map.joy]
@@ -130,7 +130,7 @@ def test_every_shipped_map_has_indicators_and_horn() -> None:
 
 
 def test_a_joy_node_works_the_lever() -> None:
-    """Button 7 of a G29 is L2; the wheel's way there and back switches it off."""
+    """Button 7 of a G29 is L2; turning the wheel there and back switches the indicator off."""
     driver = JoyDriver(next(m for m in load_device_maps() if m.name == 'logitech_g29'))
     pressed = [int(i == 7) for i in range(20)]
     driver.receive([0.0, -1.0, -1.0, -1.0], pressed, 0.0)
@@ -142,7 +142,7 @@ def test_a_joy_node_works_the_lever() -> None:
 
 
 def test_a_page_works_the_lever() -> None:
-    """It says which buttons are held; hands that are off leave the indicators, not the horn."""
+    """A page sends the held buttons; hands off keeps the indicators and stops the horn."""
     seat = HeldSeat('hv0', 'c1')
 
     def say(**hands: object) -> int:
@@ -158,7 +158,7 @@ def test_a_page_works_the_lever() -> None:
 
 
 def test_a_lost_driver_no_longer_sounds_the_horn() -> None:
-    """The watchdog passes lights on; once the driver is silent the indicators alone stay."""
+    """The watchdog passes lights on; after the driver falls silent only the indicators stay."""
     watchdog = SeatWatchdog()
     last = DriverCommand(0.5, 0.0, 0.1, lights=Light.LEFT | Light.HORN)
     assert watchdog.filter(last, 0.0, DT_S, 10.0).lights == Light.LEFT | Light.HORN
@@ -166,7 +166,7 @@ def test_a_lost_driver_no_longer_sounds_the_horn() -> None:
 
 
 def test_replays_repeat_lights_and_know_recordings_without() -> None:
-    """Four or five columns are recordings of earlier versions."""
+    """Recordings of earlier versions have four or five columns."""
     rows = np.array([[0.5, 0.0, 0.1, 0.0, 6.0], [0.5, 0.0, 0.1, 1.0, 0.0], [np.nan] * 5])
     assert [ReplayDriver(rows).command(n, DT_S).lights for n in range(2)] == [6, 0]
     assert not ReplayDriver(rows).drives(2)
@@ -176,7 +176,7 @@ def test_replays_repeat_lights_and_know_recordings_without() -> None:
 
 
 def test_signals_are_told_in_words() -> None:
-    """As /vehicles/signals has them."""
+    """The words are those of /vehicles/signals."""
     lights = {'hv0': lights_of(True, False, True), 'hv1': HAZARD, 'av0': 0}
     assert json.loads(signals_document(12, lights)) == {'n': 12, 'vehicles': {
         'hv0': {'indicator': 'left', 'horn': True}, 'hv1': {'indicator': 'hazard', 'horn': False},
@@ -184,7 +184,7 @@ def test_signals_are_told_in_words() -> None:
 
 
 def test_keys_of_the_documents_are_the_maps() -> None:
-    """docs/driving.md names the keys that config/devices/keyboard.yaml has."""
+    """docs/driving.md names the keys of config/devices/keyboard.yaml."""
     text = (Path(__file__).parents[2] / 'docs/driving.md').read_text()
     for row in ('| , | left indicator', '| . | right indicator', '| J | hazard lights',
                 '| G | horn', '| Backspace | after a contact'):

@@ -36,7 +36,7 @@ G29_REST = [0.0, -1.0, -1.0, -1.0]
     ('joy:c:d.yaml', SourceSpec('joy', 'c:d.yaml')),
     (' replay: runs/x/bag ', SourceSpec('replay', 'runs/x/bag'))])
 def test_sources_are_read(text: str, spec: SourceSpec) -> None:
-    """Every form, and back to the same text."""
+    """Every form is read and written back as the same text."""
     assert parse_source(text) == spec
     assert parse_source(str(spec)) == spec
     assert spec.has_timeline == (text[:5] in ('keys:', 'joy:c'))
@@ -45,14 +45,14 @@ def test_sources_are_read(text: str, spec: SourceSpec) -> None:
 @pytest.mark.parametrize('text', ['', 'wheel', 'keys', 'keys:', 'replay', 'idle:x', 'auto:', ':x',
                                   'evdev:', 'Keys:x'])
 def test_other_sources_are_refused_with_the_forms(text: str) -> None:
-    """The message lists what there is."""
+    """The message lists the valid forms."""
     with pytest.raises(InputError, match='auto, cockpit, idle, evdev or evdev:NAME, '
                                          'keys:FILE, joy or joy:FILE, replay:BAG'):
         parse_source(text)
 
 
 def test_timelines_are_found_beside_the_game(tmp_path: Path) -> None:
-    """Relative to the base, of the named kind."""
+    """They are found relative to the base and are of the named kind."""
     (tmp_path / 'k.yaml').write_text(KEYS, encoding='utf-8')
     (tmp_path / 'j.yaml').write_text(JOY, encoding='utf-8')
     timeline = load_timeline(parse_source('keys:k.yaml'), tmp_path)
@@ -65,7 +65,7 @@ def test_timelines_are_found_beside_the_game(tmp_path: Path) -> None:
 
 
 def test_idle_is_released() -> None:
-    """Nobody presses anything, ever."""
+    """The idle source never presses a control."""
     assert {IdleDriver().command(n, DT_S) for n in range(10)} == {RELEASED}
 
 
@@ -79,7 +79,7 @@ def test_keys_at_the_start_of_a_cycle_drive_that_cycle() -> None:
 
 
 def test_a_whole_drive_has_the_papers_closed_forms() -> None:
-    """At t = 2.2 s: braking for 0.2 s means 0.5 brake and 1 - 0.44 throttle, keys or not."""
+    """At t = 2.2 s, after 0.2 s of braking, brake is 0.5 and throttle 1 - 0.44."""
     driver = ScriptedDriver.from_text(KEYS, 'k')
     given = [driver.command(n, DT_S) for n in range(400)]
     assert given[119].steering == pytest.approx(2.0 * 0.2)  # end of 0.2 s of left
@@ -91,7 +91,7 @@ def test_a_whole_drive_has_the_papers_closed_forms() -> None:
 
 @pytest.mark.parametrize('text', [KEYS, JOY])
 def test_two_drivers_are_identical_and_a_late_one_catches_up(text: str) -> None:
-    """The same bits on every run, whenever the driver joins and however often it is asked."""
+    """Commands are bit-equal on every run, for late drivers and for repeated requests."""
     whole = [ScriptedDriver.from_text(text, 'k')]
     reference = [whole[0].command(n, DT_S) for n in range(300)]
     again = ScriptedDriver.from_text(text, 'k')
@@ -104,7 +104,7 @@ def test_two_drivers_are_identical_and_a_late_one_catches_up(text: str) -> None:
 
 
 def test_the_step_does_not_change_the_drive() -> None:
-    """Edges on the grid of both steps: after each 10 ms, 1 ms cycles give the same command."""
+    """With edges on both grids, cycles of 1 ms give the 10 ms command after each 10 ms."""
     coarse, fine = ScriptedDriver.from_text(KEYS, 'k'), ScriptedDriver.from_text(KEYS, 'k')
     for n in range(350):
         fine_command = [fine.command(10 * n + i, DT_S / 10) for i in range(10)][-1]
@@ -120,7 +120,7 @@ def test_reset_begins_again() -> None:
 
 
 def test_scripted_axes_are_sampled_at_the_start_of_the_cycle() -> None:
-    """A tenth of the way per second, and the gear in its interval."""
+    """Axes move by a tenth per second, and the gear holds in its interval."""
     driver = ScriptedDriver.from_text(JOY, 'j')
     assert driver.command(250, DT_S) == (0.25, 0.0, 0.25, False, 0, False)
     assert driver.joy() == ((0.25, 0.0, 0.25), (0, 0, 0, 0, 0))
@@ -129,21 +129,21 @@ def test_scripted_axes_are_sampled_at_the_start_of_the_cycle() -> None:
 
 
 def test_scripted_keys_are_shown_as_buttons() -> None:
-    """The raw device of /<hv>/joy: throttle, brake, left, right, reverse, then lights."""
+    """/<hv>/joy has the buttons throttle, brake, left, right, reverse, then lights."""
     driver = ScriptedDriver.from_text(KEYS, 'k')
     driver.command(100, DT_S)
     assert driver.joy() == ((), (1, 0, 1, 0, 0, 0, 0, 0, 0))
 
 
 def test_joy_messages_are_normalised_by_the_device_map() -> None:
-    """Logitech through a joy node: left is 1, pedals go from -1 to 1."""
+    """For a Logitech wheel through a joy node left is 1, and pedals go from -1 to 1."""
     driver = JoyDriver(load_device_map('logitech_g29'))
     driver.receive([0.5, -1.0, 0.0001, -0.5], [0] * 20, now_s=0.0)
     assert driver.command(0, DT_S) == pytest.approx((0.50005, 0.25, 0.5, False, 0, False))
 
 
 def test_pedals_that_have_not_moved_are_released() -> None:
-    """A joy node shows 0 for them, which would be half throttle and half brake."""
+    """A joy node sends 0 for them, which would be half throttle and half brake."""
     driver = JoyDriver(load_device_map('logitech_g29'))
     driver.receive([0.0] * 4, [], now_s=0.0)
     assert driver.command(0, DT_S) == RELEASED
@@ -153,7 +153,7 @@ def test_pedals_that_have_not_moved_are_released() -> None:
 
 
 def test_paddles_choose_the_gear() -> None:
-    """Left paddle (5) reverse, right paddle (4) forward, the shifter's gate (18) while held."""
+    """Left paddle (5) is reverse, right (4) forward; the shifter's gate (18) holds while held."""
     driver = JoyDriver(load_device_map('logitech_g29'))
     gears = []
     for pressed in ({5}, set(), {4}, set(), {18}, set()):
@@ -163,7 +163,7 @@ def test_paddles_choose_the_gear() -> None:
 
 
 def test_a_silent_joy_node_counts_as_gone() -> None:
-    """Connected from the first message until 0.5 s after the last."""
+    """A joy node is connected from its first message until 0.5 s after the last."""
     driver = JoyDriver(load_device_map('logitech_g29'))
     assert not driver.connected
     driver.receive(G29_REST, [], now_s=10.0)
@@ -174,7 +174,7 @@ def test_a_silent_joy_node_counts_as_gone() -> None:
 
 
 def test_a_message_of_another_device_is_named() -> None:
-    """Two axes are no wheel with pedals on 2 and 3; the seat gets no command from it."""
+    """A device of two axes has no pedals on 2 and 3; the seat gets no command from it."""
     driver = JoyDriver(load_device_map('logitech_g29'))
     driver.receive([0.0, 0.0], [], now_s=0.0)
     assert not driver.connected
@@ -184,6 +184,6 @@ def test_a_message_of_another_device_is_named() -> None:
 
 
 def test_a_keyboard_has_no_joy_node() -> None:
-    """Its map is refused."""
+    """A keyboard's map is refused for a joy node."""
     with pytest.raises(InputError, match='keyboard: is a keyboard'):
         JoyDriver(load_device_map('keyboard'))

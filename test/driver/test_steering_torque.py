@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The torque at the steering wheel: its formula, written down a second time, and its bounds."""
+"""The torque at the steering wheel: its formula, implemented a second time, and its bounds."""
 
 import math
 from pathlib import Path
@@ -47,7 +47,7 @@ def brush(steady: float, ahead: float, load: float, friction: float,
 
 
 def front_angle(speed: float, wheel_angle: float) -> float:
-    """Look the front wheels' angle up in the table of the BMW 320i [rad]."""
+    """Return the front wheels' angle from the table of the BMW 320i [rad]."""
     table = yaml.safe_load((ROOT / 'config/vehicles/steering_ratio.yaml').read_text())
     axes = table['speed'], table['steering_wheel_angle']
     place = [min(value, axis[-1]) for value, axis in zip(
@@ -57,7 +57,7 @@ def front_angle(speed: float, wheel_angle: float) -> float:
 
 
 def expected_torque(motion: WheelMotion) -> float:
-    """Write the whole torque down a second time, for the BMW 320i of config/vehicles."""
+    """Compute the whole torque independently, for the BMW 320i of config/vehicles."""
     load = 1093.2952334674046 * 9.81 * 1.4227170936 / 2.5789128
     force = 1093.2952334674046 * motion.speed * motion.yaw_rate * 1.4227170936 / 2.5789128
     force = max(-1.0489 * load, min(1.0489 * load, force))
@@ -82,12 +82,12 @@ def expected_torque(motion: WheelMotion) -> float:
 
 
 def states() -> list[WheelMotion]:
-    """Draw 20 states, from standstill to sliding, backwards too."""
+    """Draw 20 states, from standstill to sliding, also in reverse."""
     draw = random.Random(3)
     return [WheelMotion(
         speed := draw.choice((0.0, -4.0, draw.uniform(0.0, 40.0))),
         rate := draw.uniform(-12.0, 12.0) / max(abs(speed), 4.0),
-        # Near the turn's own, or wherever hands have pulled it.
+        # Near the angle of the turn, or at any angle to which hands have pulled it.
         draw.choice((60.0 * rate / max(speed, 4.0), draw.uniform(-7.85, 7.85))),
         draw.uniform(-6.0, 6.0), draw.uniform(0.0, 30.0), draw.random() < 0.3,
         draw.choice((math.inf, draw.uniform(0.0, 2.0)))) for _ in range(20)]
@@ -95,12 +95,12 @@ def states() -> list[WheelMotion]:
 
 @pytest.mark.parametrize('motion', states(), ids=range(20))
 def test_the_torque_is_the_formulas(motion: WheelMotion) -> None:
-    """The aligning part from a tyre cut into 20,000 bristles, the rest written anew."""
+    """It agrees with an aligning part of 20,000 tyre bristles and an independent rest."""
     assert MODEL.torque(motion) == pytest.approx(expected_torque(motion), abs=2e-3)
 
 
 def test_the_wheel_grows_light_before_the_tyres_slide() -> None:
-    """The tyre's part is largest at 58 % of the grip; from there on it falls, never its sign."""
+    """The tyre's part peaks at 58 % of the grip, then falls without changing its sign."""
     sideways = np.linspace(0.0, CAR.friction * CAR.gravity, 1001)
     caster = 0.2 / 16.0 * 0.02 * CAR.mass * CAR.rear_to_center / CAR.wheelbase
     steady = SteeringTorque(CAR, TorqueParameters(slip_stiffness=0.0))
@@ -113,7 +113,7 @@ def test_the_wheel_grows_light_before_the_tyres_slide() -> None:
 
 @pytest.mark.parametrize('speed', [0.01, 1.0, 8.0, 20.0, 40.0])
 def test_a_wheel_ahead_of_the_vehicle_is_held_back(speed: float) -> None:
-    """Straight on, by the more the farther it is turned, up to the grip; at rest by nothing."""
+    """Driving straight, the torque grows with the angle up to the grip; at rest it is 0."""
     angles = np.linspace(-7.85, 7.85, 2001)
     torques = np.array([MODEL.aligning(speed, 0.0, angle) for angle in angles])
     assert (torques * angles <= 0.0).all() and torques == pytest.approx(-torques[::-1])
@@ -125,7 +125,7 @@ def test_a_wheel_ahead_of_the_vehicle_is_held_back(speed: float) -> None:
 
 @pytest.mark.exhaustive
 def test_a_wheel_let_go_comes_to_rest_in_the_middle() -> None:
-    """With the vehicle 30 ms behind the wheel: what pulls it back does not make it swing."""
+    """With the vehicle 30 ms behind the wheel, the return torque causes no oscillation."""
     dt_s, inertia, angle, rate = 0.001, 0.03, 2.0, 0.0
     past, swing = [0.0] * 30, []
     for _ in range(2000):

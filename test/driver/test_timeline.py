@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Timelines: what they hold when, and which files are refused."""
+"""Timelines: their contents over time, and the files that are refused."""
 
 import json
 from pathlib import Path
@@ -58,7 +58,7 @@ def test_keys_are_held_from_start_until_just_before_the_end(t_s: float, held: se
 
 @pytest.mark.parametrize('rate', [10, 30, 100, 125, 1000])
 def test_edges_are_met_at_every_rate(rate: int) -> None:
-    """For n * dt on an edge, however it rounds, the new keys hold: 0.1, 0.7, 1.1, 5.7 s."""
+    """With n * dt on an edge (0.1, 0.7, 1.1, 5.7 s) the new keys hold, for any rounding."""
     lines = [f'  - {{from: {i / 10}, to: {(i + 1) / 10}, hold: [left]}}'
              for i in range(1, 100, 2)]
     timeline = parse_timeline('\n'.join(['keys:', *lines]), 'edges')
@@ -69,7 +69,7 @@ def test_edges_are_met_at_every_rate(rate: int) -> None:
 
 
 def test_axes_are_linear_between_points_and_constant_outside() -> None:
-    """Half-way between the points every axis is half-way."""
+    """Half-way between two points every axis has the mean value."""
     at = [normalize(joy().raw_at(t), SCRIPTED_LAYOUT)[:3] for t in (0.0, 1.0, 2.0, 3.0, 3.25, 99)]
     assert at[0] == at[1] == (0.4, 0.0, -0.2)
     assert at[2] == pytest.approx((0.6, 0.0, 0.0))
@@ -79,19 +79,19 @@ def test_axes_are_linear_between_points_and_constant_outside() -> None:
 
 
 def test_axes_may_be_few() -> None:
-    """Axes that are not listed rest, in whatever order the others stand."""
+    """Unlisted axes rest, and the listed ones may be in any order."""
     timeline = joy('joy: {axes: [steering, throttle], points: [[0, -0.5, 1], [2, 0.5, 0]]}')
     assert normalize(timeline.raw_at(0.5), SCRIPTED_LAYOUT)[:3] == (0.75, 0.0, -0.25)
 
 
 def test_reverse_lasts_for_its_intervals() -> None:
-    """The gear is asked for in [2, 2.5)."""
+    """Reverse is requested in [2, 2.5)."""
     assert [joy().held.keys_at(t).reverse for t in (1.99, 2.0, 2.49, 2.5)] == [
         False, True, True, False]
 
 
 def test_ends() -> None:
-    """A run can be made as long as its script."""
+    """A timeline has an end, so a run can be as long as its script."""
     assert (keys().end_s, joy().end_s) == (8.0, 3.5)
 
 
@@ -99,7 +99,7 @@ def test_ends() -> None:
     KEYS, JOY, 'keys: []', 'joy: {points: [[0.000001, 1.0e-7, 0.1, 0.2]]}',
     'keys: [{from: 0.123456789, to: 1.0e-6, hold: left}]'.replace('1.0e-6', '12345.678901234')])
 def test_text_round_trip(text: str) -> None:
-    """The text that the resolved game carries, in JSON too, gives an equal timeline."""
+    """The text in the resolved game, also as JSON, gives an equal timeline."""
     timeline = parse_timeline(text, 'here')
     carried = json.loads(json.dumps(timeline_text(timeline)))
     assert parse_timeline(carried, 'there') == timeline
@@ -159,7 +159,7 @@ def test_json_is_read() -> None:
     ('joy: {points: [[0, 0, 0, 0]], reverse: [{from: 1}]}', 'reverse.0.: "to" is missing'),
 ])
 def test_wrong_timelines_name_file_and_line(text: str, message: str) -> None:
-    """One message each, with the file and the entry."""
+    """Each gives one message with the file and the entry."""
     with pytest.raises(InputError, match=message) as caught:
         parse_timeline(text, 'drive.yaml')
     assert str(caught.value).startswith('drive.yaml')
@@ -167,7 +167,7 @@ def test_wrong_timelines_name_file_and_line(text: str, message: str) -> None:
 
 
 def test_a_yaml_bomb_is_refused_before_it_expands() -> None:
-    """Merge keys that double at each of 60 levels would need 2^60 entries."""
+    """Merge keys that double at each of 60 levels would expand to 2^60 entries."""
     lines = ['a0: &a0 {k: 1}']
     lines += [f'a{i}: &a{i} {{<<: [*a{i - 1}, *a{i - 1}]}}' for i in range(1, 61)]
     with pytest.raises(InputError, match='alias'):
@@ -178,7 +178,7 @@ def test_a_yaml_bomb_is_refused_before_it_expands() -> None:
     (None, 'No such file'), (b'\xff\xfe\x00\x01', 'no text in UTF-8'),
     (b' ' * (3 * MAX_BYTES), 'is larger than')])
 def test_wrong_files_are_refused(tmp_path: Path, content: bytes | None, message: str) -> None:
-    """Missing, binary and huge files; no more than the limit is read."""
+    """Missing, binary and huge files are refused; reading stops at the limit."""
     path = tmp_path / 'drive.yaml'
     if content is not None:
         path.write_bytes(content)
@@ -193,14 +193,14 @@ def test_a_directory_is_no_timeline(tmp_path: Path) -> None:
 
 
 def test_a_file_is_read(tmp_path: Path) -> None:
-    """A file gives what its text gives."""
+    """A file gives the same timeline as its text."""
     path = tmp_path / 'drive.yaml'
     path.write_text(KEYS, encoding='utf-8')
     assert read_timeline(path) == keys()
 
 
 def test_the_documented_examples_are_read() -> None:
-    """The page docs/driving.md shows one timeline of keys and one of axes."""
+    """docs/driving.md shows one timeline of keys and one of axes; both are valid."""
     text = (Path(__file__).parents[2] / 'docs' / 'driving.md').read_text(encoding='utf-8')
     blocks = [block.split('```')[0] for block in text.split('```yaml')[1:]]
     read = [parse_timeline(b, 'driving.md') for b in blocks if b.startswith(('\nkeys:', '\njoy:'))]

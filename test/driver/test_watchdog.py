@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The seat watchdog: unchanged while heard, gentle while not, smooth on return."""
+"""The seat watchdog: unchanged commands while heard, a gentle stop else, a smooth return."""
 
 import math
 
@@ -15,7 +15,7 @@ DRIVING = DriverCommand(0.8, 0.0, 0.5)
 
 def silence(watchdog: SeatWatchdog, last: DriverCommand, seconds: float, speed: float = 15.0,
             ) -> list[DriverCommand]:
-    """Let a driver fall silent and collect the commands from the timeout on."""
+    """Make a driver fall silent and collect the commands from the timeout on."""
     return [watchdog.filter(last, 0.2 + (step + 1) * DT_S, DT_S, speed)
             for step in range(round(seconds / DT_S))]
 
@@ -29,7 +29,7 @@ def heard(command: DriverCommand) -> SeatWatchdog:
 
 @pytest.mark.parametrize('age_s', [0.0, 0.1, 0.2])
 def test_heard_commands_pass_unchanged(age_s: float) -> None:
-    """Up to 200 ms every bit passes, however the command jumps."""
+    """Commands up to 200 ms old pass bit by bit, even if they jump."""
     watchdog = SeatWatchdog()
     for command in (DRIVING, DriverCommand(0.0, 1.0, -1.0, True), RELEASED,
                     DriverCommand(0.1, 0.2, 0.30000000000000004)):
@@ -46,7 +46,7 @@ def test_silence_releases_at_the_papers_rates() -> None:
 
 
 def test_the_gentle_brake_follows_the_release_and_ends_at_standstill() -> None:
-    """Throttle 0.8 takes 37 steps to 0; then 2.5 1/s up to 0.15 in 6 more; then it stays."""
+    """Throttle 0.8 takes 37 steps to 0; then the brake rises at 2.5 1/s to 0.15 in 6 and stays."""
     watchdog = heard(DRIVING)
     brakes = [command.brake for command in silence(watchdog, DRIVING, 2.0)]
     assert brakes[:37] == [0.0] * 37
@@ -58,7 +58,7 @@ def test_the_gentle_brake_follows_the_release_and_ends_at_standstill() -> None:
 
 
 def test_a_held_brake_falls_to_the_gentle_one_and_no_further() -> None:
-    """Who was braking when the cable came out must not roll on free in between."""
+    """A driver's brake at the moment of the loss must not be released in between."""
     last = DriverCommand(0.0, 1.0, -0.3, True)
     brakes = [command.brake for command in silence(heard(last), last, 1.0)]
     assert brakes[0] == pytest.approx(1.0 - 2.2 * DT_S)
@@ -67,13 +67,13 @@ def test_a_held_brake_falls_to_the_gentle_one_and_no_further() -> None:
 
 
 def test_the_gear_stays() -> None:
-    """A lost driver changes no gear."""
+    """The gear stays when the driver is lost."""
     last = DriverCommand(0.3, 0.0, 0.0, True)
     assert all(command.reverse for command in silence(heard(last), last, 1.0))
 
 
 def test_a_backward_roll_is_braked_too() -> None:
-    """Speed counts by size: at -2 m/s the brake stays on."""
+    """The absolute speed counts: at -2 m/s the brake stays on."""
     assert silence(heard(RELEASED), RELEASED, 1.0, speed=-2.0)[-1].brake == 0.15
 
 
@@ -88,7 +88,7 @@ def test_losses_are_counted_once_each() -> None:
 
 
 def test_return_is_without_a_jump() -> None:
-    """From the gentle brake to full throttle and left in steps of at most rate * dt."""
+    """Commands go from the gentle brake to full throttle and left by at most rate * dt a step."""
     watchdog = heard(DRIVING)
     before = silence(watchdog, DRIVING, 1.0)[-1]
     assert before == (0.0, 0.15, 0.0, False, 0, False)
@@ -103,7 +103,7 @@ def test_return_is_without_a_jump() -> None:
 
 
 def test_a_second_silence_during_the_return_goes_on_from_there() -> None:
-    """Nothing jumps when a driver comes and goes."""
+    """The command does not jump when a driver comes and goes."""
     watchdog = heard(DRIVING)
     silence(watchdog, DRIVING, 1.0)
     up = [watchdog.filter(DRIVING, 0.0, DT_S, 5.0) for _ in range(10)][-1]
@@ -132,6 +132,6 @@ def test_a_reset_begins_released() -> None:
     {'timeout_s': 0.0}, {'gentle_brake': 1.5}, {'gentle_brake': -0.1}, {'brake_rate': math.nan},
     {'pedal_release_rate': math.inf}, {'standstill_speed': 0.0}])
 def test_wrong_parameters_are_refused(wrong: dict[str, float]) -> None:
-    """Each is named."""
+    """The message names each wrong parameter."""
     with pytest.raises(InputError, match=next(iter(wrong))):
         WatchdogParameters(**wrong)

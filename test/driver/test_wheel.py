@@ -37,7 +37,7 @@ def test_ends_are_exact() -> None:
 
 @pytest.mark.parametrize('value', range(0, 256, 5))
 def test_pedals_are_linear(value: int) -> None:
-    """CRG 17, p = l / l_max, with l = 255 - raw, for the pedals rest at 255."""
+    """CRG 17: p = l / l_max, with l = 255 - raw, as the pedals rest at 255."""
     command = normalize(raw(throttle=value, brake=255 - value), WHEEL)
     assert command.throttle == pytest.approx((255 - value) / 255)
     assert command.brake == pytest.approx(value / 255)
@@ -52,13 +52,13 @@ def test_steering_is_linear_in_the_wheel_angle(degrees: float) -> None:
 
 
 def test_values_beyond_the_range_are_clipped() -> None:
-    """A calibration narrower than the device clips; so does a value that no range holds."""
+    """Values are clipped beyond a calibration narrower than the device and beyond any range."""
     assert normalize(raw(-500, -3, 300), WHEEL) == (1.0, 0.0, 1.0, False, 0, False)
     assert normalize(raw(70000), WHEEL).steering == -1.0
 
 
 def test_values_that_are_no_numbers_count_as_rest() -> None:
-    """Neither NaN nor infinity must not press a pedal."""
+    """NaN and infinity must not press a pedal."""
     assert normalize(raw(math.nan, math.inf, -math.inf), WHEEL) == (0.0, 0.0, 0.0, False, 0, False)
 
 
@@ -77,14 +77,14 @@ def test_deadzone_is_silent_inside_and_continuous_outside() -> None:
 
 
 def test_combined_pedals_share_an_axis() -> None:
-    """Throttle on the positive side, brake on the negative one, never both."""
+    """The positive side is throttle, the negative side brake, never both."""
     layout = ControlLayout(STEERING, pedals=AxisRange(1, -100.0, 100.0, 0.0))
     assert [normalize(RawInput({1: v}), layout)[:2] for v in (-100, -25, 0, 50, 100)] == [
         (0.0, 1.0), (0.0, 0.25), (0.0, 0.0), (0.5, 0.0), (1.0, 0.0)]
 
 
 def test_silent_axes_are_at_rest() -> None:
-    """Drivers show 0 before an axis first moves; on these pedals 0 would be full throttle."""
+    """Drivers report 0 until an axis moves; on these pedals 0 would be full throttle."""
     fresh = reported({0: 40000, 2: 0, 5: 0}, WHEEL)
     assert normalize(RawInput(fresh), WHEEL)[:2] == (0.0, 0.0)
     later = reported({0: 40000, 2: 0, 5: 0}, WHEEL, known={2: 130.0})
@@ -92,7 +92,7 @@ def test_silent_axes_are_at_rest() -> None:
 
 
 def test_gear_buttons() -> None:
-    """Paddles select, a toggle flips at presses only, a shifter's gate lasts while it is held."""
+    """Paddles select, a toggle flips at presses only, a shifter's gate holds while held."""
     gear = GearButtons(on=frozenset({1}), off=frozenset({2}), toggle=frozenset({3}),
                        held=frozenset({4}))
     reverse, seen = False, []
@@ -104,7 +104,7 @@ def test_gear_buttons() -> None:
 
 
 def test_joy_is_ordered_and_signed_like_the_joy_node() -> None:
-    """Axes by code without hats, left and up positive; joystick buttons before the others."""
+    """Axes are by code without hats, left and up positive; joystick buttons come first."""
     state = joy_state({0: 0, 2: 255}, {292, 30}, {5: (0, 255), 2: (0, 255), 0: (0, 65535),
                                                   16: (-1, 1)}, [30, 288, 292])
     assert state.axes == (1.0, -1.0, 0.0)
@@ -119,13 +119,13 @@ def test_joy_is_ordered_and_signed_like_the_joy_node() -> None:
 ])
 def test_a_map_that_does_not_fit_the_device_is_refused(
         binding: AxisBinding, reported_range: tuple[float, float] | None, message: str) -> None:
-    """A pedal of 0..1023 read as 0..255 would be wrong everywhere: say so instead."""
+    """A pedal of 0..1023 read as 0..255 would be wrong everywhere, so it is refused."""
     with pytest.raises(InputError, match=message):
         binding.range(reported_range)
 
 
 def test_a_binding_takes_the_devices_range() -> None:
-    """Where the map gives no limits, those of the device hold, and the rest follows from them."""
+    """Without limits in the map the device's limits hold, and the rest position follows."""
     pedal = AxisBinding(2, None, None, None, True, False, 0.0).range((0.0, 1023.0))
     stick = AxisBinding(0, None, None, None, True, True, 0.0).range((-32768.0, 32767.0))
     assert (pedal.minimum, pedal.maximum, pedal.rest) == (0.0, 1023.0, 1023.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which cells there are, and what their keys depend on."""
+"""The cells of a plan, and the inputs of their keys."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ GAME = scenarios_directory() / 'cut_in.yaml'
 
 @pytest.fixture
 def plan(tmp_path: Path) -> dict[str, Any]:
-    """Return a plan with a planner of somebody's own."""
+    """Return a plan with a user's own planner."""
     (tmp_path / 'mine.py').write_text(PLANNER)
     return {'games': [str(GAME)], 'planners': ['idm', 'mine.py:Mine'], 'seeds': 2}
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A process for cells: what one does takes no other along."""
+"""A process for cells: no cell affects another one."""
 
 from collections.abc import Iterator
 import re

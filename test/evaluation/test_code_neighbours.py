@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a planner's file names beside it travels with it."""
+"""Files beside a planner's file that it names are copied with it."""
 
 from pathlib import Path
 

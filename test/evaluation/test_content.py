@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files by what they hold."""
+"""Files identified by their content."""
 
 from pathlib import Path
 
@@ -43,7 +43,7 @@ def test_another_content_under_its_name_is_refused(tmp_path: Path) -> None:
     here, there = ContentStore(tmp_path / 'here'), ContentStore(tmp_path / 'there')
     here.put(MAP)
     packed = here.packed(MAP.digest) | {'more': here.packed(MAP.digest)['map.yaml']}
-    with pytest.raises(InputError, match='is not what its name says'):
+    with pytest.raises(InputError, match='does not match its digest'):
         there.unpack(MAP.digest, packed)
     with pytest.raises(InputError, match='cannot be read'):
         here.packed('0' * 32)

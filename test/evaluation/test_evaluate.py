@@ -23,7 +23,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 GAME = scenarios_directory() / 'cut_in.yaml'
 CELLS = 14
-# Says which cell it begins, and takes its time: what is killed in between is in the middle.
+# It prints the cell that it begins, and is slow: a kill comes in the middle of a cell.
 PLANNER = """
 import os
 import time
@@ -68,7 +68,7 @@ class Evaluation:
             stderr=subprocess.PIPE, text=True, start_new_session=True)
 
     def run(self, *arguments: str) -> str:
-        """Run the command to its end; give what it told."""
+        """Run the command to its end; return its output."""
         process = self.start(*arguments)
         _, told = process.communicate(timeout=240)
         assert process.returncode == 0, told
@@ -102,13 +102,13 @@ class Evaluation:
 
 
 def environment(begun: Path) -> dict[str, str]:
-    """Let processes find the package from anywhere."""
+    """Make the package importable for processes in any folder."""
     return os.environ | {'CELLS_BEGUN': str(begun), 'PYTHONPATH': str(ROOT)}
 
 
 @pytest.fixture(scope='module')
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Evaluation:
-    """Return the evaluation that two workers compute when nobody disturbs them."""
+    """Return the evaluation that two undisturbed workers compute."""
     evaluation = Evaluation(tmp_path_factory.mktemp('expected'))
     told = evaluation.run('--workers', '2')
     assert f'{CELLS} of {CELLS} cells' in told
@@ -148,17 +148,17 @@ def test_a_killed_client_takes_its_workers_along_and_goes_on(
     told = evaluation.run('--workers', '1')
     assert f'{finished} of them finished before' in told
     assert evaluation.tables() == expected
-    # Only the one that it was killed in was begun again.
+    # Only the cell in which it was killed was begun again.
     assert CELLS <= evaluation.begun.total() <= CELLS + 1
 
 
 @pytest.mark.exhaustive
-def test_ctrl_c_ends_everybody_in_a_line(tmp_path: Path) -> None:
+def test_ctrl_c_ends_all_in_a_line(tmp_path: Path) -> None:
     evaluation = Evaluation(tmp_path)
     process = evaluation.start('--workers', '1')
     evaluation.wait_for(2, process)
     others = psutil.Process(process.pid).children(recursive=True)
-    # As a terminal does: to everybody in the foreground.
+    # As from a terminal: to all processes in the foreground.
     os.killpg(process.pid, signal.SIGINT)
     _, told = process.communicate(timeout=60)
     _, alive = psutil.wait_procs(others, timeout=60)
@@ -206,7 +206,7 @@ def cluster(folder: Path, begun: Path) -> Iterator[tuple[str, 'subprocess.Popen[
 
 
 @pytest.mark.exhaustive
-def test_a_cluster_of_somebody_else_computes_the_same(
+def test_a_foreign_cluster_computes_the_same(
         tmp_path: Path, expected: list[list[dict[str, Any]]]) -> None:
     evaluation = Evaluation(tmp_path)
     with cluster(tmp_path / 'first', evaluation.begun_file) as (address, scheduler):

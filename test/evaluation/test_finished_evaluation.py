@@ -13,7 +13,7 @@ PLAN = {'games': [str(GAME)], 'planners': ['constant-velocity'], 'seeds': 2, 'du
 
 @pytest.mark.slow
 def test_cells_are_runs_and_have_scores(tmp_path: Path) -> None:
-    """States are those of `crgame_ros.run`; what is finished is not computed again."""
+    """States are those of `crgame_ros.run`; finished cells are not computed again."""
     found = crgame_ros.evaluate(PLAN, tmp_path / 'out', computing=crgame_ros.Computing())
     assert (found.tally.done, found.tally.failed) == (2, 0)
     cells = {row['seed']: row for row in found.table('cells').to_pylist()}
@@ -37,7 +37,7 @@ def test_cells_are_runs_and_have_scores(tmp_path: Path) -> None:
     ({'planners': ['idm']}, 'names no games'), (3, 'plan: is 3'),
     ('missing.yaml', 'missing.yaml')])
 def test_what_is_no_plan_is_an_input_error(plan: object, said: str, tmp_path: Path) -> None:
-    """Before anything is computed."""
+    """The error comes before anything is computed."""
     with pytest.raises(crgame_ros.InputError, match=said):
         crgame_ros.evaluate(plan, tmp_path / 'out')  # type: ignore[arg-type]
     assert not (tmp_path / 'out').exists()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of an evaluation survive whatever ends the process that writes them."""
+"""The tables of an evaluation survive every end of the process that writes them."""
 
 from pathlib import Path
 import subprocess
@@ -113,7 +113,7 @@ def test_a_summary_knows_of_cells_that_are_only_in_the_journal(tmp_path: Path) -
             ('vehicles', 'distance', pa.float64(), [n + 0.1 for n in range(10) for _ in (0, 1)])):
         assert [value for batch in parts.batches(table, {column: kind})
                 for value in batch.rows[column].to_pylist()] == wanted
-    # A journal whose part is written, and a line that is cut off, count once and not.
+    # A journal whose part is written counts once; a line that is cut off does not count.
     kept = next(tmp_path.glob('journal*'))
     (tmp_path / 'journal-000000.jsonl').write_text(kept.read_text())
     kept.write_text(kept.read_text()[:-9])

@@ -70,7 +70,7 @@ def event(text: str, folder: Path = Path()) -> EventSpec:
 
 
 def test_every_key(tmp_path: Path) -> None:
-    """Each value arrives where it belongs; a planner's file is relative to the game file."""
+    """Each value is read into its field; a planner's file is relative to the game file."""
     path = tmp_path / 'game.yaml'
     path.write_text(EVENTS)
     assert load_game(path).events == (
@@ -90,7 +90,7 @@ def test_every_key(tmp_path: Path) -> None:
 
 
 def test_dumped_game_has_the_same_events(tmp_path: Path) -> None:
-    """What `game.yaml` of a run's folder gives from anywhere."""
+    """`game.yaml` of a run's folder gives the same events from any folder."""
     path, again = tmp_path / 'game.yaml', tmp_path / 'elsewhere' / 'game.yaml'
     path.write_text(EVENTS)
     again.parent.mkdir()
@@ -165,14 +165,14 @@ def test_document_has_the_same_events(tmp_path: Path) -> None:
     ('{name: a, release: {object: 1}, when: {between: [hv0], distance: 1}}', 'name two ids'),
 ], ids=range(39))
 def test_refusals_name_the_entry(text: str, message: str) -> None:
-    """Each says what is wrong with which entry, and what would be right."""
+    """Each refusal names the entry, the mistake and the valid values."""
     with pytest.raises(InputError, match=message) as caught:
         event(text)
     assert str(caught.value).startswith('game.yaml: events[0]')
 
 
 def test_names_are_unique_and_lists_short() -> None:
-    """A trigger names one event; a list that never ends is refused before it is read."""
+    """A trigger names one event; an oversized list is refused before it is read."""
     entry = {'name': 'a', 'release': {'object': 1}}
     with pytest.raises(InputError, match=r'events\[1\]: "a" is there already'):
         read(EventList, [entry, entry], 'events')
@@ -185,6 +185,6 @@ def test_names_are_unique_and_lists_short() -> None:
 @pytest.mark.parametrize('entries', [7, [7], [{'name': 'a'}], [{'name': 'a', 'kind': 'x'}]],
                          ids=range(4))
 def test_spoilt_document_is_refused(entries: object) -> None:
-    """Whatever another process writes into `/scenario/game`."""
+    """Malformed content of `/scenario/game` from another process is refused."""
     with pytest.raises(InputError, match='/scenario/game'):
         parse_document_entries(entries, '/scenario/game')

@@ -72,7 +72,7 @@ def write(folder: Path, text: str, name: str = 'game.yaml') -> Path:
 
 
 def test_every_key(tmp_path: Path) -> None:
-    """Each value arrives where it belongs; file names are relative to the game file."""
+    """Each value is read into its field; file names are relative to the game file."""
     game = load_game(write(tmp_path, FULL))
     assert game == Game(
         tmp_path / 'map' / 'road.xml', 'Everything at once',
@@ -90,7 +90,7 @@ def test_every_key(tmp_path: Path) -> None:
 
 
 def test_defaults(tmp_path: Path) -> None:
-    """Only the scenario is needed: one human, an AV of each planning problem, 100 Hz, no end."""
+    """A scenario is enough: one human, an AV of each planning problem, 100 Hz, no end."""
     game = load_game(write(tmp_path, 'scenario: road.xml\n'))
     assert game.humans == (HumanSpec('hv0', 'auto', 'bmw_320i', None),)
     assert game.avs is None
@@ -102,7 +102,7 @@ def test_defaults(tmp_path: Path) -> None:
 
 
 def test_rate_inside_timing(tmp_path: Path) -> None:
-    """Both places work; the outer one leaves the other values of timing alone."""
+    """Both places work; the outer one does not change the other values of timing."""
     inner = load_game(write(tmp_path, 'scenario: a.xml\ntiming: {rate: 50}\n'))
     both = load_game(write(
         tmp_path, 'scenario: a.xml\nrate: 80\ntiming: {rate: 50, clip: drop}\n'))
@@ -173,7 +173,7 @@ MALFORMED = {
 
 @pytest.mark.parametrize('case', MALFORMED)
 def test_malformed_game_is_refused(tmp_path: Path, case: str) -> None:
-    """One line with the file, the key and what would be right; exit code 2."""
+    """The command prints one line with file, key and valid values, and exits with code 2."""
     text, named, remedy = MALFORMED[case]
     path = write(tmp_path, text)
     with pytest.raises(InputError) as caught:
@@ -187,7 +187,7 @@ def test_malformed_game_is_refused(tmp_path: Path, case: str) -> None:
 
 
 def test_alias_bomb_is_refused_shortly(tmp_path: Path) -> None:
-    """Ten levels of ten aliases are 10^10 words; the message doesn't spell them out."""
+    """Ten levels of ten aliases are 10^10 words; the message doesn't expand them."""
     levels = ['a0: &a0 [lol]'] + [
         f'a{i}: &a{i} [{", ".join([f"*a{i - 1}"] * 10)}]' for i in range(1, 11)]
     bomb = write(tmp_path, 'scenario: a.xml\ntitle:\n' + '\n'.join(f'  {line}' for line in levels))
@@ -197,7 +197,7 @@ def test_alias_bomb_is_refused_shortly(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_refused(tmp_path: Path) -> None:
-    """A directory, nothing at all, too large, no text."""
+    """A directory, an empty file, one that is too large and one without text are refused."""
     with pytest.raises(InputError, match='is a directory, not a game file; name a file'):
         load_game(tmp_path)
     with pytest.raises(InputError, match=r'none\.yaml: cannot read the game file .No such file'):
@@ -211,7 +211,7 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
 
 def test_dump_gives_the_same_game_from_another_directory(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Written to another folder and read there, every file is still the one beside the game."""
+    """Read from another folder, a dumped game still names the files beside the original."""
     home, elsewhere = tmp_path / 'home', tmp_path / 'elsewhere'
     for folder in (home, elsewhere):
         folder.mkdir()
@@ -232,12 +232,12 @@ def test_dump_gives_the_same_game_from_another_directory(
     assert replace(again.avs[0], planner='') == replace(original.avs[0], planner='')
     for field in ('title', 'duration', 'seed', 'prediction', 'drivability', 'timing'):
         assert getattr(again, field) == getattr(original, field)
-    # What was absolute once stays as it is.
+    # An absolute path stays unchanged.
     assert dump_game(again) == text
 
 
 def test_dump_of_a_minimal_game(tmp_path: Path) -> None:
-    """Infinity and nobody's list of AVs are left out, so that they are the defaults again."""
+    """Infinity and an unset list of AVs are left out, so that reading restores the defaults."""
     game = Game(tmp_path / 'a.xml')
     values = yaml.safe_load(dump_game(game))
     assert 'duration' not in values
@@ -250,7 +250,7 @@ def test_dump_of_a_minimal_game(tmp_path: Path) -> None:
     path for path in scenarios_directory().glob('*.yaml') if path.suffixes == ['.yaml']),
     ids=lambda path: path.stem)
 def test_own_games_round_trip(tmp_path: Path, path: Path) -> None:
-    """The games of the package, as the launcher writes them into the run's folder."""
+    """The package's games survive the launcher's way of writing them into a run's folder."""
     game = load_game(path)
     again = load_game(write(tmp_path, dump_game(game)))
     assert again.scenario == game.scenario.resolve()
@@ -262,7 +262,7 @@ def test_own_games_round_trip(tmp_path: Path, path: Path) -> None:
 
 @pytest.mark.parametrize(('written', 'meant'), [('on', 'on'), ("'on'", 'on'), ('none', 'none')])
 def test_sound_is_on_or_none(tmp_path: Path, written: str, meant: str) -> None:
-    """YAML reads a bare on as a truth value; only what is not the default is written back."""
+    """YAML reads a bare `on` as a truth value; only a value other than the default is written."""
     game = load_game(write(tmp_path, f'scenario: road.xml\nsound: {written}\n'))
     assert game.sound == meant
     again = dump_game(game)

@@ -40,7 +40,7 @@ def parse(entries: Any, base: Path = Path()) -> tuple[ObjectSpec, ...]:
 
 
 def test_every_key_is_read(tmp_path: Path) -> None:
-    """Keys, defaults by kind and type, and what a CSV file holds."""
+    """It reads keys, defaults by kind and type, and the content of a CSV file."""
     (tmp_path / 'ride.csv').write_text('t,x,y\n0,0,0\n1,0,3\n2,0,3\n3,-3,3\n', encoding='utf-8')
     specs = {spec.id: spec for spec in parse(yaml.safe_load(OBJECTS), tmp_path)}
     assert list(specs) == ['bin', 'b1', 'walker', 'walker2', 'cyclist', 'lead', 'rec', 'given']
@@ -49,7 +49,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     walker = specs['walker']
     assert (walker.type, walker.start, walker.end) == ('pedestrian', 2.0, 'stay')
     assert (walker.path, walker.reactive) == (((10.0, -4.0), (10.0, 6.0)), False)
-    # As wide as those of our own scenarios, at the speed that the game says.
+    # As wide as pedestrians of our own scenarios, at the game's speed.
     assert (walker.shape, walker.mover.speed) == (Shape.circle(0.35), 1.4)
     other = specs['walker2'].mover
     assert (other.headway, other.distance, other.shape.radius) == (4.0, 0.7, 0.3)
@@ -59,7 +59,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     assert (cyclist.mover.acceleration, cyclist.mover.deceleration) == (0.8, 1.2)
     lead = specs['lead']
     assert (lead.lanelet, lead.s, lead.end, lead.shape.length) == (12, 5.0, 'vanish', 4.508)
-    # The heading is that of the motion, and stays where there is none.
+    # The heading is that of the motion and stays during a stop.
     assert specs['rec'].trajectory == ((0.0, 0.0, 0.0, math.pi / 2), (1.0, 0.0, 3.0, math.pi / 2),
                                        (2.0, 0.0, 3.0, math.pi), (3.0, -3.0, 3.0, math.pi))
     assert specs['given'].trajectory[1] == (1.0, 0.0, 1.2, 1.5)
@@ -67,7 +67,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
 
 
 def test_entries_give_the_same_objects_again(tmp_path: Path) -> None:
-    """What is written is read from anywhere, through YAML and JSON."""
+    """Written entries are read back from any folder, through YAML and JSON."""
     (tmp_path / 'ride.csv').write_text('t,x,y,yaw\n0,0,0,0.1\n1,0,1.3,0.2\n', encoding='utf-8')
     specs = parse(yaml.safe_load(OBJECTS), tmp_path)
     entries = write(specs)
@@ -76,12 +76,12 @@ def test_entries_give_the_same_objects_again(tmp_path: Path) -> None:
 
 
 def test_every_type_has_a_size_and_limits() -> None:
-    """Each type of each mover can be made, and turns about as sharply as its like."""
+    """Each type of each mover can be made and turns about as sharply as a real one."""
     for name, mover in MOVER_TYPES.items():
         kind = WALK if mover.wheelbase == 0.0 else RIDE
         spec, = parse([{**kind, 'type': name}])
         assert spec.mover == mover
-    # A turning circle of 11 m between kerbs: the rear axle goes round a radius of 4.1 m.
+    # A turning circle of 11 m between kerbs gives the rear axle a radius of 4.1 m.
     assert 1.0 / MOVER_TYPES['car'].sharpest == pytest.approx(4.1, abs=0.1)
 
 
@@ -144,7 +144,7 @@ REFUSED: list[tuple[Any, str]] = [
 @pytest.mark.parametrize(('entries', 'message'), REFUSED,
                          ids=[str(number) for number in range(len(REFUSED))])
 def test_wrong_entries_are_refused(entries: Any, message: str) -> None:
-    """One line that names the entry, the key, the value and what would be right."""
+    """The message is one line that names the entry, the key, the value and valid values."""
     with pytest.raises(InputError, match=message) as caught:
         parse(entries)
     assert str(caught.value).startswith('game.yaml: objects')
@@ -152,18 +152,18 @@ def test_wrong_entries_are_refused(entries: Any, message: str) -> None:
 
 
 def outside(folder: Path) -> None:
-    """Put a good trajectory beside the folder of the game."""
+    """Write a valid trajectory beside the folder of the game."""
     (folder.parent / 'ride.csv').write_text('t,x,y\n0,0,0\n1,0,3\n', encoding='utf-8')
 
 
 def linked(folder: Path) -> None:
-    """Let the folder of the game hold a link that leads out of it."""
+    """Create a link in the game's folder that leads out of it."""
     outside(folder)
     (folder / 'ride.csv').symlink_to(folder.parent / 'ride.csv')
 
 
 def holding(content: bytes) -> Callable[[Path], None]:
-    """Make a writer of the trajectory's file."""
+    """Return a function that writes the trajectory's file."""
     def write(folder: Path) -> None:
         (folder / 'ride.csv').write_bytes(content)
     return write
@@ -189,7 +189,7 @@ def holding(content: bytes) -> Callable[[Path], None]:
         'short', 'one', 'bytes', 'rows', 'large'])
 def test_wrong_trajectory_files_are_refused(name: str, prepare: Callable[[Path], None],
                                             message: str, tmp_path: Path) -> None:
-    """Only bounded files inside the folder of the game, with the line that is wrong."""
+    """Only files inside the game's folder and below a size are read; errors name the line."""
     folder = tmp_path / 'game'
     folder.mkdir()
     prepare(folder)

@@ -46,7 +46,7 @@ def parse(text: str) -> PerceptionSpec:
 
 
 def test_nothing_said_is_a_front_lidar_and_a_noisy_pose() -> None:
-    """`perception: {}`."""
+    """`perception: {}` gives a front lidar and a noisy pose."""
     spec = parse('{}')
     assert spec == PerceptionSpec()
     assert spec.localisation == LocalisationSpec()
@@ -54,7 +54,7 @@ def test_nothing_said_is_a_front_lidar_and_a_noisy_pose() -> None:
 
 
 def test_everything_said_is_understood() -> None:
-    """Whole numbers become lengths and times, names and files are resolved."""
+    """Integers become lengths and times; names and files are resolved."""
     spec = parse(EVERYTHING)
     assert spec.localisation is not None
     assert spec.localisation.position_bias == (0.5, -1.0)
@@ -72,13 +72,13 @@ def test_everything_said_is_understood() -> None:
     '{}', EVERYTHING, 'localisation: null', 'sensors: []', 'localisation: {}\nsensors: [{}]'],
     ids=['default', 'everything', 'true pose', 'sees all', 'defaults'])
 def test_what_is_written_reads_the_same(text: str) -> None:
-    """Through YAML and back."""
+    """A specification survives YAML and back."""
     spec = parse(text)
     assert parse(yaml.safe_dump(write(spec))) == spec
 
 
 def test_null_and_empty_list_switch_off() -> None:
-    """The true pose, and everything seen."""
+    """Null gives the true pose, and an empty list makes all objects visible."""
     spec = parse('{localisation: null, sensors: []}')
     assert spec.localisation is None
     assert spec.sensors == ()
@@ -109,7 +109,7 @@ def test_null_and_empty_list_switch_off() -> None:
     ('seed: -1', '"seed" is -1'),
 ], ids=range(20))
 def test_one_clear_line_for_what_is_wrong(text: str, message: str) -> None:
-    """Naming the place, the key and what would be right."""
+    """The message is one line with the place, the key and valid values."""
     with pytest.raises(InputError) as caught:
         parse(text)
     line = str(caught.value)
@@ -119,7 +119,7 @@ def test_one_clear_line_for_what_is_wrong(text: str, message: str) -> None:
 
 
 def test_too_many_sensors_are_refused() -> None:
-    """Each costs a scan."""
+    """The number of sensors is limited, as each costs a scan."""
     values: dict[str, Any] = {'sensors': [{}] * 33}
     with pytest.raises(InputError, match='has 33 entries; give 32 at most'):
         read(PerceptionSpec, values, 'game.yaml', BASE)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The two time grids and what links them (CRG 14)."""
+"""The two time grids and their relation (CRG 14)."""
 
 from fractions import Fraction
 import math
@@ -25,7 +25,7 @@ def test_replanning_period(time_step: float, dt: float, period: int) -> None:
     (0.1, 3.0, 1, Fraction(100_000_000))])
 def test_step_divides_the_scenario_step_exactly(time_step: float, rate: float, period: int,
                                                 dt_ns: Fraction) -> None:
-    """Where the rate doesn't divide, dt becomes dt_c / N: 14.29 ms for 70 Hz."""
+    """If the rate doesn't divide dt_c, dt becomes dt_c / N: 14.29 ms for 70 Hz."""
     scheduler = ScenarioScheduler.from_rate(time_step, rate)
     assert scheduler.steps_per_tick == period
     assert scheduler.dt_s == pytest.approx(float(dt_ns) * 1e-9, rel=1e-15)
@@ -46,7 +46,7 @@ def test_stamps_do_not_drift(rate: float) -> None:
 
 
 def test_million_float_additions_would_have_drifted() -> None:
-    """The pitfall that integers avoid: ten additions of 0.1 floor to 0 (CRG 15 as printed)."""
+    """Integers avoid this error: ten additions of 0.1 floor to 0 (CRG 15 as printed)."""
     progress = 0.0
     for _ in range(10):
         progress += 0.1
@@ -61,7 +61,7 @@ def test_million_float_additions_would_have_drifted() -> None:
 
 
 def test_scenario_time_advances_every_n_steps() -> None:
-    """K starts at k0 and counts whole scenario steps; a tick is where it advances."""
+    """K starts at k0 and counts whole scenario steps; a tick is a step at which it advances."""
     scheduler = ScenarioScheduler.from_rate(0.1, 100.0, k0=7)
     assert [scheduler.k(n) for n in (0, 1, 9, 10, 19, 20)] == [7, 7, 7, 8, 8, 9]
     assert [n for n in range(31) if scheduler.is_tick(n)] == [0, 10, 20, 30]
@@ -69,7 +69,7 @@ def test_scenario_time_advances_every_n_steps() -> None:
 
 @pytest.mark.parametrize('rate', [100.0, 30.0, 70.0])
 def test_stamp_leads_back_to_its_step(rate: float) -> None:
-    """Every step is found by its stamp; only ticks are ticks."""
+    """Every step is found by its stamp, and only stamps of ticks are ticks."""
     scheduler = ScenarioScheduler.from_rate(0.1, rate, 4, clock_offset_ns=5_000_000_001)
     for n in range(1000):
         stamp = scheduler.stamp_ns(n)
@@ -78,7 +78,7 @@ def test_stamp_leads_back_to_its_step(rate: float) -> None:
 
 
 def test_stamps_of_other_runs_are_no_ticks() -> None:
-    """Before the run (an older epoch) or a nanosecond beside a tick."""
+    """Stamps before the run (an older epoch) or a nanosecond beside a tick are no ticks."""
     scheduler = ScenarioScheduler.from_rate(0.1, 100.0, clock_offset_ns=10**9)
     assert scheduler.tick_of_stamp(9 * 10**8) is None
     assert scheduler.tick_of_stamp(10**9 + 1) is None
@@ -95,6 +95,6 @@ def test_steps_for_a_duration() -> None:
 
 @pytest.mark.parametrize('time_step', [0.0, -0.1, 1e-12])
 def test_scenario_step_must_be_positive(time_step: float) -> None:
-    """A step of less than a nanosecond is none."""
+    """A step of less than a nanosecond is refused."""
     with pytest.raises(InputError, match='timeStepSize.*is not positive'):
         ScenarioScheduler.from_rate(time_step, 100.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a game file may say about traffic."""
+"""The key `traffic` of a game file."""
 
 from pathlib import Path
 

@@ -20,7 +20,7 @@ def test_known_angles(angle: float, wrapped: float) -> None:
 
 
 def test_angles_in_the_interval_stay_bit_for_bit() -> None:
-    """A state that is replayed must not change by being normalised again."""
+    """A second normalisation must not change a replayed state."""
     for angle in np.random.default_rng(1).uniform(-math.pi, math.pi, 1000):
         assert wrap_pi(float(angle)) == angle
 

@@ -26,7 +26,7 @@ def arc(turns: float = 0.5, points: int = 200) -> Array:
 
 
 def zigzag() -> Array:
-    """Return an open polyline of uneven segments, with a vertex that is there twice."""
+    """Return an open polyline of uneven segments, with one vertex twice."""
     random = np.random.default_rng(3)
     x = np.cumsum(random.uniform(1.0, 9.0, 12))
     points = np.column_stack((x, random.uniform(-2.0, 2.0, 12)))
@@ -91,7 +91,7 @@ def test_projection_finds_the_nearest_place_that_shapely_finds() -> None:
     curve, line = Curve.from_polyline(arc()), shapely.LineString(arc())
     random = np.random.default_rng(1)
     points = random.uniform((-5.0, -5.0), (25.0, 65.0), (200, 2))
-    # Near the middle of a circle everything is equally far.
+    # Near the middle of a circle all points are equally far.
     points = points[np.hypot(points[:, 0], points[:, 1] - RADIUS) > 10.0]
     s, d = curve.project(points)
     inside = (s > 0.0) & (s < curve.length)
@@ -104,7 +104,7 @@ def test_projection_finds_the_nearest_place_that_shapely_finds() -> None:
 
 @pytest.mark.parametrize('d', [-8.0, 0.5, 12.0])
 def test_refining_a_rough_guess_is_exact_on_a_circle(d: float) -> None:
-    """Points at an offset d are at the arc length that they were made of."""
+    """Points at an offset d get the arc length that they were made from."""
     curve = Curve.from_polyline(arc(points=2000))
     s = np.linspace(3.0, curve.length - 3.0, 40)
     points = curve.poses(s, np.full_like(s, d))[:, :2]
@@ -143,7 +143,7 @@ def test_many_points_are_projected_as_few(monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.mark.parametrize('make', [Curve.from_polyline, ReferencePath.from_polyline])
 def test_few_points_are_refined_to_the_last_bit_as_many(
         make: Callable[[Array], Curve], rounds: int, exact: float) -> None:
-    """The same points again and again are many; on the line, far off it, beyond it, nowhere."""
+    """The many points repeat the few: on the line, far off it, beyond it, and NaN."""
     random = np.random.default_rng(11)
     for _ in range(100):
         line = make(np.cumsum(random.normal((1.0, 0.0), 1.0, (20, 2)), axis=0))

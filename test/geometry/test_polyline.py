@@ -72,7 +72,7 @@ def test_a_path_ends_at_its_ends() -> None:
     path = ReferencePath.from_polyline(np.array([[0.0, 0.0], [20.0, 0.0]]))
     assert path.pose_at(np.array([-3.0, 99.0, np.nan]))[:, 0] == pytest.approx(
         (0.0, path.length, 0.0), abs=1e-4)
-    # Points beyond them have arc lengths all the same.
+    # Points beyond them have arc lengths, too.
     s, d = path.project(np.array([[-4.0, 1.0], [25.0, -2.0]]))
     assert s == pytest.approx((-4.0, 25.0), abs=1e-4) and d == pytest.approx((1.0, -2.0))
     assert path.locate(25.0, -2.0, 15.0) == pytest.approx((25.0, -2.0, 0.0), abs=1e-4)
@@ -87,10 +87,10 @@ def test_window_separates_the_laps_of_a_loop() -> None:
 
 
 def test_projection_is_that_of_commonroads_frame() -> None:
-    """As Wuersching and Althoff have it (CRG 1 and its reference 9), and as a circle does."""
+    """It agrees with Wuersching and Althoff (CRG 1 and its reference 9), and with a circle."""
     path = circle(0.5)
     frame = CurvilinearCoordinateSystem(path.points, 20.0, 0.1)
-    # The library prolongs the path at both ends; its s starts before ours.
+    # The library extends the path at both ends; its s starts before ours.
     shift = path.step - frame.convert_to_curvilinear_coords(*path.points[1], False)[0]
     for angle in (0.5, 1.2, 2.0):
         for d in (-2.0, 0.0, 3.0):

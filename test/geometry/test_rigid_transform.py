@@ -70,7 +70,7 @@ def test_rotation_is_orthogonal() -> None:
 
 
 def test_poses_that_agree_give_the_identity_exactly() -> None:
-    """Not a rotation by rounding: the states of an AV then stay bit for bit."""
+    """There is no rotation by rounding: the states of an AV then stay bit for bit."""
     pose = (512.3, -87.1, 2.9)
     assert RigidTransform.between(pose, pose) == RigidTransform()
     assert RigidTransform.between(pose, pose).is_identity

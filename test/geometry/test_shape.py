@@ -34,6 +34,6 @@ def test_shape_without_extent_is_refused(length: float, width: float, named: str
 
 
 def test_polygon_on_a_line_is_refused() -> None:
-    """It has no area to collide with."""
+    """Such a polygon has no area to collide with."""
     with pytest.raises(InputError, match='width 0'):
         Shape.polygon(((0.0, 0.0), (1.0, 0.0), (2.0, 0.0)))

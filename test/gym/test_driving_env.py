@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Episodes: what happens in them is what happens in a run of the same game."""
+"""Episodes: they equal runs of the same game."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +46,7 @@ def test_equal_seeds_give_equal_episodes_and_others_do_not(game: str) -> None:
     assert episode(DrivingEnv(game=game, vary={'speed': 2.0}), 7, 15) == first
 
 
-def test_shared_placements_of_traffic_begin_as_if_nobody_had_driven_in_them() -> None:
+def test_shared_placements_of_traffic_begin_as_if_unused() -> None:
     env = DrivingEnv(game='dense_merge', worlds=1)
     first = episode(env, 1, 10)
     episode(env, 2, 10)
@@ -72,7 +72,7 @@ def test_a_policy_drives_in_a_run_as_it_did_in_the_environment(seat: str) -> Non
         seen = env.step(follow_lane(seen))[0]
         states.append(env.agent.game.simulation.states)
     run = _run(seat).vehicle_states[10::10]
-    # A request carries velocities as vectors: rounding alone is between the two.
+    # A request carries velocities as vectors: the two differ only by rounding.
     assert np.abs(np.array(states) - run)[:, :, :4].max() < 1e-6
 
 
@@ -127,7 +127,7 @@ def test_an_episode_ends_by_contact_road_and_time_as_gymnasium_means_it() -> Non
         _, reward, terminated, truncated, info = env.step(still)
         if terminated or truncated:
             break
-    # Whoever holds his speed runs into the human who has cut in and stops.
+    # An agent at constant speed runs into the human that has cut in and stops.
     assert (terminated, truncated, reward, info['hit']) == (True, False, -3.0, 'hv0')
     env = DrivingEnv(game='cut_in', ends=['goal'], duration=12.0)
     env.reset(seed=0)
@@ -142,7 +142,7 @@ def test_an_episode_ends_by_contact_road_and_time_as_gymnasium_means_it() -> Non
     assert (terminated, info['off_road'], reward) == (True, True, -1.0)
 
 
-def test_who_begins_off_the_road_leaves_it_when_he_comes_further_off() -> None:
+def test_a_vehicle_that_begins_off_the_road_leaves_it_further_off() -> None:
     game = load_game(SCENARIOS / 'cut_in.yaml')
     # Half a car beside the road's left edge.
     beside = replace(game.humans[0], driver='idle', spawn=LaneletSpawn(13, 234.0, 2.0, 15.0))
@@ -150,7 +150,7 @@ def test_who_begins_off_the_road_leaves_it_when_he_comes_further_off() -> None:
     env.reset(seed=0)
     for _ in range(5):
         assert not env.step(np.zeros(2, np.float32))[2]
-    # Back onto the road, and then off it again: now it counts at once.
+    # It returns to the road and then leaves it again: now that counts at once.
     for turn in (*[-0.5] * 4, *[0.0] * 8, *[0.5] * 4):
         assert not env.step(np.array((0.0, turn), np.float32))[2]
     assert env.agent.seats[0].overhang == 0.0

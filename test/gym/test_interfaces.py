@@ -26,7 +26,7 @@ pytestmark = pytest.mark.filterwarnings('error')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', shipped_games())
 def test_gymnasium_accepts_every_environment(game: str) -> None:
-    # The checker begins a dozen episodes: they share a placement of traffic.
+    # The checker begins a dozen episodes, which share a placement of traffic.
     check_env(gymnasium.make(environment_id(game), worlds=1).unwrapped, skip_render_check=True)
 
 
@@ -45,7 +45,7 @@ def test_gymnasium_accepts_every_choice(keywords: dict[str, object]) -> None:
     check_env(gymnasium.make('crgame/Merge-v0', **keywords).unwrapped, skip_render_check=True)
 
 
-# Its own warning: a plan is no vector that could be normalised.
+# The checker's own warning: a plan is no vector that could be normalised.
 @pytest.mark.filterwarnings('ignore:.*normalized space')
 def test_gymnasium_accepts_plans_and_perception() -> None:
     check_env(gymnasium.make('crgame/Fog-v0', action='plan').unwrapped, skip_render_check=True)
@@ -80,7 +80,7 @@ def test_games_together_are_the_same_as_one_after_the_other() -> None:
     apart = gymnasium.make_vec(ANY_GAME, 3, vectorization_mode='sync', **keywords)
     action = np.random.default_rng(0).uniform(-0.3, 0.3, (60, 3, 2)).astype(np.float32)
     first, second = together.reset(seed=5), apart.reset(seed=5)
-    # Each game ends on the way and begins anew.
+    # Each game ends in between and restarts.
     for given in (*action, None):
         for part, values in first[0].items():
             assert (values == second[0][part]).all()

@@ -46,7 +46,7 @@ def test_several_agents_are_in_one_picture() -> None:
 
 
 async def _watched(url: str) -> tuple[dict[str, Any], list[tuple[float, ...]]]:
-    """Open the page's connection; give its documents, and the states that come."""
+    """Open the page's connection; return its documents, and the received states."""
     documents: dict[str, Any] = {}
     states: list[tuple[float, ...]] = []
     async with ClientSession() as session:
@@ -89,11 +89,11 @@ def test_the_page_shows_the_environment_and_steers_nothing() -> None:
         assert not documents['reply']['ok']
         assert 'agent drives' in documents['reply']['text']
         vehicles = np.array(states[-1][6:]).reshape(2, STATE_COLUMNS)
-        # 20 m/s, and where the engine had it at that step.
+        # 20 m/s, and the engine's position at that step.
         assert vehicles[1, 3] == 20.0
         assert states[-1][2] <= env.agent.game.simulation.n
         env.reset(seed=1)
-        # A second of an environment takes a second for whoever looks on.
+        # A second of an environment takes a second for a client that watches.
         began_s = time.monotonic()
         for _ in range(5):
             env.step(STILL)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The example: it trains a policy, which then drives in a run of the game."""
+"""The example trains a policy, which then drives in a run of the game."""
 
 from dataclasses import replace
 import os
@@ -26,7 +26,7 @@ def test_a_few_generations_drive_better_and_then_drive_the_av(tmp_path: Path) ->
     done = subprocess.run(
         [sys.executable, example, '--generations', '3', '--population', '8'],
         env=os.environ | {'PYTHONPATH': str(ROOT)}, capture_output=True, text=True)
-    # Exit code 1 says that a drive from a new start ended badly, as it may after so little.
+    # Exit code 1: a drive from a new start ended badly, as it may after so little training.
     assert done.returncode in (0, 1), done.stderr
     means = [float(line.rpartition(' ')[2]) for line in done.stdout.splitlines()
              if line.startswith('generation')]

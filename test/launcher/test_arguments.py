@@ -16,7 +16,7 @@ def test_without_arguments() -> None:
 
 
 def test_every_argument() -> None:
-    """As the README lists them."""
+    """The arguments are those of the README."""
     request = parse_arguments([
         'games/mine.yaml', '--scenario', 'road.xml', '--driver', 'evdev:Logitech G29',
         '--planner', 'idm', '--planner', 'mine.py:Mine', '--duration', '20', '--rate', '200',
@@ -29,7 +29,7 @@ def test_every_argument() -> None:
 
 
 def test_each_human_gets_the_driver_that_is_named_for_it() -> None:
-    """Without a name it is the first human's, whatever the source holds."""
+    """Without a name it is the first human's, whatever characters the source has."""
     request = parse_arguments(['--driver', 'hv1=evdev:G29', '--driver', 'keys:a=b.yaml',
                                '--driver', 'hv0=cockpit'])
     assert request.driver == 'keys:a=b.yaml'
@@ -39,7 +39,7 @@ def test_each_human_gets_the_driver_that_is_named_for_it() -> None:
 
 
 def test_a_cockpit_is_opened_on_purpose() -> None:
-    """On all addresses unless one is given; what does not go together is refused."""
+    """It is on all addresses unless one is given; contradictory arguments are refused."""
     request = parse_arguments(['--open-cockpit', '--certificate', 'c.pem', '--key', 'k.pem'])
     assert cockpit_host(request) == '0.0.0.0' and cockpit_host(RunRequest()) == '127.0.0.1'
     assert cockpit_host(parse_arguments(['--open-cockpit', '--listen', '10.0.0.4'])) == '10.0.0.4'
@@ -51,7 +51,7 @@ def test_a_cockpit_is_opened_on_purpose() -> None:
 
 
 def test_one_origin_may_show_the_cockpit_within_its_page() -> None:
-    """None unless it is named; where there is no page, or a recording's, nothing can show it."""
+    """No origin may unless it is named; without a page, or with a recording's, none can."""
     assert parse_arguments([]).framed_by == ''
     request = parse_arguments(['--framed-by', 'http://LocalHost:8070/'])
     assert request.framed_by == 'http://localhost:8070'

@@ -36,24 +36,24 @@ def noon() -> datetime:
 
 @pytest.fixture(autouse=True)
 def in_an_empty_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Start every test where nothing is."""
+    """Start every test in an empty folder."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 def test_without_arguments_it_is_the_cut_in() -> None:
-    """The game of the README's first command, as its file says."""
+    """It is the game of the README's first command, unchanged."""
     assert effective_game(RunRequest()) == load_game(CUT_IN)
 
 
 def test_scenario_alone() -> None:
-    """One human who is placed near the first AV; each planning problem becomes an AV."""
+    """One human is placed near the first AV; each planning problem becomes an AV."""
     game = effective_game(RunRequest(scenario=CUT_IN_XML))
     assert (game.scenario, game.humans, game.avs) == (CUT_IN_XML, (HumanSpec('hv0'),), None)
 
 
 def test_overrides() -> None:
-    """What the command line says goes before the game file; all else stays."""
+    """The command line takes precedence over the game file; all else stays."""
     before = load_game(TWO_AVS)
     game = effective_game(RunRequest(TWO_AVS, CUT_IN_XML, 'idle', (), 7.0, 250.0))
     assert game.scenario == CUT_IN_XML
@@ -78,7 +78,7 @@ def test_rate_is_bounded_as_in_the_file(rate: float) -> None:
         effective_game(RunRequest(rate_hz=rate))
 
 
-def test_driver_for_nobody_is_refused(tmp_path: Path) -> None:
+def test_driver_without_a_human_is_refused(tmp_path: Path) -> None:
     """The game has no human: the argument would have no effect."""
     path = tmp_path / 'alone.yaml'
     path.write_text(f'scenario: {CUT_IN_XML}\nhumans: []\n', encoding='utf-8')
@@ -96,7 +96,7 @@ def test_folder_is_named_by_time_and_scenario(tmp_path: Path) -> None:
 
 
 def test_given_folder_is_used(tmp_path: Path) -> None:
-    """Also where it exists, as long as it holds no recording; else one beside it."""
+    """It may exist, as long as it holds no recording; else one beside it is used."""
     (tmp_path / 'mine').mkdir()
     plan = plan_run(RunRequest(CUT_IN, out=Path('mine')), noon)
     assert plan.folder == tmp_path / 'mine'
@@ -109,7 +109,7 @@ def test_given_folder_is_used(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('out', [None, Path('mine')])
 def test_ten_starts_at_once_have_ten_folders(tmp_path: Path, out: Path | None) -> None:
-    """Also where the folder that they all name is there already."""
+    """This holds also if the folder that they all name exists already."""
     (tmp_path / 'mine').mkdir()
     with ThreadPoolExecutor(10) as pool:
         plans = list(pool.map(lambda _: plan_run(RunRequest(CUT_IN, out=out), noon), range(10)))
@@ -125,7 +125,7 @@ def test_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 
 
 def test_drivers_are_given_by_name() -> None:
-    """Who is named gets them, the others keep theirs; who takes no part is told."""
+    """Named humans get them, the others keep theirs; unknown names are reported."""
     game = Game(CUT_IN_XML, humans=(HumanSpec('hv0'), HumanSpec('hv1', 'idle')))
     named = effective_game(RunRequest(drivers=(('hv1', 'cockpit'),)), game)
     assert [human.driver for human in named.humans] == ['auto', 'cockpit']
@@ -201,7 +201,7 @@ CROSSING = SCENARIOS / 'crossing.yaml'
 
 
 def test_planners_of_events_are_checked(tmp_path: Path) -> None:
-    """One that nobody knows, and one that would replace an external planner: before any start."""
+    """An unknown one, or one for an external planner's AV, is refused before any start."""
     text = CROSSING.read_text().replace('scenario: ', f'scenario: {SCENARIOS}/').replace(
         'joy:crossing', f'joy:{SCENARIOS}/crossing')
     game = tmp_path / 'game.yaml'
@@ -217,7 +217,7 @@ def test_planners_of_events_are_checked(tmp_path: Path) -> None:
 @pytest.mark.parametrize('address', ['192.0.2.1', 'nobody.invalid', '"', 'a' * 70],
                          ids=['of another machine', 'unknown', 'a quote', 'too long'])
 def test_the_page_has_to_be_at_an_address_of_this_machine(address: str, tmp_path: Path) -> None:
-    """Said before anything starts: a run that waits for the browser would wait for ever."""
+    """The refusal comes before the start: a run that waits for the browser would never begin."""
     with pytest.raises(InputError, match=r'cannot listen \(.+\); choose another|is no address'):
         plan_run(RunRequest(listen=address, out=tmp_path / 'run'))
     assert not (tmp_path / 'run').exists()

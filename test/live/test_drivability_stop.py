@@ -22,7 +22,7 @@ SLOW = 0.15
 
 
 def _game(folder: Path) -> Path:
-    """Write the cut-in with a human who leaves the road to the left after about a second."""
+    """Write the cut-in with a human that leaves the road to the left after about a second."""
     game = yaml.safe_load((SCENARIOS / 'cut_in.yaml').read_text())
     game['scenario'] = str(SCENARIOS / game['scenario'])
     game['humans'][0]['driver'] = 'keys:left.keys.yaml'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The contract itself: every row is true of the types it names, and its page is up to date."""
+"""The contract itself: every row agrees with the types it names; its page is up to date."""
 
 from collections.abc import Iterator
 import importlib.util
@@ -54,7 +54,7 @@ def _walk(message: Any, path: str) -> Iterator[str]:
 
 
 def test_the_contract_is_whole() -> None:
-    """What the graph cannot do without has a row, under the name that everybody knows."""
+    """Each essential topic has a row, under its usual name."""
     assert {'/clock', '/scenario/xml', '/vehicles/state', '/<av>/plan_request', '/<av>/plan',
             '/<v>/driver_command', '/timing/cycle', '/diagnostics'} <= set(CONTRACT.topics)
     assert set(CONTRACT.services) == {
@@ -92,7 +92,7 @@ def test_qos_is_what_rclpy_gets(topic: Topic) -> None:
 
 
 def test_slots_are_one_deep_and_documents_latched() -> None:
-    """CRG algorithm 2 exchanges single slots; who joins late still learns what is played."""
+    """CRG algorithm 2 exchanges single slots; a late subscriber still gets the documents."""
     for name in ('/<av>/plan_request', '/<av>/plan', '/<v>/driver_command'):
         assert CONTRACT.topic(name).qos.depth == 1
     happenings = ('/trigger', '/seats/order', '/tasks/log', '/tasks/report')
@@ -102,7 +102,7 @@ def test_slots_are_one_deep_and_documents_latched() -> None:
 
 
 def test_what_is_recorded_goes_to_the_recorder() -> None:
-    """`record` and the recorder's place among the consumers say the same."""
+    """`record` and the recorder's place among the consumers agree."""
     assert ([topic.name for topic in TOPICS if topic.record]
             == [topic.name for topic in TOPICS if 'recorder_node' in topic.consumers])
 

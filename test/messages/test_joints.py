@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""States as joints and back: what crosses the bus loses nothing that a planner said."""
+"""States as joints and back: the messages keep all values of a planner."""
 
 from dataclasses import replace
 import math
@@ -88,7 +88,7 @@ def test_reverse_keeps_its_sign() -> None:
 
 
 def test_names() -> None:
-    """As in the contract."""
+    """The names are those of the contract."""
     assert vehicle_joint_names('hv1') == ('hv1/x', 'hv1/y', 'hv1/yaw', 'hv1/steering')
     assert object_joint_names('o12') == ('o12/x', 'o12/y', 'o12/yaw')
 
@@ -99,7 +99,7 @@ def good() -> JointSeries:
 
 
 def test_names_must_be_the_avs() -> None:
-    """Neither another AV's nor another order."""
+    """Another AV's names or another order are refused."""
     with pytest.raises(InputError, match='/av1/plan: joint_names are av0/x.*name av1/x'):
         plan_from_joints(good(), 'av1', STEP_NS)
     swapped = replace(good(), names=('av0/y', 'av0/x', 'av0/yaw', 'av0/steering'))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Values of statuses: text that ROS's tools and the page read alike."""
+"""Values of statuses: text for ROS's tools and for the page."""
 
 from crgame_ros.messages.status_values import status_text, status_truth
 import numpy as np
@@ -14,7 +14,7 @@ def test_yes_and_no_are_words(value: object, text: str) -> None:
 
 
 def test_a_yes_is_read_from_every_version() -> None:
-    """Earlier recordings say True; what is no yes is none, what is missing is as stated."""
+    """Earlier recordings have True; other texts are no, a missing value is the default."""
     values = {'now': 'true', 'before': 'True', 'no': 'False', 'off': 'off'}
     assert [status_truth(values, key) for key in (*values, 'missing')] == [
         True, True, False, False, False]

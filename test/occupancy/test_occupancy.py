@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Grids, and the map_server files they come from: what is read, and what is refused."""
+"""Grids, and the map_server files they come from: valid files and refused ones."""
 
 import os
 from pathlib import Path
@@ -26,7 +26,7 @@ def write(folder: Path, **values: str | None) -> Path:
 
 
 def test_points_of_a_grid() -> None:
-    """Cells of 0.5 m from (1, -2) on: rows grow with y, and outside nothing is occupied."""
+    """Cells of 0.5 m from (1, -2) on: rows grow with y; no point outside is occupied."""
     grid = OccupancyGrid((1.0, -2.0), 0.5, np.array([[False, True, False], [True, False, False]]))
     points = np.array([(1.6, -1.9), (1.2, -1.4), (1.2, -1.9), (0.99, -1.4), (1.2, -0.99),
                        (2.51, -1.9)])
@@ -59,7 +59,7 @@ def test_the_top_row_is_the_largest_y(tmp_path: Path) -> None:
     b'P5 # a\n# b\n 7\t5\n# c\n255\n'],
     ids=['plain', 'one line', 'map_saver', 'comments'])
 def test_images_of_others(tmp_path: Path, header: bytes) -> None:
-    """The same pixels as Pillow, whole and in pieces, whatever the spacing of the header."""
+    """The same pixels as Pillow, whole and in pieces, for any spacing of the header."""
     pixels = np.random.default_rng(1).integers(0, 256, (5, 7), dtype=np.uint8)
     path = tmp_path / 'map.pgm'
     path.write_bytes(header + pixels.tobytes())
@@ -79,7 +79,7 @@ def test_image_of_numbers_as_text(tmp_path: Path) -> None:
 
 
 def test_written_images_are_read_by_pillow(tmp_path: Path) -> None:
-    """What we write is a PGM for others."""
+    """Written images are PGM files for other programs."""
     pixels = np.random.default_rng(2).integers(0, 256, (4, 9), dtype=np.uint8)
     write_pgm(tmp_path / 'map.pgm', pixels)
     image = Image.open(tmp_path / 'map.pgm')
@@ -101,7 +101,7 @@ def test_written_images_are_read_by_pillow(tmp_path: Path) -> None:
     ids=['empty', 'png', 'colour', 'long comment', 'no width', 'huge', '16 bit', 'no maximum',
          'short', 'few numbers', 'word', 'large number', 'negative'])
 def test_images_that_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
-    """One line with the file's name."""
+    """The refusal is one line with the file's name."""
     path = tmp_path / 'map.pgm'
     path.write_bytes(content)
     with pytest.raises(InputError, match=message) as caught:
@@ -110,7 +110,7 @@ def test_images_that_are_refused(tmp_path: Path, content: bytes, message: str) -
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
-    """A pipe would be waited for without end."""
+    """Reading a pipe would block for ever."""
     os.mkfifo(tmp_path / 'pipe')
     for name in ('pipe', '.', 'none'):
         with pytest.raises(InputError, match='is no regular file|No such file'):
@@ -120,7 +120,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_image_that_is_cut_short_while_in_use(tmp_path: Path) -> None:
-    """An error, not the end of the process."""
+    """It raises an error and does not end the process."""
     path = tmp_path / 'map.pgm'
     write_pgm(path, np.zeros((100, 100), dtype=np.uint8))
     image = open_pgm(path)
@@ -148,7 +148,7 @@ def test_an_image_that_is_cut_short_while_in_use(tmp_path: Path) -> None:
     ids=lambda value: next(iter(value.items()))[0] if isinstance(value, dict) else None)
 def test_map_files_that_are_refused(tmp_path: Path, values: dict[str, str | None], message: str
                                     ) -> None:
-    """One line that names file, key and remedy."""
+    """The refusal is one line that names file, key and remedy."""
     (tmp_path / 'map').mkdir()
     (tmp_path / 'secret.pgm').write_bytes(b'P5\n1 1\n255\n0')
     (tmp_path / 'map' / 'link.pgm').symlink_to(tmp_path / 'secret.pgm')
@@ -159,7 +159,7 @@ def test_map_files_that_are_refused(tmp_path: Path, values: dict[str, str | None
 
 
 def test_a_folder_stands_for_its_map(tmp_path: Path) -> None:
-    """A full turn is no turn, and whole numbers are numbers."""
+    """A full turn counts as no turn, and integers are accepted as numbers."""
     write(tmp_path, resolution='1', origin='[3, 4, 6.283185307179586]')
     map_file = read_map_file(tmp_path)
     assert (map_file.resolution, map_file.origin) == (1.0, (3.0, 4.0))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Maps of any extent: what is near is what is in the map, and little is in memory."""
+"""Maps of any extent: nearby cells equal the map, and memory stays small."""
 
 from pathlib import Path
 import shutil
@@ -22,7 +22,7 @@ CELLS = round(TILE_M / CELL_M)
 
 
 def single(folder: Path, occupied: NDArray[np.bool_], resolution: float = 0.5) -> Path:
-    """Write a plain map_server map, as others make it."""
+    """Write a plain map_server map, as other programs do."""
     folder.mkdir(exist_ok=True)
     write_pgm(folder / 'm.pgm', np.where(occupied[::-1], 0, 254).astype(np.uint8))
     path = folder / 'm.yaml'
@@ -48,7 +48,7 @@ def tiled(folder: Path, tiles: dict[tuple[int, int], NDArray[np.bool_]], shape: 
 
 
 def piece(whole: NDArray[np.bool_], grid: OccupancyGrid) -> NDArray[np.bool_]:
-    """Cut what a grid covers out of a whole map, free cells beyond it."""
+    """Return the part of a whole map that a grid covers, with free cells beyond the map."""
     column, row = np.rint((np.array(grid.origin) - ORIGIN) / grid.resolution).astype(int)
     rows, columns = grid.occupied.shape
     cut = whole[row:row + rows, column:column + columns]
@@ -93,7 +93,7 @@ def test_ten_kilometres_stay_on_disk(tmp_path: Path) -> None:
     """
     Along the diagonal of 10 km x 10 km with a reach of 60 m, no more than 16 tiles are in memory.
 
-    Every tenth step is compared with a fresh map, in which nothing is kept.
+    Every tenth step is compared with a fresh map without tiles in memory.
     """
     count = round(EDGE_M / TILE_M)
     random = np.random.default_rng(5)
@@ -159,7 +159,7 @@ def test_a_large_single_map_is_not_read_whole(tmp_path: Path) -> None:
 
 
 def test_the_same_object_while_the_same_tiles_are_needed(tmp_path: Path) -> None:
-    """Per step nothing is built or read, also for two vehicles that ask in turn."""
+    """No step builds or reads anything, also for two vehicles in turn."""
     cells = np.eye(8, dtype=bool)
     occupancy = TiledOccupancy(tiled(
         tmp_path / 'map', {(0, column): cells for column in range(6)}, (1, 6)))
@@ -179,7 +179,7 @@ def test_the_same_object_while_the_same_tiles_are_needed(tmp_path: Path) -> None
 
 
 def test_absent_vehicles_and_places_without_a_map(tmp_path: Path) -> None:
-    """Points that are NaN don't count; nobody, or nobody near the map, gives None."""
+    """Points that are NaN don't count; no points, or none near the map, give None."""
     occupancy = TiledOccupancy(single(tmp_path / 'map', np.ones((10, 10), dtype=bool)))
     nobody = [np.nan, np.nan]
     grid = occupancy.near(np.array([nobody, [-39.0, 26.0], nobody]), 2.0)
@@ -191,7 +191,7 @@ def test_absent_vehicles_and_places_without_a_map(tmp_path: Path) -> None:
 
 
 def test_more_than_fits_is_refused(tmp_path: Path) -> None:
-    """A neighbourhood larger than the memory it may take."""
+    """A neighbourhood larger than its memory limit is refused."""
     occupancy = TiledOccupancy(tiled(
         tmp_path / 'map', {(0, 0): np.ones((8, 8), dtype=bool)}, (9, 9)), max_cells=4 * 64)
     far = np.array([[-38.0, 27.0], [-20.0, 27.0]])
@@ -209,7 +209,7 @@ def test_more_than_fits_is_refused(tmp_path: Path) -> None:
     ('no image', 'cannot be read'), ('outside', 'lies outside the folder'),
     ('index', 'does not fit into its map')])
 def test_damaged_tiles_are_refused(tmp_path: Path, damage: str, message: str) -> None:
-    """Tiles come from anyone: one line, with the name of the file that is wrong."""
+    """Tiles may come from any source: the refusal is one line with the name of the faulty file."""
     folder = tiled(tmp_path / 'map', {(1, 2): np.ones((8, 8), dtype=bool)}, (3, 4)).parent
     tile = folder / 'tile_1_2.yaml'
     text = tile.read_text()

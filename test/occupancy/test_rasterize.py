@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Drawn maps against the true edges of roads and obstacles, and as others read them."""
+"""Drawn maps against the true edges of roads and obstacles, and as other programs read them."""
 
 import math
 import os
@@ -43,7 +43,7 @@ def road(*lanelets: str) -> LoadedScenario:
 
 
 def whole(raster: Raster) -> OccupancyGrid:
-    """Put the tiles of a map together."""
+    """Return the whole map, joined from its tiles."""
     cells = raster.spec.tile_cells
     occupied = np.zeros((raster.rows * cells, raster.columns * cells), dtype=bool)
     for row, column, tile in raster.tiles():
@@ -63,7 +63,7 @@ def outlines(loaded: LoadedScenario) -> tuple[shapely.Geometry, shapely.Geometry
     """
     Find the edges of the road and the static obstacles, by commonroad-io and shapely alone.
 
-    Seams up to 0.1 m and holes below 2 m^2 are closed in another way than the program does.
+    It closes seams up to 0.1 m and holes below 2 m^2 in another way than the program.
     """
     network = loaded.scenario.lanelet_network
     lanes = shapely.union_all([
@@ -96,7 +96,7 @@ def ends(loaded: LoadedScenario) -> shapely.Geometry:
 def test_curbs_and_obstacles_are_where_they_are(name: str, project_root: Path,
                                                 request: pytest.FixtureRequest) -> None:
     """
-    Every occupied cell meets a curb or an obstacle; each point of these lies in one.
+    Every occupied cell meets a curb or an obstacle; each point of these lies in such a cell.
 
     The curb lies outside the road, up to its width away. Where a road ends with the map, it is
     open.
@@ -137,7 +137,7 @@ def test_curbs_and_obstacles_are_where_they_are(name: str, project_root: Path,
         part = obstacle.occupancy_at_time(0).shape.shapely_object
         inside = shapely.union_all(cells[tree.query(part, predicate='intersects')])
         assert part.difference(inside).area < 1e-6
-    # Nothing across the middle of the ends.
+    # There is no curb across the middle of the ends.
     middles = shapely.line_interpolate_point(shapely.get_parts(open_ends), 0.5, normalized=True)
     middles = middles[shapely.distance(middles, edge) < slack]
     assert len(middles) > 1
@@ -159,7 +159,7 @@ def test_a_straight_road_cell_by_cell() -> None:
 
 def test_closed_ends_and_lanes_that_end() -> None:
     """
-    An end is open where nothing leads on; a lane that ends beside one that goes on has a curb.
+    An end of the road is open; a lane that ends beside one that goes on has a curb.
 
     Lanelet 1 goes on as 2; lanelet 3 beside 1 ends at x = 50.
     """
@@ -207,7 +207,7 @@ def test_projected_coordinates_move_the_map_only() -> None:
 
 
 def test_drawing_against_each_cell_alone() -> None:
-    """Random polygons with holes: quartering gives what testing cell after cell gives."""
+    """Random polygons with holes: quartering gives the same cells as tests of each cell."""
     random = np.random.default_rng(6)
     for _ in range(20):
         shape = shapely.Point(*random.uniform(0, 8, 2)).buffer(random.uniform(0.5, 4)).difference(
@@ -221,7 +221,7 @@ def test_drawing_against_each_cell_alone() -> None:
 
 
 def by_map_server_rules(path: Path) -> tuple[NDArray[np.int8], dict[str, object]]:
-    """Read a map as the documentation of map_server has it, with Pillow and PyYAML only."""
+    """Read a map by the documentation of map_server, with Pillow and PyYAML only."""
     values = yaml.safe_load(path.read_text())
     grey = np.asarray(Image.open(path.parent / values['image']), dtype=float)
     p = grey / 255.0 if values['negate'] else (255.0 - grey) / 255.0
@@ -233,7 +233,7 @@ def by_map_server_rules(path: Path) -> tuple[NDArray[np.int8], dict[str, object]
 
 
 def test_each_file_is_a_map_for_map_server(tmp_path: Path, project_root: Path) -> None:
-    """Index and tiles read by its rules: nothing unknown, the same cells in the same places."""
+    """Index and tiles read by its rules: no unknown cells, the same cells in the same places."""
     loaded = load_scenario(project_root / 'scenarios' / 'ZAM_ParkedCars-1_1_T-1.xml')
     raster = Raster(loaded, RasterSpec(resolution=0.2, tile=40.0))
     written = write_map(raster, tmp_path / 'map', loaded.benchmark_id)
@@ -255,7 +255,7 @@ def test_each_file_is_a_map_for_map_server(tmp_path: Path, project_root: Path) -
     assert len(tiles) == np.sum(index == 100) == written.tiles
     np.testing.assert_array_equal(found, grid.occupied)
     assert written.cells == grid.occupied.sum()
-    # And read back by ourselves.
+    # The package reads the map back, too.
     occupancy = TiledOccupancy(tmp_path / 'map')
     left, low, right, high = occupancy.bounds
     assert (right - left, high - low) == pytest.approx(written.size)
@@ -265,7 +265,7 @@ def test_each_file_is_a_map_for_map_server(tmp_path: Path, project_root: Path) -
 
 
 def test_the_same_scenario_gives_the_same_bytes(tmp_path: Path, project_root: Path) -> None:
-    """Twice, into two folders."""
+    """Two runs into two folders."""
     path = project_root / 'scenarios' / 'ZAM_TJunction-1_1_T-1.xml'
     for name in ('a', 'b'):
         write_map(Raster(load_scenario(path), RasterSpec()), tmp_path / name, 'T')
@@ -302,13 +302,13 @@ def test_cars_on_the_road_touch_no_curb_a_cell_away(project_root: Path) -> None:
     ({'curb_width': math.inf}, '--curb-width: is inf')],
     ids=['no resolution', 'nan', 'negative', 'not whole', 'too many', 'infinite'])
 def test_specs_that_are_refused(values: dict[str, float], message: str) -> None:
-    """The option, its value, and what would be right."""
+    """The message names the option, its value, and the valid values."""
     with pytest.raises(InputError, match=message):
         RasterSpec(**values)
 
 
 def test_maps_that_are_refused() -> None:
-    """Nothing to draw, or too many tiles to list."""
+    """Maps without anything to draw, or with too many tiles to list."""
     with pytest.raises(InputError, match='x: has nothing to draw'):
         Raster(road(straight(1, (0.0, 50.0), 0.0)), RasterSpec(curbs=False))
     far = road(straight(1, (0.0, 50.0), 0.0),
@@ -337,7 +337,7 @@ occupancy_command.write_map(raster, Path(sys.argv[2]), 'T', progress=progress)
 @pytest.mark.slow
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGINT], ids=['killed', 'interrupted'])
 def test_killed_while_writing(tmp_path: Path, project_root: Path, number: signal.Signals) -> None:
-    """With the first of its tiles written, nothing is at the place of the map; nor is a part."""
+    """With only the first tile written, there is no map at its place, and no part of one."""
     out = tmp_path / 'maps' / 'map'
     process = subprocess.Popen(
         [sys.executable, '-c', SLOW,

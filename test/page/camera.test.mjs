@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The camera: the map and the canvas agree, and what the hand holds stays where it is. */
+/** The camera: map and canvas agree, and the point under the hand stays in place. */
 
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
@@ -36,7 +36,7 @@ test('north up: east is right and north is up, at so many pixels a metre', () =>
   close([x - 400, 300 - y], [camera.scale, 3 * camera.scale]);
 });
 
-test('the map under a point of the canvas is what is drawn there, however it is turned', () => {
+test('a canvas point and its map point agree, for any rotation', () => {
   const camera = made();
   camera.lookAt(3000, -70, false);
   for (const angle of [0, 0.3, 2, -1.1]) {
@@ -45,7 +45,7 @@ test('the map under a point of the canvas is what is drawn there, however it is 
   }
 });
 
-test('a box is shown whole, as large as fits, in the middle', () => {
+test('a box is shown whole, as large as possible, in the middle', () => {
   const camera = made();
   camera.fit(BOX, false);
   // 400 m in 92 % of 800 px.
@@ -56,7 +56,7 @@ test('a box is shown whole, as large as fits, in the middle', () => {
   close(camera.scale, 0.92 * 600 / 10);
 });
 
-test('what is covered from below is not counted', () => {
+test('the covered lower part of the canvas is not used', () => {
   const camera = made();
   camera.resize(WIDTH, HEIGHT, 200);
   camera.fit([0, 0, 100, 100], false);
@@ -82,7 +82,7 @@ test('the scale has its limits', () => {
   close(camera.scale, 0.02);
 });
 
-test('the hand takes the map along, turned or not', () => {
+test('dragging moves the map with the hand, turned or not', () => {
   const camera = made();
   camera.fit(BOX, false);
   for (const angle of [0, 0.7, -2]) {
@@ -93,7 +93,7 @@ test('the hand takes the map along, turned or not', () => {
   }
 });
 
-test('turning by a right angle about a point: what was right of it is above it', () => {
+test('a turn by a right angle moves a point from right of the centre to above it', () => {
   const camera = made();
   camera.fit(BOX, false);
   const [pivot, aside] = [camera.toMap(200, 300), camera.toMap(250, 300)];
@@ -102,7 +102,7 @@ test('turning by a right angle about a point: what was right of it is above it',
   close(onCanvas(camera, ...aside), [200, 250], 1e-9);
 });
 
-test('followed with its heading up, a vehicle drives upwards, four fifths down', () => {
+test('a vehicle followed heading up drives upwards at four fifths of the height', () => {
   const camera = made();
   const yaw = 0.4;
   camera.beginFollowing({ x: 50, y: 60, yaw, speed: 0 }, true, true, false);
@@ -118,13 +118,13 @@ test('followed with its heading up, a vehicle drives upwards, four fifths down',
   assert.ok(!camera.headingUp, 'whoever turns the map by hand wants it so');
 });
 
-test('the faster it is, the more road is shown', () => {
+test('more road is shown at higher speed', () => {
   const camera = made();
   camera.beginFollowing({ x: 0, y: 0, yaw: 0, speed: 25 }, true, true, false);
   close(camera.scale, 600 / (70 + 2.8 * 25));
 });
 
-test('gliding: after 90 ms the way is done but for 1/e, and then it ends exactly', () => {
+test('gliding: after 90 ms 1/e of the way remains, and it ends exactly', () => {
   const camera = made();
   camera.lookAt(0, 0, false);
   camera.update(1000);
@@ -158,7 +158,7 @@ test('turning back to north takes the shortest way', () => {
   close(Math.abs(camera.up - Math.PI / 2), (2 * Math.PI - 6) / 2, 1e-9);
 });
 
-test('who wants no motion gets none', () => {
+test('with reduced motion the camera does not glide', () => {
   still = true;
   const camera = made();
   camera.lookAt(300, 0);
@@ -173,7 +173,7 @@ test('a canvas that changes its size keeps the map where it is', () => {
   close(onCanvas(camera, ...corner), [500, 0], 1e-9);
 });
 
-test('what can be seen: the corners of the canvas bound it', () => {
+test('the visible area is bounded by the corners of the canvas', () => {
   const camera = made();
   camera.lookAt(10, 20, false);
   for (const angle of [0, 0.5, 1.9, -2.5]) {
@@ -186,7 +186,7 @@ test('what can be seen: the corners of the canvas bound it', () => {
   }
 });
 
-test('seeing: by radius and by box, and nobody who is absent', () => {
+test('visibility is checked by radius and by box; absent vehicles are not visible', () => {
   const camera = made();
   camera.lookAt(0, 0, false);
   const { right } = camera;
@@ -201,7 +201,7 @@ test('seeing: by radius and by box, and nobody who is absent', () => {
   assert.ok(!camera.seesBox([0, bottom - 9, 1, bottom - 1]));
 });
 
-/** Where a context that was set up draws a point. */
+/** Compute where a context that was set up draws a point. */
 const drawnAt = ([a, b, c, d, e, f], x, y) => [a * x + c * y + e, b * x + d * y + f];
 
 test('a context draws in metres around a point, and at a pose', () => {
@@ -222,7 +222,7 @@ test('a context draws in metres around a point, and at a pose', () => {
 
 const SCENE = { id: 'a', bounds: BOX, vehicles: [{ id: 'hv0' }, { id: 'av0' }] };
 
-test('following goes round all driven vehicles', () => {
+test('following cycles through all driven vehicles', () => {
   const navigation = new Navigation(made(), () => {});
   navigation.load(SCENE, true);
   const followed = [navigation.followed];
@@ -237,7 +237,7 @@ test('following goes round all driven vehicles', () => {
   assert.equal(navigation.followed, 'hv0');
 });
 
-test('the same map once more keeps the view, another one is shown whole', () => {
+test('the same map again keeps the view; another map is shown whole', () => {
   const camera = made();
   const navigation = new Navigation(camera, () => {});
   navigation.load(SCENE, false);
@@ -267,7 +267,7 @@ test('keys glide, and hands do not', () => {
   [true, true, true, false, false, false, false]);
 });
 
-test('a hand zooms about itself, but about the vehicle while one is followed', () => {
+test('zooming is about the hand, or about the followed vehicle', () => {
   const camera = made();
   const navigation = new Navigation(camera, () => {});
   navigation.load(SCENE, false);
@@ -280,7 +280,7 @@ test('a hand zooms about itself, but about the vehicle while one is followed', (
   close(onCanvas(camera, 7, 8), [400, 300], 1e-9);
 });
 
-test('heading up and north up take turns; without a vehicle there is only north', () => {
+test('heading up and north up alternate; without a vehicle only north up exists', () => {
   still = true;
   const camera = made();
   const navigation = new Navigation(camera, () => {});
@@ -300,7 +300,7 @@ test('heading up and north up take turns; without a vehicle there is only north'
   assert.deepEqual([navigation.headingUp, camera.up], [false, Math.PI / 2]);
 });
 
-test('bringing a vehicle back chooses the scale anew, following it once more does not', () => {
+test('bringing a vehicle back chooses a new scale; following it again does not', () => {
   const camera = made();
   const navigation = new Navigation(camera, () => {});
   navigation.load(SCENE, true);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** A recorded run: its chunks, the frames and documents that hold at a time. */
+/** A recorded run: its chunks, and the frames and documents that are valid at a time. */
 
 import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
@@ -26,7 +26,7 @@ function packed(...frames) {
   return bytes.buffer;
 }
 
-/** Answer what the page fetches; gives the list of what was asked for. */
+/** Answer the page's fetches; return the list of requested addresses. */
 function serve(t, answer) {
   const asked = [];
   t.mock.method(globalThis, 'fetch', async (address) => {
@@ -49,7 +49,7 @@ test('frames are unpacked as they were packed', () => {
   assert.deepEqual(unpack(new ArrayBuffer(0)), []);
 });
 
-test('which chunk holds a time', () => {
+test('the chunk that holds a time', () => {
   const chunks = new Chunks(INFO, () => {}, () => {});
   assert.deepEqual([-9, 0.5, 5.4999, 5.5, 10.49, 9999].map((t) => chunks.numberAt(t)),
     [0, 0, 0, 1, 1, 99]);
@@ -64,7 +64,7 @@ test('a refusal of the server becomes an error with its reason', async (t) => {
   assert.deepEqual(asked, ['/api/replay/info?epoch=7', '/api/replay/chunk']);
 });
 
-test('what is wanted is fetched once, and from when on each frame is seen', async (t) => {
+test('wanted chunks are fetched once, and each frame counts from its time on', async (t) => {
   const plan = frameOf(KIND.PLAN, 3, 60, 6, 0.6, 2, 0);
   const scan = frameOf(KIND.SCAN, 3, 61, 6, 0.61, 1, 4);
   const asked = serve(t, () => new Response(packed(
@@ -78,12 +78,12 @@ test('what is wanted is fetched once, and from when on each frame is seen', asyn
   await soon();
   assert.deepEqual(asked, ['/api/replay/chunk?i=0&epoch=3', '/api/replay/chunk?i=1&epoch=3']);
   assert.deepEqual([loaded, chunks.size], [2, 2]);
-  // A plan is seen from the state after which it came on, and nothing before what comes first.
+  // A plan counts from the state after which it came; nothing counts before the first frame.
   assert.deepEqual(chunks.get(0).map(({ at, slot }) => [at, slot]),
     [[0.65, '1'], [0.65, '3:2'], [0.65, '5:1:4']]);
 });
 
-test('twelve chunks are kept, those used last', async (t) => {
+test('the twelve chunks used last are kept', async (t) => {
   const asked = serve(t, () => new Response(packed()));
   const chunks = new Chunks(INFO, () => {}, assert.fail);
   for (const number of [...Array(12).keys(), 0, 12]) {
@@ -96,7 +96,7 @@ test('twelve chunks are kept, those used last', async (t) => {
   assert.ok(chunks.get(0) !== undefined && chunks.get(1) === undefined);
 });
 
-test('what failed is asked for again after a second', async (t) => {
+test('a failed fetch is repeated after a second', async (t) => {
   let now_ms = 1000;
   t.mock.method(performance, 'now', () => now_ms);
   const asked = serve(t, () => Response.json({ error: 'damaged' }, { status: 404 }));
@@ -136,19 +136,19 @@ function recordedRun(t) {
   return { store, feed: new ReplayFeed(store, info, { loaded() {}, refused: assert.fail }) };
 }
 
-test('before a chunk has come nothing is shown, then exactly its time', async (t) => {
+test('nothing is shown until the chunk has arrived, then exactly its time', async (t) => {
   const { store, feed } = recordedRun(t);
   assert.ok(Number.isNaN(feed.show(2)));
   await soon();
   await soon();
   assert.equal(feed.show(2), 2);
   store.useTimeSource(() => 2.004);
-  // Between two states, of which the later one has been given too: x = 100 t.
+  // Between two states, the later of which has arrived too: x = 100 t.
   assert.equal(feed.show(2.004), 2.004);
   close(store.displayed(1).vehicles[0], 200.4, 1e-9);
 });
 
-test('after a jump only what still counts is there, and half a second of states', async (t) => {
+test('after a jump only valid frames and half a second of states remain', async (t) => {
   const { store, feed } = recordedRun(t);
   feed.show(0);
   await soon();
@@ -162,7 +162,7 @@ test('after a jump only what still counts is there, and half a second of states'
   close(store.latest.t, 2.01, 1e-9);
 });
 
-test('going on gives all states, over the border of two chunks', async (t) => {
+test('playing on gives all states across the border of two chunks', async (t) => {
   const { store, feed } = recordedRun(t);
   feed.show(4.9);
   await soon();
@@ -176,7 +176,7 @@ test('going on gives all states, over the border of two chunks', async (t) => {
   assert.deepEqual(expected.filter((n) => !seen.has(n)), []);
 });
 
-test('the past of a vehicle comes from the outline, and a minute of what follows', async (t) => {
+test('the outline gives the past of a vehicle and the following minute', async (t) => {
   const { feed } = recordedRun(t);
   feed.show(5);
   await soon();
@@ -199,7 +199,7 @@ function documentsOf(documents) {
 const now = (time, more) => (
   { t: time, n: Math.round(100 * time), k: 0, run: 'running', speed: 2, ...more });
 
-test('the documents that hold at a time, forward and back', () => {
+test('the documents that are valid at a time, forward and back', () => {
   const { store, shown } = documentsOf({
     signals: [[1, { k: 10, states: { 5: 'red' } }], [2, { k: 20, states: { 5: 'green' } }]],
     frames_skipped: [[1.5, true]], timing: [[1, { final_error_ms: 7 }]],
@@ -217,7 +217,7 @@ test('the documents that hold at a time, forward and back', () => {
   assert.deepEqual([store.status.frames_skipped, store.status.timing], [false, null]);
 });
 
-test('each document is told once while it holds, the status five times a second', () => {
+test('each valid document is sent once, the status five times a second', () => {
   const { told, shown } = documentsOf({ signals: [[1, { k: 10, states: {} }]] });
   for (let now_ms = 0; now_ms <= 1000; now_ms += 20) {
     shown.show(now(1 + now_ms / 1000), now_ms, false);
@@ -229,7 +229,7 @@ test('each document is told once while it holds, the status five times a second'
   assert.equal(times('status'), 7, 'that it stands still is told at once');
 });
 
-test('nobody on this page held a seat of a recorded run', () => {
+test('this page holds no seat of a recorded run', () => {
   const { store, shown } = documentsOf({ seats: [[0, { seats: {
     hv0: { source: 'cockpit', driver: 'cockpit', holder: 'c1', holder_name: 'Ada' } } }]] });
   shown.show(now(1), 0, true);
@@ -237,7 +237,7 @@ test('nobody on this page held a seat of a recorded run', () => {
     holder_name: '', requests: [], lost: false });
 });
 
-test('after a jump the status of the last two minutes is told for the plots, then that of now',
+test('after a jump the plots get the status of the last two minutes, then the present one',
   () => {
     const planners = [...Array(300).keys()].map((second) => [second, {}]);
     const { told, shown } = documentsOf({ planners });
@@ -247,7 +247,7 @@ test('after a jump the status of the last two minutes is told for the plots, the
     assert.deepEqual([times[0], times.at(-2), times.at(-1), times.length], [81, 199, 200, 120]);
   });
 
-test('the status of a recording says how fast it is shown', () => {
+test('the status of a recording has its playback speed', () => {
   const { store, shown } = documentsOf({});
   shown.show(now(1), 0, true);
   assert.deepEqual([store.status.real_time_factor, store.status.measured_factor], [2, 2]);

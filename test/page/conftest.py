@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tools of the tests here can be imported by them."""
+"""Make the tools of this folder importable by its tests."""
 
 from pathlib import Path
 import sys

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The connection: replies find who asked, and a broken one comes back. */
+/** The connection: replies reach their requests, and a broken one is restored. */
 
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
@@ -9,7 +9,7 @@ import { Connection } from '../../crgame_ros/cockpit/page/js/connection.js';
 import { InputSender } from '../../crgame_ros/cockpit/page/js/driving/sender.js';
 import { frameOf } from './support.mjs';
 
-/** A server that does what a test says. */
+/** A server that a test controls. */
 class FakeSocket extends EventTarget {
   static OPEN = 1;
   static all = [];
@@ -77,7 +77,7 @@ test('documents and frames go to the store', () => {
   assert.deepEqual(told, [true, { type: 'signals', k: 1 }, frame]);
 });
 
-test('each reply finds its request, in whatever order they come', async () => {
+test('each reply reaches its request, in any order', async () => {
   const { connection, socket } = connected();
   const replies = [1, 2].map((factor) => connection.request({ type: 'rate', factor }));
   const [first, second] = socket.sent;
@@ -88,7 +88,7 @@ test('each reply finds its request, in whatever order they come', async () => {
     [[false, 'first'], [true, 'second']]);
 });
 
-test('no answer within ten seconds is one, and so is a broken connection', async (t) => {
+test('a missing answer within ten seconds or a broken connection is a refusal', async (t) => {
   const { connection, socket } = connected();
   const late = connection.request({ type: 'trigger', event: 'a' });
   t.mock.timers.tick(10_000);
@@ -100,7 +100,7 @@ test('no answer within ten seconds is one, and so is a broken connection', async
     'There is no connection to the simulation.');
 });
 
-test('it comes back after 0.25 s, then after twice as long each time, up to 2 s', (t) => {
+test('it reconnects after 0.25 s, then after twice as long each time, up to 2 s', (t) => {
   const { socket, told } = connected();
   socket.close();
   assert.deepEqual(told, [true, false]);
@@ -121,7 +121,7 @@ test('it comes back after 0.25 s, then after twice as long each time, up to 2 s'
   assert.equal(FakeSocket.all.length, count + 1, 'the waits begin anew');
 });
 
-test('closed for good it does not', (t) => {
+test('a closed connection does not reconnect', (t) => {
   const { connection } = connected();
   connection.close();
   t.mock.timers.tick(60_000);
@@ -139,7 +139,7 @@ test('the answer time is measured once a second', (t) => {
   assert.equal(store.round_trip_ms, 42);
 });
 
-test('hands are sent at each change and twenty times a second, hands off once', (t) => {
+test('input is sent at each change and twenty times a second, hands off once', (t) => {
   const sent = [];
   let hands = { keys: [0, 0, 0, 0], reverse: 0 };
   const sender = new InputSender({ send: (message) => sent.push(message) }, () => hands);
@@ -151,7 +151,7 @@ test('hands are sent at each change and twenty times a second, hands off once', 
   hands = { keys: [1, 0, 0, 0], reverse: 0 };
   sender.update();
   assert.equal(sent.length, 2);
-  // At 250 and each 50 ms on up to 450.
+  // At 250 ms and every 50 ms up to 450 ms.
   t.mock.timers.tick(250);
   assert.equal(sent.length, 7);
   hands = { away: true };

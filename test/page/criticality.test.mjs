@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What is left to vehicles: as it came, at a time, and at worst. */
+/** Criticality of vehicles: as received, at a time, and at worst. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -21,12 +21,12 @@ const logOf = (keeps_s, ...frames) => {
   return log;
 };
 
-test('a frame has a row for each vehicle, a value and somebody for each measure', () => {
+test('a frame has a row per vehicle, with a value and another vehicle per measure', () => {
   const { kind, rows } = decodeFrame(frame(10, row(0, { ttc: 4 }), row(1, { drac: 2 })));
   assert.deepEqual([kind, rows.length], [KIND.CRITICALITY, 2 * CRITICALITY_WIDTH]);
 });
 
-test('values over time are NaN where there is nothing', () => {
+test('missing values over time are NaN', () => {
   const log = logOf(100, frame(10, row(0, { ttc: 4 })), frame(20, row(1, { ttc: 9 })),
     frame(30, row(0, { ttc: 3 })));
   const { t, values } = log.past(0, 'ttc');
@@ -34,7 +34,7 @@ test('values over time are NaN where there is nothing', () => {
   close(values, [4, NaN, 3]);
 });
 
-test('at a time counts the step before it, unless it is long ago', () => {
+test('the values at a time are those of the step before it, unless it is too old', () => {
   const log = logOf(100, frame(10, row(0, { ttc: 4 })), frame(20, row(0, { ttc: 3 })));
   assert.deepEqual(log.at(0.19, 0, 'ttc'), { value: 4, of: 2 });
   assert.deepEqual(log.at(0.2, 0, 'ttc'), { value: 3, of: 2 });
@@ -43,7 +43,7 @@ test('at a time counts the step before it, unless it is long ago', () => {
   assert.equal(log.at(0.2, 0, 'gap'), null);
 });
 
-test('the worst is the smallest, of decelerations the greatest, and not of the future', () => {
+test('the worst past value is the smallest, for decelerations the greatest', () => {
   const log = logOf(100, frame(10, row(0, { ttc: 4, drac: 1 })),
     frame(20, row(0, { ttc: 2, drac: 3 })), frame(30, row(0, { ttc: 1, drac: 5 })));
   assert.deepEqual(log.worst(0.2, 0, 'ttc'), { value: 2, of: 2, t: 0.2 });
@@ -51,14 +51,14 @@ test('the worst is the smallest, of decelerations the greatest, and not of the f
   assert.equal(log.worst(0.2, 1, 'ttc'), null);
 });
 
-test('a step that comes again replaces what was known from it on, old ones are forgotten', () => {
+test('a repeated step replaces all values from it on, and old values are dropped', () => {
   const log = logOf(0.15, ...[10, 20, 30, 20].map((n) => frame(n, row(0, { ttc: n }))));
   close(log.past(0, 'ttc').values, [20]);
   log.take(decodeFrame(frame(30, row(0, { ttc: 7 }))));
   close(log.past(0, 'ttc').values, [20, 7]);
 });
 
-test('of a replay it comes when somebody looks, once', () => {
+test('a replay fetches it once, when the panel is opened', () => {
   let asked = 0;
   const log = new CriticalityLog(Infinity, () => { asked += 1; });
   log.want();
@@ -66,7 +66,7 @@ test('of a replay it comes when somebody looks, once', () => {
   assert.equal(asked, 1);
 });
 
-test('a reset forgets it, a jump in a replay does not', () => {
+test('a reset clears it, a jump in a replay does not', () => {
   for (const [mode, left] of [['live', 0], ['replay', 1]]) {
     const store = new Store();
     store.receive({ type: 'hello', client: 'c', name: '', mode, version: '' });
@@ -76,7 +76,7 @@ test('a reset forgets it, a jump in a replay does not', () => {
   }
 });
 
-test('limits are those that the node tells, else the usual ones', () => {
+test('limits come from the node, else the defaults hold', () => {
   assert.deepEqual(limitsOf(null), { ttc: 3, drac: 3, pet: 2 });
   const told = { criticality: { hv0: { thresholds: { ttc: 2.5, drac: null } } } };
   assert.deepEqual(limitsOf(told), { ttc: 2.5, drac: 3, pet: 2 });

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Gamepads, wheels and keys: what their raw values mean, and how that is found out. */
+/** Gamepads, wheels and keys: the meaning of their raw values, and its calibration. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -17,14 +17,14 @@ const axis = (index, more) => (
   { kind: 'axis', index, min: -1, max: 1, invert: false, deadzone: 0, ...more });
 const axes = (...values) => ({ axes: values, buttons: [] });
 
-test('a pedal over its range, and the other way round', () => {
+test('a pedal over its range, normal and inverted', () => {
   const pedal = (value, more) => pedalValue(axes(value), axis(0, more));
   close([-1, -0.5, 0, 1, 2, -2].map((value) => pedal(value)), [0, 0.25, 0.5, 1, 1, 0]);
-  // As Logitech's: +1 is at rest.
+  // A Logitech pedal rests at +1.
   close([1, 0.5, -1].map((value) => pedal(value, { invert: true })), [0, 0.25, 1]);
 });
 
-test('a dead zone is cut off, and what remains stretched to the full way', () => {
+test('a dead zone is cut off, and the rest is stretched to the full range', () => {
   const control = { kind: 'button', index: 0, min: 0, max: 1, invert: false, deadzone: 0.2 };
   const pedal = (value) => pedalValue({ axes: [], buttons: [value] }, control);
   close([0.1, 0.2, 0.6, 1].map(pedal), [0, 0, 0.5, 1]);
@@ -50,21 +50,21 @@ test('gears: paddles, a button that changes, and a lever that is held', () => {
   assert.deepEqual([after(false, 4), after(true, 4), after(true, 5), after(false, 5)],
     [true, true, false, false]);
   assert.deepEqual([after(false, 6), after(true, 6)], [true, false]);
-  // Letting go changes nothing but the lever; other buttons change nothing.
+  // A release changes only the lever; other buttons change nothing.
   assert.deepEqual([after(true, 6, false), after(true, 9), after(false, 9)], [true, true, false]);
   assert.deepEqual([after(false, 18), after(true, 18, false)], [true, false]);
 });
 
 const pad = (id, resting, more) => ({ id, mapping: '', axes: resting, buttons: [], ...more });
 
-test('pedals of a wheel that nobody has calibrated', () => {
+test('pedals of an uncalibrated wheel', () => {
   const pedals = (...given) => {
     const { throttle, brake } = defaultProfile(pad(...given));
     return [throttle.index, brake.index];
   };
   assert.deepEqual(pedals('G29 (Vendor: 046d Product: c24f)', [0, 0, 1, 1]), [2, 3]);
   assert.deepEqual(pedals('G920 (Vendor: 046d Product: c262)', [0, 1, 1, 0]), [1, 2]);
-  // Of unknown ones those are pedals that rest at +1; of three the first is a clutch.
+  // Axes of unknown wheels that rest at +1 are pedals; the first of three is a clutch.
   assert.deepEqual(pedals('X', [0, 0, 0, 1, 1]), [3, 4]);
   assert.deepEqual(pedals('X', [0, 1, 1, 1]), [2, 3]);
   assert.deepEqual(pedals('X', [0, 0, 0]), [1, 2]);
@@ -77,7 +77,7 @@ test('a standard gamepad: its stick and triggers', () => {
   assert.equal(profile.steering.index, 0);
 });
 
-test('a calibration is kept for its device, and what is broken is not taken', (t) => {
+test('a calibration is kept for its device, and a broken one is ignored', (t) => {
   const kept = keepStorage();
   const wheel = pad('X', [0, 1, 1]);
   const own = defaultProfile(wheel);
@@ -96,7 +96,7 @@ test('a calibration is kept for its device, and what is broken is not taken', (t
   assert.equal(kept.size, 0);
 });
 
-test('calibrations of another page are kept, but for what is none', (t) => {
+test('valid calibrations of another page are kept', (t) => {
   const kept = keepStorage();
   t.mock.method(console, 'warn', () => {});
   const own = defaultProfile(pad('X', [0, 1, 1]));
@@ -105,7 +105,7 @@ test('calibrations of another page are kept, but for what is none', (t) => {
   assert.deepEqual(loadProfile(pad('X', [0, 1, 1])).profile, own);
 });
 
-/** Move something there and back, slowly enough for each step to end by itself. */
+/** Move a control there and back, slowly enough for each step to end by itself. */
 class Hands {
   now_ms = 0;
 
@@ -125,7 +125,7 @@ class Hands {
 
   move(part, index, to) {
     const from = this.sample[part][index];
-    // A pedal does not jump: a first value far from 0 is one that had not been told before.
+    // A pedal does not jump: a first value far from 0 had not been reported before.
     this.hold(part, index, from + 0.4 * (to - from));
     this.hold(part, index, to);
     this.hold(part, index, from, 700);
@@ -144,7 +144,7 @@ function calibrated(rest, moves) {
   return run;
 }
 
-test('calibrating a wheel: each step ends by itself with what was moved', () => {
+test('calibrating a wheel: each step ends by itself with the moved control', () => {
   const run = calibrated({ axes: [0.02, 0, 1, 1], buttons: [0, 0, 0, 0, 0, 0] }, [
     ['left', 'axes', 0, -0.9], ['right', 'axes', 0, 0.95], ['throttle', 'axes', 2, -1],
     ['brake', 'axes', 3, -0.8], ['reverse', 'buttons', 1, 1], ['left_indicator', 'buttons', 2, 1],
@@ -152,7 +152,7 @@ test('calibrating a wheel: each step ends by itself with what was moved', () => 
     ['put_back', 'buttons', 5, 1]]);
   assert.equal(run.step, 'test');
   assert.deepEqual(run.profile.put_back, [5]);
-  // Button 3 was the hazard lights' by default, and does one thing alone now.
+  // Button 3 was the default for hazard lights, and now has one function only.
   assert.deepEqual(run.profile.lights,
     { left_indicator: [2], right_indicator: [3], hazard: [4], horn: [0] });
   const { steering, throttle, brake, reverse } = run.profile;
@@ -162,13 +162,13 @@ test('calibrating a wheel: each step ends by itself with what was moved', () => 
     [2, -1, 1, true]);
   assert.deepEqual([brake.index, brake.min, brake.max, brake.invert], [3, -0.8, 1, true]);
   assert.deepEqual(reverse.toggle, [1]);
-  // What is found means what was meant.
+  // The result gives the intended commands.
   close(steeringValue({ axes: [-0.9], buttons: [] }, steering), 1);
   close(pedalValue({ axes: [0, 0, -1], buttons: [] }, throttle), 1);
   close(pedalValue({ axes: [0, 0, 1], buttons: [] }, throttle), 0);
 });
 
-test('a pedal that reads 0 until it is touched rests where its first value is', () => {
+test('a pedal that reads 0 until it is touched rests at its first value', () => {
   const run = new CalibrationRun(defaultProfile(pad('X', [0, 0, 0])));
   const hands = new Hands(run, { axes: [0, 0, 0], buttons: [] });
   run.feed(hands.sample, 0);
@@ -193,7 +193,7 @@ test('both pedals on one axis: the brake is its other direction', () => {
   assert.deepEqual([brake.min, brake.max, brake.invert], [-1, 0, true]);
 });
 
-test('what trembles, or belongs to another control, is not found', () => {
+test('axes that tremble or belong to another control are not chosen', () => {
   const run = new CalibrationRun(defaultProfile(pad('X', [0, 0, 0])));
   const hands = new Hands(run, { axes: [0, 0, 1], buttons: [0] });
   run.feed(hands.sample, 0);
@@ -207,12 +207,12 @@ test('what trembles, or belongs to another control, is not found', () => {
   assert.deepEqual([run.found.kind, run.found.index], ['axis', 0]);
   hands.hold('axes', 0, 0, 700);
   assert.equal(run.step, 'right');
-  // Right is on the axis of left, whatever else moves more.
+  // Right is on the axis of left, even if another axis moves more.
   hands.hold('axes', 2, -1);
   assert.equal(run.found, null);
 });
 
-test('skipping keeps what was there', () => {
+test('skipping a step keeps the previous binding', () => {
   const before = defaultProfile(pad('X', [0, 1, 1]));
   const run = new CalibrationRun(before);
   run.feed({ axes: [0, 1, 1], buttons: [] }, 0);
@@ -224,7 +224,7 @@ test('skipping keeps what was there', () => {
   assert.deepEqual(run.profile, before);
 });
 
-test('who asks in vain to be put back is told so, once', (t) => {
+test('a refused request to be put back is reported once', (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   /** @type {string[]} */
   const told = [];
@@ -233,7 +233,7 @@ test('who asks in vain to be put back is told so, once', (t) => {
   const store = /** @type {any} */ ({ fired: [], status: { run: 'running' },
     receive: (/** @type {{text: string}} */ message) => told.push(message.text) });
   const notice = new PutBackNotice(store);
-  /** @param {object[]} before @param {object[]} after what has happened when it asks, and then */
+  /** @param {object[]} before @param {object[]} after events at the request, and later */
   const ask = (before, after) => {
     store.fired = before;
     notice.take('hv0', true);

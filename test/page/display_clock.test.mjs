@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Which simulation time the page shows, for arrivals that are known. */
+/** The simulation time that the page shows, for known arrivals. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -8,7 +8,7 @@ import { test } from 'node:test';
 import { DisplayClock } from '../../crgame_ros/cockpit/page/js/display_clock.js';
 import { close } from './support.mjs';
 
-/** Let samples arrive: every 10 ms of simulation, at times that a function gives. */
+/** Make samples arrive: every 10 ms of simulation, at times that a function gives. */
 function fed(arrival_ms, count = 100, factor = 1) {
   const clock = new DisplayClock();
   clock.factor = factor;
@@ -25,8 +25,8 @@ test('even arrivals: one period and the guard of a millisecond behind', () => {
   close(clock.time(1994, 0.99, true), 0.983, 1e-9);
 });
 
-test('jitter is waited for: its mean and two standard deviations', () => {
-  // Every other one is late by 6 ms: lateness 0 or 6, mean 3, deviation 3.
+test('the delay covers the mean jitter and two standard deviations', () => {
+  // Every second sample is late by 6 ms: lateness 0 or 6, mean 3, deviation 3.
   const clock = fed((i) => 1000 + 10 * i + (i % 2 === 0 ? 0 : 6));
   close(clock.jitter_ms, 3 + 2 * 3, 1e-6);
   // 64 of them span 63 periods, and 6 ms more, as the oldest in the window is in time.
@@ -34,7 +34,7 @@ test('jitter is waited for: its mean and two standard deviations', () => {
   close(clock.delay_ms, clock.period_ms + 9 + 1, 1e-6);
 });
 
-test('half speed is measured, though the clock was told of full speed', () => {
+test('half speed is measured, although full speed was requested', () => {
   const clock = fed((i) => 1000 + 20 * i);
   close(clock.rate, 0.5, 1e-9);
   clock.time(2980, 0.99, true);
@@ -42,19 +42,19 @@ test('half speed is measured, though the clock was told of full speed', () => {
   close(after - before, 0.005, 1e-9);
 });
 
-test('a rate within three per cent of what was asked for is that rate', () => {
+test('a rate within three per cent of the requested one is the requested rate', () => {
   assert.equal(fed((i) => 1000 + 10.2 * i).rate, 1);
   assert.notEqual(fed((i) => 1000 + 10.4 * i).rate, 1);
 });
 
-test('before it has been measured, the rate is what was asked for', () => {
+test('before a measurement the rate is the requested one', () => {
   // Eight samples over at least 150 ms measure it.
   assert.equal(fed((i) => 1000 + 40 * i, 7, 2).rate, 2);
   assert.equal(fed((i) => 1000 + 10 * i, 15, 2).rate, 2);
   close(fed((i) => 1000 + 10 * i, 16, 2).rate, 1);
 });
 
-test('after a stall of up to 80 ms the time has never gone back', () => {
+test('the time never goes back after a stall of up to 80 ms', () => {
   for (const stall_ms of [20, 40, 80]) {
     const clock = fed((i) => 1000 + 10 * i);
     let last = -Infinity;
@@ -76,11 +76,11 @@ test('after a stall of up to 80 ms the time has never gone back', () => {
   }
 });
 
-test('an error is taken back with a time constant of a quarter of a second', () => {
+test('an error is corrected with a time constant of a quarter of a second', () => {
   const clock = new DisplayClock();
   clock.arrived(0, 1000);
   close(clock.time(1011, 0, true), 0);
-  // The second comes 29 ms earlier after the first than its time says: lateness 29 and 0 ms, so
+  // The second arrives 29 ms too early after the first: lateness 29 and 0 ms, so
   // jitter 14.5 + 2 * 14.5, period 21 and guard 1: it should run 65.5 ms behind.
   clock.arrived(0.05, 1021);
   close(clock.delay_ms, 65.5, 1e-9);
@@ -103,7 +103,7 @@ test('while the simulation stands still, the newest is shown', () => {
   assert.equal(clock.time(9000, 0.99, false), 0.99);
 });
 
-test('after a silence, or a time that goes back, it measures anew', () => {
+test('after a silence, or a time that goes back, it measures again', () => {
   const clock = fed((i) => 1000 + 20 * i);
   clock.arrived(1, 10_000);
   assert.deepEqual([clock.rate, clock.jitter_ms], [1, 0]);
@@ -111,7 +111,7 @@ test('after a silence, or a time that goes back, it measures anew', () => {
   close(clock.time(10_010, 0.5, true), 0.5 - 0.011, 1e-9);
 });
 
-test('reset forgets: the next sample is shown at once', () => {
+test('after a reset the next sample is shown at once', () => {
   const clock = fed((i) => 1000 + 10 * i);
   clock.time(2000, 0.99, true);
   clock.reset();

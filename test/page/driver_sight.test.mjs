@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Whom a driver sees in fog, on the map and in words. */
+/** The vehicles that a driver sees in fog, on the map and in words. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -21,7 +21,7 @@ function rowsAt(width, ...xs) {
 /** The x of each row. */
 const xsOf = (rows, width) => [...rows].filter((_, i) => i % width === 0);
 
-test('who is beyond the range of sight is taken out, and the own vehicle never', () => {
+test('vehicles beyond the range of sight are removed, the own vehicle never', () => {
   const shown = { vehicles: rowsAt(VEHICLE_WIDTH, 1000, 940, 939),
     objects: rowsAt(OBJECT_WIDTH, 1060, 1061, NaN) };
   hideBeyond(shown, 0, 60);
@@ -29,7 +29,7 @@ test('who is beyond the range of sight is taken out, and the own vehicle never',
   assert.deepEqual(xsOf(shown.objects, OBJECT_WIDTH), [1060, NaN, NaN]);
 });
 
-test('from a seat that is not there nobody is taken out', () => {
+test('an absent seat removes no vehicle', () => {
   for (const own of [-1, 1]) {
     const shown = { vehicles: rowsAt(VEHICLE_WIDTH, 0, NaN), objects: rowsAt(OBJECT_WIDTH, 500) };
     hideBeyond(shown, own, 60);
@@ -38,7 +38,7 @@ test('from a seat that is not there nobody is taken out', () => {
   }
 });
 
-test('who sits in a seat, or looks from its eyes, sees as far as air lets them', () => {
+test('a driver, or a view from the driver\'s eyes, has the range of sight of the air', () => {
   const store = { scene: { environment: { visibility: 80 } } };
   const from = (parts) => {
     globalThis.window = { crgame: parts };
@@ -56,7 +56,7 @@ test('who sits in a seat, or looks from its eyes, sees as far as air lets them',
   delete globalThis.window;
 });
 
-test('words tell of nobody whom fog hides', () => {
+test('words name no vehicle that fog hides', () => {
   const body = (id, x) => ({ id, x, y: 0, yaw: 0, speed: 0 });
   const others = [body('car 1', 50), body('car 2', 70), body('car 3', 120)];
   const text = (range) => describeAround(body('hv0', 0), others, true, range);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What eslint asks of the page and of its tests; types are checked by tsc (tsconfig.json). */
+/** Rules of eslint for the page and its tests; tsc checks types (tsconfig.json). */
 
 import js from '@eslint/js';
 import globals from 'globals';
@@ -31,7 +31,7 @@ export default [
       'prefer-const': 'error',
       'prefer-object-has-own': 'error',
       radix: 'error',
-      // What a person or a file says is only ever set as text.
+      // Input from a person or a file is only set as text.
       'no-restricted-properties': ['error',
         ...['innerHTML', 'outerHTML', 'insertAdjacentHTML', 'writeln'].map(
           (property) => ({ property, message: 'Use the functions of dom.js.' }))],

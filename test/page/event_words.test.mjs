@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the events of a game do, and when, in words. */
+/** The actions and conditions of a game's events, in words. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -40,7 +40,7 @@ for (const [kind, more, words] of [
   test(`${kind}: ${words}`, () => assert.equal(eventWords(event(kind, more)), words));
 }
 
-test('an unknown kind is told by its parameters', () => {
+test('an unknown kind is described by its parameters', () => {
   const unknown = event('weather', { rain: 0.5, wet: true, fields: [1, 2] });
   assert.equal(eventKind(unknown), 'weather');
   assert.equal(eventKind(event('new_kind')), 'new kind');
@@ -48,7 +48,7 @@ test('an unknown kind is told by its parameters', () => {
   assert.equal(eventKind(event('toString')), 'toString');
 });
 
-test('under which condition it fires by itself', () => {
+test('the condition under which it fires by itself', () => {
   assert.equal(conditionWords(null), '');
   assert.equal(conditionWords({ time: 0 }), 'by itself at 0.0 s');
   assert.equal(conditionWords({ step: 30 }), 'by itself at step 30');
@@ -58,7 +58,7 @@ test('under which condition it fires by itself', () => {
     'by itself when hv0 is within 15 m of (100, \u22122)');
 });
 
-test('of a file only its name is shown, and what follows it', () => {
+test('only the name of a file is shown, and what follows it', () => {
   assert.equal(baseName('idm'), 'idm');
   assert.equal(baseName('keys:/home/somebody/runs/lap.keys.yaml'), 'keys:lap.keys.yaml');
   assert.equal(baseName(null), '');

@@ -15,7 +15,7 @@ import {
 import { countText } from '../../crgame_ros/cockpit/page/js/perception/unseen.js';
 import { eventText } from '../../crgame_ros/cockpit/page/js/replay/marks.js';
 
-test('fixed: a true minus, none before zero, a dash for what is no number', () => {
+test('fixed: a true minus, none before zero, a dash for other values', () => {
   assert.equal(fixed(3.14159, 2), '3.14');
   assert.equal(fixed(-3.14159, 1), '\u22123.1');
   assert.equal(fixed(-0.004, 2), '0.00');
@@ -30,18 +30,18 @@ test('the clock shows seconds with one digit', () => {
     ['65.2 s', '0.0 s', '\u22120.5 s', NONE, NONE]);
 });
 
-test('thousands are set apart by a thin space', () => {
+test('a thin space separates thousands', () => {
   assert.deepEqual([0, 999, 1000, 1234567, -12345].map(count),
     ['0', '999', '1\u202f000', '1\u202f234\u202f567', '\u221212\u202f345']);
 });
 
-test('one is singular, all others plural', () => {
+test('one is singular, all other numbers are plural', () => {
   assert.deepEqual([0, 1, 2].map((number) => plural(number, 'plan')),
     ['0 plans', '1 plan', '2 plans']);
   assert.equal(plural(3, 'entry', 'entries'), '3 entries');
 });
 
-test('one line, whatever was thrown', () => {
+test('any thrown value becomes one line', () => {
   assert.equal(oneLine(' two\n\t lines '), 'two lines');
   assert.equal(oneLine(null), '');
   assert.equal(errorText(new TypeError('no such thing')), 'no such thing');
@@ -55,14 +55,14 @@ test('figures are found live and nested as in timing.json', () => {
   assert.ok(Number.isNaN(valueOf({ final_error_ms: null }, 'final_error_ms')));
 });
 
-test('the worst late step is told in words, and that nobody told of it, too', () => {
+test('the worst late step is described in words, also if it is unknown', () => {
   assert.equal(worstLateStep({ worst_late_step: '7.0 ms late: 7.0 ms\n own work' }),
     'Worst late step: 7.0 ms late: 7.0 ms own work.');
   assert.equal(worstLateStep({ worst_late_step: '' }), 'No step was late.');
   assert.match(worstLateStep({ final_error_ms: 1 }), /does not tell/);
 });
 
-test('table I: how each figure reads, and from when on it is late', () => {
+test('table I: the text of each figure, and the value from which it is late', () => {
   const figures = new Map(TABLE_I.map(([key, , , format, isLate]) => [key, { format, isLate }]));
   assert.equal(figures.get('final_error_ms').format(12.345), '12.35 ms');
   assert.equal(figures.get('timeout_ratio').format(0.0123), '1.23 %');
@@ -76,13 +76,13 @@ test('table I: how each figure reads, and from when on it is late', () => {
     [false, true]);
 });
 
-test('what browsers call a gamepad becomes its name', () => {
+test('a browser\'s id of a gamepad becomes its name', () => {
   assert.equal(shortName('G29 Driving Wheel (Vendor: 046d Product: c24f)'), 'G29 Driving Wheel');
   assert.equal(shortName('046d-c24f-Logitech G29'), 'Logitech G29');
   assert.equal(shortName('(STANDARD GAMEPAD Vendor: 045e Product: 028e)'), 'Gamepad');
 });
 
-test('who drives a seat', () => {
+test('the driver of a seat', () => {
   const seat = { source: 'game', driver: 'joy:lap.joy.yaml', holder: null, holder_name: null };
   const say = (more, role = 'human', planner = undefined) =>
     describeSeat({ ...seat, ...more }, role, planner, 'c1');
@@ -100,12 +100,12 @@ test('who drives a seat', () => {
   assert.equal(say({ source: 'planner' }, 'autonomous'), 'Driven by its planner');
 });
 
-test('nobody is taken for the holder before the server has named this page', () => {
+test('this page is not the holder before the server has named it', () => {
   const seat = { source: 'game', driver: 'idle', holder: '', holder_name: 'X' };
   assert.equal(describeSeat(seat, 'human', undefined, ''), 'Driven by X in a cockpit');
 });
 
-test('a count of perception names its range only where there is one', () => {
+test('a count of perception names its range only if there is one', () => {
   assert.equal(countText({ seen: 3, near: 4, range: 79.6 }), 'sees 3 of 4 within 80 m');
   assert.equal(countText({ seen: 3, near: 4, range: null }), 'sees 3 of 4');
 });

@@ -72,7 +72,7 @@ test('an estimate has its pose, motion and covariance', () => {
     [2, 10, 20, 0.5, 15, 0.1, 0.04, 0.01, 0.09]);
 });
 
-test('who is seen comes as columns', () => {
+test('the seen vehicles come as columns', () => {
   const { index, columns } = decodeFrame(frameOf(KIND.SEEN, ...HEAD, 1, 3, 0, 4, 9));
   assert.equal(index, 1);
   close(columns, [0, 4, 9]);

@@ -7,7 +7,7 @@ import { test } from 'node:test';
 
 import { close, keepStorage } from './support.mjs';
 
-/** What tests of a target need: `closest`, and listeners. */
+/** The parts of an event target that tests need: `closest` and listeners. */
 class FakeElement extends EventTarget {
   attributes = new Map();
   children = [];
@@ -88,7 +88,7 @@ const pressed = (key, more) => {
   return event;
 };
 
-test('keys of the world: each its action, and none while somebody types', (t) => {
+test('keys of the world: each has its action, and none acts while typing', (t) => {
   const done = [];
   const note = (name) => (value) => done.push(value === undefined ? name : [name, value]);
   const end = attachKeys({ zoomBy: note('zoom'), turnBy: note('turn'), fit: note('fit'),
@@ -104,7 +104,7 @@ test('keys of the world: each its action, and none while somebody types', (t) =>
     pressed('f', { [command]: true });
   }
   pressed('f', { target: new FakeElement('textarea') });
-  // Those that drive are none of them.
+  // Driving keys are none of them.
   assert.ok(['w', 'a', 's', 'd', 'r', ' ', 'ArrowUp'].every(
     (key) => !pressed(key).defaultPrevented));
   end();
@@ -114,7 +114,7 @@ test('keys of the world: each its action, and none while somebody types', (t) =>
 
 function keyboard() {
   const told = { changed: 0, reversed: 0, enabled: true };
-  // Another keyboard would hear the same keys.
+  // A second keyboard object would receive the same keys.
   const own = new EventTarget();
   globalThis.window = own;
   const keys = new Keyboard(() => told.enabled, {
@@ -129,7 +129,7 @@ function keyboard() {
     up: (code) => key('keyup', code) };
 }
 
-test('driving keys, by their place: throttle, brake, left, right', () => {
+test('driving keys, by position: throttle, brake, left, right', () => {
   const { keys, told, down, up } = keyboard();
   down('KeyW');
   down('ArrowLeft');
@@ -149,7 +149,7 @@ test('driving keys, by their place: throttle, brake, left, right', () => {
   assert.deepEqual([keys.keys, keys.anyHeld], [[0, 0, 0, 0], false]);
 });
 
-test('a key that repeats tells nothing new, and no widget gets it', () => {
+test('a repeated key sends nothing new and reaches no widget', () => {
   const { told, down, up } = keyboard();
   down('KeyS');
   assert.ok(down('KeyS', { repeat: true }).defaultPrevented);
@@ -160,7 +160,7 @@ test('a key that repeats tells nothing new, and no widget gets it', () => {
   assert.deepEqual([told.reversed, told.changed], [1, 1]);
 });
 
-test('R is the gear when it is tapped, not when it is held or its hands went off', async () => {
+test('a tap on R is the gear, a held R or one with hands off is not', async () => {
   const { told, keys, down, up } = keyboard();
   down('KeyR');
   await new Promise((resolve) => { setTimeout(resolve, HELD_MS + 20); });
@@ -172,7 +172,7 @@ test('R is the gear when it is tapped, not when it is held or its hands went off
   assert.equal(told.reversed, 0);
 });
 
-test('keys drive only while they may, and never with a command key', () => {
+test('keys drive only while allowed, and never with a command key', () => {
   const { told, keys, down } = keyboard();
   told.enabled = false;
   assert.ok(!down('KeyW').defaultPrevented);
@@ -184,7 +184,7 @@ test('keys drive only while they may, and never with a command key', () => {
   down('KeyW', { target: new FakeElement('select') });
   assert.equal(keys.anyHeld, false);
   down('KeyW');
-  // Of what is held then macOS tells no release.
+  // macOS reports no release of keys held then.
   down('Meta', { key: 'Meta' });
   assert.equal(keys.anyHeld, false);
 });
@@ -202,7 +202,7 @@ function canvas() {
     pointerId: 1, button: 0, shiftKey: false, ...more, clientX: 100 + x, clientY: 50 + y })) };
 }
 
-test('dragging pans, once the hand has meant it', () => {
+test('dragging pans after a minimum distance', () => {
   const { done, send } = canvas();
   send('pointerdown', 10, 10);
   send('pointermove', 12, 10);
@@ -224,20 +224,20 @@ test('dragging with shift turns about the middle: a quarter from right to top', 
   assert.deepEqual(about, []);
 });
 
-test('two fingers: apart by half is a zoom by half about their middle', () => {
+test('spreading two fingers by half zooms by half about their middle', () => {
   const { done, send } = canvas();
   send('pointerdown', 300, 300, { pointerId: 1 });
   send('pointerdown', 500, 300, { pointerId: 2 });
   send('pointermove', 600, 300, { pointerId: 2 });
   assert.deepEqual(done, [['pan', 50, 0], ['zoom', 1.5, 450, 300], ['rotate', 0, 450, 300]]);
   done.length = 0;
-  // From the right of the other to above it, as far away: a quarter turn, nothing else.
+  // From the right of the other to above it, at equal distance: only a quarter turn.
   send('pointermove', 300, 0, { pointerId: 2 });
   const [[, ...moved], [, factor], [, angle, ...about]] = done;
   close([...moved, factor, angle, ...about], [-150, -150, 1, Math.PI / 2, 300, 150]);
 });
 
-test('the wheel zooms where it is, a line as 30 pixels; a double click picks', () => {
+test('the wheel zooms at the pointer, a line as 30 pixels; a double click picks', () => {
   const { done, send } = canvas();
   send('wheel', 40, 30, { deltaY: -100, deltaMode: 0 });
   send('wheel', 40, 30, { deltaY: -10, deltaMode: 1 });
@@ -246,7 +246,7 @@ test('the wheel zooms where it is, a line as 30 pixels; a double click picks', (
     [Math.exp(0.15), 40, 30, Math.exp(0.45), 40, 30, 7, 8]);
 });
 
-test('preferences are kept under names of their own, and an empty one is forgotten', () => {
+test('preferences are kept under their own names, and an empty one is removed', () => {
   const kept = keepStorage({ theme: 'of another page' });
   assert.equal(recall('theme'), '');
   remember('theme', 'dark');
@@ -256,7 +256,7 @@ test('preferences are kept under names of their own, and an empty one is forgott
   assert.equal(kept.has('crgame.theme'), false);
 });
 
-test('a browser that keeps nothing is no error', (t) => {
+test('a browser without storage is no error', (t) => {
   const refuse = () => {
     throw new Error('forbidden');
   };
@@ -268,7 +268,7 @@ test('a browser that keeps nothing is no error', (t) => {
   assert.equal(recall('theme'), '');
 });
 
-test('colours have the names of the style sheets, map- left out, and are read anew', () => {
+test('colours have the style sheets\' names without map-, and are read again', () => {
   colors.set('map-label-ground', 'rgb(1, 2, 3)').set('av', 'blue').set('map-road', 'grey');
   const palette = Palette.ofTheme();
   assert.deepEqual([palette.labelGround, palette.av, palette.road, palette.rem_px],
@@ -290,7 +290,7 @@ test('an element: text as text, true as an empty attribute, false as none', () =
   assert.equal(clicked, 1);
 });
 
-test('what has not changed is not written again: each write costs a layout', () => {
+test('unchanged values are not written again, as each write costs a layout', () => {
   const node = new FakeElement();
   const after = ['a', 'a', 'b', true, true, false, null].map((value) => {
     setAttribute(node, 'data-x', value);

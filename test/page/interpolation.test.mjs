@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Vehicles between their samples and beyond them, against the motion in closed form. */
+/** Vehicles between and beyond their samples, compared with the motion in closed form. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -13,7 +13,7 @@ import { close } from './support.mjs';
 const vehicle = (values) => Float64Array.from(
   { length: VEHICLE_WIDTH }, (_, i) => values[Object.keys(VEHICLE)[i]] ?? 0);
 
-test('turning takes the shortest way, over the seam too', () => {
+test('turning takes the shortest way, also across pi', () => {
   close(turn(0, 1, 0.25), 0.25);
   // From 3 to -3 it is 2 pi - 6 to the left, not 6 to the right.
   close(turn(3, -3, 0.5), 3 + (2 * Math.PI - 6) / 2);
@@ -21,7 +21,7 @@ test('turning takes the shortest way, over the seam too', () => {
   close(turn(0.1, 0.1 + 4 * Math.PI, 1), 0.1, 1e-12);
 });
 
-test('half way between two samples is their mean, but the yaw takes its way', () => {
+test('half way between two samples is their mean; the yaw turns the short way', () => {
   const before = vehicle({ x: 0, y: 10, yaw: 3, speed: 10, throttle: 0.2 });
   const after = vehicle({ x: 1, y: 20, yaw: -3, speed: 12, throttle: 0.4 });
   const out = new Float64Array(VEHICLE_WIDTH);
@@ -30,7 +30,7 @@ test('half way between two samples is their mean, but the yaw takes its way', ()
   close(Math.abs(out[VEHICLE.yaw]), Math.PI);
 });
 
-test('a gear is never half, and a value that ends stays until then', () => {
+test('a gear is not interpolated, and a value that ends stays until then', () => {
   const before = vehicle({ reverse: 0, steering: 0.4 });
   const after = vehicle({ reverse: 1, steering: NaN });
   const out = new Float64Array(VEHICLE_WIDTH);
@@ -39,7 +39,7 @@ test('a gear is never half, and a value that ends stays until then', () => {
   close(out[VEHICLE.steering], 0.4);
 });
 
-test('who is absent before appears with the next sample only', () => {
+test('a vehicle that was absent appears with the next sample only', () => {
   const out = new Float64Array(VEHICLE_WIDTH);
   interpolateVehicles(out, vehicle({ x: NaN }), vehicle({ x: 5 }), 0.5);
   assert.ok(Number.isNaN(out[VEHICLE.x]));
@@ -51,7 +51,7 @@ test('straight on: position is speed times time', () => {
   close([out[0], out[1], out[2]], [1 + 2 * Math.sqrt(3) / 2, 3, Math.PI / 6]);
 });
 
-test('in a bend it stays on the circle but for the third order', () => {
+test('in a bend it stays on the circle up to the third order', () => {
   // Radius 20 m at 10 m/s: 0.5 rad/s. The chord along the mean heading misses the arc by
   // v * yaw_rate^2 * dt^3 / 24, 1.05e-4 m at 0.1 s; without the half turn it would be 2.5 cm.
   const dt = 0.1;
@@ -61,7 +61,7 @@ test('in a bend it stays on the circle but for the third order', () => {
   close(out[VEHICLE.yaw], 0.05);
 });
 
-test('each vehicle moves by itself', () => {
+test('each vehicle moves independently', () => {
   const two = Float64Array.from([...vehicle({ speed: 10 }),
     ...vehicle({ y: 5, yaw: Math.PI / 2, speed: 2 })]);
   const out = new Float64Array(2 * VEHICLE_WIDTH);
@@ -69,7 +69,7 @@ test('each vehicle moves by itself', () => {
   close([out[0], out[1], out[VEHICLE_WIDTH], out[VEHICLE_WIDTH + 1]], [5, 0, 0, 6]);
 });
 
-test('objects move with their velocities, which stay', () => {
+test('objects move with constant velocities', () => {
   const out = new Float64Array(12);
   moveObjects(out, Float64Array.from([1, 2, 0.1, 10, -20, 0.2, 5, 6, 0, 0, 0, 0]), 0.1);
   close(out, [2, 0, 0.12, 10, -20, 0.2, 5, 6, 0, 0, 0, 0]);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Indicators and horn: what shines when, and which of a device's buttons work them. */
+/** Indicators and horn: when they are on, and the device buttons that switch them. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -22,13 +22,13 @@ test('indicators blink three times in two seconds of simulation time, the horn s
   assert.deepEqual(shining(LIGHT.right, 0), { left: false, right: true, horn: false });
 });
 
-test('who has no command has no lights', () => {
+test('a vehicle without a command has no lights', () => {
   for (const lights of [NaN, undefined, 0]) {
     assert.deepEqual(shining(lights, 0), { left: false, right: false, horn: false });
   }
 });
 
-test('lights are never between two samples', () => {
+test('lights are not interpolated', () => {
   const [before, after, out] = [0, 0, 0].map(() => new Float64Array(VEHICLE_WIDTH));
   before[VEHICLE.lights] = LIGHT.left;
   after[VEHICLE.lights] = LIGHT.horn;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The paths of a map: what is drawn once, where, and how often. */
+/** The paths of a map: their places and numbers, each drawn once. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -28,7 +28,7 @@ test('two neighbours share their line, which is drawn once', () => {
     [[0, 'dashed', true], [0, 'dashed', false], [1, 'solid', false]]);
 });
 
-test('of two markings of a shared line the more visible one counts', () => {
+test('a shared line has the more visible of its two markings', () => {
   const lower = laneletOf({ id: 1, adj_left: 2, adj_left_same: true, left_line: 'dashed' });
   const upper = laneletOf({ id: 2, y: 4, adj_right: 1, adj_right_same: true,
     right_line: 'solid' });
@@ -42,7 +42,7 @@ test('with oncoming traffic the left line is shared, in the other direction', ()
   assert.equal(collectBoundaries([there, back]).length, 3);
 });
 
-test('neighbours that lie apart have lines of their own', () => {
+test('neighbours with a space between them have separate lines', () => {
   const lower = laneletOf({ id: 1, adj_left: 2, adj_left_same: true });
   const upper = laneletOf({ id: 2, y: 5, adj_right: 1, adj_right_same: true });
   assert.equal(collectBoundaries([lower, upper]).length, 4);
@@ -50,7 +50,7 @@ test('neighbours that lie apart have lines of their own', () => {
   assert.equal(collectBoundaries([lower]).length, 2);
 });
 
-test('lanes that part from each other share no line, nor do those that join', () => {
+test('lanes that split or merge share no line', () => {
   const lower = laneletOf({ id: 1, adj_left: 2, adj_left_same: true });
   const upper = { ...laneletOf({ id: 2, adj_right: 1, adj_right_same: true }),
     left: [0, 6, 100, 30] };
@@ -73,7 +73,7 @@ test('lanelets near each other are one chunk, around a point of theirs', () => {
   const cells = (...places) => chunksOf(...places.map(([x, y]) => around(x, y))).length;
   assert.deepEqual([cells([1, 1], [119, 119]), cells([1, 1], [121, 1]), cells([1, 1], [1, 121])],
     [1, 2, 2]);
-  // What is symmetric about the origin is no nearer than any other.
+  // Lanes symmetric about the origin are in different cells.
   const at = (y) => laneletOf({ id: y, y });
   assert.equal(chunksOf(at(1000), at(-1000)).length, 2);
 });
@@ -127,12 +127,12 @@ test('zebra stripes of half a metre, half a metre apart', () => {
   assert.equal(zebras.closed, 4);
   const [xmin, ymin, xmax, ymax] = zebras.box;
   close([xmax - xmin, ymin, ymax], [3.5, -2, 2]);
-  // As many as the shorter bound has room for.
+  // The shorter bound limits their number.
   const wedge = { left: [0, 2, 4, 2], right: [0, -2, 2, -2], types: ['crosswalk'] };
   assert.equal(only(laneletOf(wedge)).zebras.closed, 2);
 });
 
-test('every marking goes where it is drawn', () => {
+test('every marking is put into its path', () => {
   const paths = (marking) => {
     const chunk = only(laneletOf({ left_line: marking, right_line: 'no_marking' }));
     return ['lines', 'broad', 'curbs', 'seams'].map((name) => drawn(chunk[name]));

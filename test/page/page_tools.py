@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tools that look at pages: npm installs what package-lock.json pins, once."""
+"""The tools that check pages: npm installs the versions of package-lock.json once."""
 
 import fcntl
 from pathlib import Path
@@ -12,17 +12,17 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-# What eslint itself needs.
+# Requirements of eslint itself.
 NODE = (20, 19)
-# Seconds each, on a machine that has nothing else to do.
+# Each takes seconds on an idle machine.
 INSTALL_S, CHECK_S = 600.0, 600.0
 
 
 def missing(path: str | None = None) -> str:
     """
-    Return in a few words what these tests lack on this machine, empty if nothing.
+    Return in a few words the missing tools of this machine, empty if none is missing.
 
-    :param path: where programs are looked for, by default as everywhere.
+    :param path: search path of programs, by default that of the environment.
     """
     lacking = [name for name in ('node', 'npm') if shutil.which(name, path=path) is None]
     if lacking:
@@ -36,7 +36,7 @@ def missing(path: str | None = None) -> str:
 
 
 def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> None:
-    """Run a tool and fail with what it says."""
+    """Run a tool; fail with its output."""
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout_s)
     if done.returncode != 0:
         pytest.fail(f'{Path(command[0]).name} {command[1]}:\n{done.stdout}{done.stderr}',
@@ -45,7 +45,7 @@ def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> N
 
 def is_stale(folder: Path) -> bool:
     """Return whether node_modules is absent, incomplete or older than the lock file."""
-    # npm writes it when everything else is there.
+    # npm writes it after everything else.
     installed = folder / 'node_modules' / '.package-lock.json'
     lock = folder / 'package-lock.json'
     return not installed.exists() or installed.stat().st_mtime < lock.stat().st_mtime

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What an AV perceives: who is not seen, where it takes itself to be, and how long that holds. */
+/** An AV's perception: unseen vehicles, its own estimate, and how long both are valid. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -24,7 +24,7 @@ const SHOWN = {
   objects: rows(OBJECT_WIDTH, [1030, 540], [1050.1, 500], [NaN, NaN]),
 };
 
-test('all are hollow but the AV itself and those whom it sees', () => {
+test('all vehicles are hollow but the AV itself and those that it sees', () => {
   const unseen = new Unseen(SCENE);
   assert.equal(unseen.perceiving('av0'), 1);
   assert.equal(unseen.perceiving('hv0'), -1);
@@ -33,12 +33,12 @@ test('all are hollow but the AV itself and those whom it sees', () => {
   assert.deepEqual([...unseen.flags(1, Float64Array.of())], [1, 0, 1, 1, 1, 1]);
 });
 
-test('counted are those within the range, and of them those seen', () => {
+test('the counts are of vehicles within the range, and of those seen among them', () => {
   const unseen = new Unseen(SCENE);
   assert.deepEqual(unseen.count(1, Float64Array.of(3, 4), SHOWN), { seen: 1, near: 2, range: 50 });
   const far = new Unseen({ ...SCENE, vehicles: [SCENE.vehicles[0],
     { id: 'av0', perception: { range: null } }, SCENE.vehicles[2]] });
-  // Without a limit all who are there; 8 is seen, too.
+  // Without a limit all present vehicles count; 8 is seen too.
   assert.deepEqual(far.count(1, Float64Array.of(3, 4), SHOWN), { seen: 2, near: 4, range: null });
 });
 
@@ -59,14 +59,14 @@ test('a covariance that is turned gives the same ellipse, turned', () => {
 const seen = (t, ...columns) => (
   { kind: KIND.SEEN, index: 1, n: 0, t, columns: Float64Array.from(columns) });
 
-test('what the planner was told of holds for a second', () => {
+test('the planner\'s request is valid for a second', () => {
   const perceived = new Perceived();
   assert.equal(perceived.seenBy(1, 0), null);
   perceived.take(seen(10, 0, 2));
   close(perceived.seenBy(1, 10.99), [0, 2]);
   assert.equal(perceived.seenBy(1, 11.01), null);
   assert.equal(perceived.seenBy(0, 10), null);
-  // The display runs behind, by less than half a second.
+  // The display is behind by less than half a second.
   close(perceived.seenBy(1, 9.6), [0, 2]);
   assert.equal(perceived.seenBy(1, 9.4), null);
 });
@@ -74,14 +74,14 @@ test('what the planner was told of holds for a second', () => {
 const estimate = (n, more) => ({ kind: KIND.ESTIMATE, index: 1, n, t: n / 100, x: 0, y: 0, yaw: 0,
   speed: 0, yaw_rate: 0, xx: 1, xy: 0, yy: 1, ...more });
 
-test('an estimate is moved on along its way', () => {
+test('an estimate is extrapolated along its motion', () => {
   const perceived = new Perceived();
   perceived.take(estimate(100, { x: 5, yaw: Math.PI / 2, speed: 10, xx: 0.5 }));
   const { n, x, y, yaw, xx } = perceived.estimateOf(1, 1.2);
   close([n, x, y, yaw, xx], [100, 5, 2, Math.PI / 2, 0.5]);
 });
 
-test('in a bend it is moved on along the circle, but for the third order', () => {
+test('in a bend it is extrapolated along the circle up to the third order', () => {
   const perceived = new Perceived();
   perceived.take(estimate(100, { speed: 10, yaw_rate: 0.5 }));
   const { x, y, yaw } = perceived.estimateOf(1, 1.1);
@@ -90,7 +90,7 @@ test('in a bend it is moved on along the circle, but for the third order', () =>
   close(yaw, 0.05);
 });
 
-test('of several estimates that at the shown time counts, and none that is too old', () => {
+test('the estimate of the shown time counts, and none that is too old', () => {
   const perceived = new Perceived();
   [100, 110, 120].forEach((n) => perceived.take(estimate(n, { x: n })));
   assert.deepEqual([1.05, 1.1, 1.15, 1.2, 1.69].map((t) => perceived.estimateOf(1, t).n),
@@ -119,7 +119,7 @@ test('scans: the newest of each sensor, for two periods and 0.3 s', () => {
   assert.deepEqual(perceived.scansOf(1, 1.61), []);
 });
 
-test('a reset forgets what was perceived, and keeps the map', () => {
+test('a reset clears the perception and keeps the map', () => {
   const perceived = new Perceived();
   const map = { kind: KIND.OCCUPANCY, rows: 1 };
   perceived.take(map);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Lengths, poses, dashes and outlines of lines whose geometry is known. */
+/** Lengths, poses, dashes and outlines of lines with known geometry. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -29,7 +29,7 @@ test('poses along a line, and at its end beyond it', () => {
   close(at(99), [13, 24, Math.PI / 2]);
 });
 
-test('a point that is there twice has the heading of the way on', () => {
+test('a repeated point has the heading of the following segment', () => {
   close(Object.values(poseAlong([0, 0, 0, 0, 0, 2], 0)), [0, 0, Math.PI / 2]);
   close(Object.values(poseAlong([5, 6], 1)), [5, 6, 0]);
 });
@@ -40,11 +40,11 @@ test('to the left of east is north', () => {
   close(shifted([0, 0, 10, 0], -2), [0, -2, 10, -2]);
 });
 
-test('a circle that is shifted inwards is a smaller circle', () => {
+test('an inward offset of a circle is a smaller circle', () => {
   const circle = Array.from({ length: 41 }, (_, i) => i * Math.PI / 80)
     .flatMap((angle) => [50 * Math.cos(angle), 50 * Math.sin(angle)]);
   const inner = shifted(circle, 10);
-  // But for the ends, whose direction is that of the first chord.
+  // Except at the ends, which have the direction of the first chord.
   for (let i = 2; i < inner.length - 2; i += 2) {
     close(Math.hypot(inner[i], inner[i + 1]), 40, 1e-9);
   }
@@ -65,7 +65,7 @@ test('dashes go round a corner, and are as long as on a straight line', () => {
   close(path.lengths, [3, 3, 2]);
 });
 
-test('dashes do not depend on how finely a line is divided', () => {
+test('dashes do not depend on the spacing of a line\'s points', () => {
   const lengths = [1, 7, 20, 101].map((count) => {
     const line = Array.from({ length: count + 1 }, (_, i) => [100 * i / count, 0]).flat();
     const path = new PathRecorder();

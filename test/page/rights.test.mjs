@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What a role may not do, and whose a seat is, in words. */
+/** The limits of a role and the holder of a seat, in words. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -12,17 +12,17 @@ import {
 
 const DRIVER = { role: 'driver', directs: false, drives: true, seat: '' };
 
-test('a role is told why it cannot, and told nothing of what it can', () => {
+test('a role gets a reason for forbidden actions and none for allowed ones', () => {
   const store = { mode: 'live', rights: DRIVER };
   assert.equal(reasonAgainst(store, 'direct', 'reset the run'),
     'Only a director can reset the run; you are a driver.');
   assert.equal(reasonAgainst(store, 'drive', 'take a seat'), '');
   assert.equal(reasonAgainst({ ...store, mode: 'replay' }, 'direct', 'reset the run'), '');
-  // Before the server has said who somebody is.
+  // Before the server has sent the role.
   assert.equal(reasonAgainst({ ...store, rights: { ...DRIVER, role: '' } }, 'direct', 'x'), '');
 });
 
-test('a driver in the seat starts, before the first step, and orders nothing else', () => {
+test('a driver in the seat may start the run before its first step, and no more', () => {
   const store = { mode: 'live', rights: DRIVER, me: { id: 'c1' }, status: { n: 0 },
     seats: { hv0: { holder: 'c1' }, hv1: { holder: null } } };
   const refused = (action) => `Only a director can ${action} the run; you are a driver.`;
@@ -34,7 +34,7 @@ test('a driver in the seat starts, before the first step, and orders nothing els
     { ...store, rights: { ...DRIVER, directs: true } }, 'reset'), '');
 });
 
-test('a link for one seat leads to no other, unless it is offered', () => {
+test('a link for one seat admits to no other, unless it is offered', () => {
   const store = { mode: 'live', rights: { ...DRIVER, seat: 'hv0' }, me: { id: 'c1' },
     seats: { hv0: { holder: null }, hv1: { holder: null },
       hv2: { holder: 'c2', offer: { client: 'c1' } } } };
@@ -45,7 +45,7 @@ test('a link for one seat leads to no other, unless it is offered', () => {
     /^Only a driver can take a seat/);
 });
 
-test('a kept seat says for whom and for how long', () => {
+test('a kept seat names its driver and the remaining time', () => {
   const seat = { source: 'cockpit', driver: 'cockpit', holder: null, holder_name: null };
   assert.equal(describeSeat({ ...seat, kept: { name: 'Anna', for_s: 42 } }, 'human', '', 'c1'),
     'Kept for Anna for 42 s');

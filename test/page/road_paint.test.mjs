@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Roads of the 3D view: what is paved and painted, how wide and how long. */
+/** Roads of the 3D view: width and length of their surfaces and markings. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -33,7 +33,7 @@ const lengthOf = (line) => {
   return length;
 };
 
-/** What is painted of one lanelet's left bound, when nothing is on its right one. */
+/** Return the paint of one lanelet's left bound, without a marking on its right one. */
 function painted(marking, more = {}, country = 'DEU') {
   const lanelet = laneletOf({ left_line: marking, right_line: 'no_marking', ...more });
   const parts = new MeshParts({ x: 0, y: 0 });
@@ -44,7 +44,7 @@ function painted(marking, more = {}, country = 'DEU') {
   return parts;
 }
 
-/** The area of all triangles, seen from above. */
+/** Return the area of all triangles, seen from above. */
 function areaOf({ positions, indices }) {
   let area = 0;
   for (let i = 0; i < indices.length; i += 3) {
@@ -76,7 +76,7 @@ test('the kind of road: by types, then by the limit', () => {
   ['motorway', 'town', 'town', 'country', 'motorway', 'country', 'town']);
 });
 
-test('dashes: as many, and as much paint, as the closed form says', () => {
+test('number and paint of dashes agree with the closed form', () => {
   for (const [length, dash, gap] of [[100, 3, 6], [99, 3, 6], [18, 6, 12], [7.5, 4, 8]]) {
     const pieces = paintedPieces([0, 0, length, 0], [dash, gap]);
     const whole = Math.floor(length / (dash + gap));
@@ -90,11 +90,11 @@ test('around a bend dashes keep their length along the line', () => {
   const line = arc(50, 200);
   const pieces = paintedPieces(line, [3, 6]);
   pieces.slice(0, -1).forEach((piece) => close(lengthOf(piece), 3, 1e-9));
-  // 78.54 m of arc, of which the polyline lacks 0.2 mm: nine times 9 m begin in it.
+  // The arc is 78.54 m long, the polyline 0.2 mm less: nine periods of 9 m begin in it.
   assert.equal(pieces.length, 9);
 });
 
-test('a strip is as wide as it should be, in bends too', () => {
+test('a strip has its width, also in bends', () => {
   const [left, right] = stripOf(arc(30, 60), 0.3);
   for (let i = 0; i < left.length; i += 2) {
     close([Math.hypot(left[i], left[i + 1]), Math.hypot(right[i], right[i + 1])],
@@ -142,7 +142,7 @@ test('no kerb leads across another lane', () => {
   assert.ok(!xs.some((x) => x > 40.5 && x < 59.5));
 });
 
-test('centre lines are yellow where they are', () => {
+test('centre lines are yellow in countries with yellow ones', () => {
   const color = (country) => painted('solid', { adj_left: 7, adj_left_same: false }, country)
     .colors.slice(0, 3);
   assert.deepEqual([color('DEU'), color('USA')], [COLOR.white, COLOR.yellow]);
@@ -164,7 +164,7 @@ test('between bounds with heights the triangles fill the lanelet', () => {
   assert.equal(parts.triangles, 18 + 32 - 2);
 });
 
-test('far from the origin nothing is lost to float32', () => {
+test('far from the origin float32 is precise enough', () => {
   const [x, y] = [691_000, 5_337_000];
   const parts = new MeshParts({ x, y });
   parts.addStrip([x + 0.1, y + 0.06, x + 10, y + 0.06], [x + 0.1, y - 0.06, x + 10, y - 0.06],
@@ -195,7 +195,7 @@ test('400 lanelets take few meshes and few triangles', () => {
   const scene = town();
   assert.equal(scene.lanelets.length, 400);
   const index = new RoadIndex(scene.lanelets);
-  // A polygon of n points has n - 2 triangles, however it is cut.
+  // A polygon of n points has n - 2 triangles in any triangulation.
   const triangulate = (ring) => new Array(3 * (ring.length / 2 - 2)).fill(0);
   const roads = buildRoads(scene, { x: 500, y: 500 }, index, FLAT, triangulate);
   const land = buildLand(scene, { x: 500, y: 500 }).tiles;
@@ -206,7 +206,7 @@ test('400 lanelets take few meshes and few triangles', () => {
   assert.ok(triangles + 70_000 <= 150_000, `${triangles} triangles`);
 });
 
-test('tiles of the land leave no gap and lie on no other', () => {
+test('tiles of the land have no gaps and do not overlap', () => {
   const { tiles } = buildLand(town(), { x: 500, y: 500 });
   const areas = tiles.flatMap(({ positions, indices }) => Array.from(
     { length: indices.length / 3 }, (_, i) => {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What stands at roads of the 3D view: never on them, never in the way of drivers' eyes. */
+/** Objects beside roads of the 3D view: never on a road or in a driver's line of sight. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -15,7 +15,7 @@ const { heightOn, RoadIndex } = await import(`${JS}/view3d/road/road_index.js`);
 const { placeRoadside, SIGHT_M, stationsOf } = await import(`${JS}/view3d/road/roadside.js`);
 const { faceOf, speedText } = await import(`${JS}/view3d/road/sign_faces.js`);
 
-/** A road of 5 m that winds, in parts of 60 m that follow each other; and one across it. */
+/** A winding road, 5 m wide, in consecutive parts of 60 m, and one road across it. */
 function winding(more = {}) {
   const at = (s, d) => {
     const [y, slope] = [40 * Math.sin(s / 70), 40 / 70 * Math.cos(s / 70)];
@@ -31,7 +31,7 @@ function winding(more = {}) {
   return { id: 'winding', bounds: [0, -200, 720, 200], lanelets };
 }
 
-/** Whether a point is in a polygon, by the angle that it turns around it. */
+/** Check whether a point is in a polygon, by the winding angle around the point. */
 function isIn({ left, right }, x, y) {
   const ring = [];
   for (let i = 0; i < left.length; i += 2) {
@@ -55,7 +55,7 @@ test('nothing stands on a lanelet', () => {
     const all = Object.values(roadside).flat();
     assert.ok(all.length > 300);
     for (const { x, y, size: [length, width], yaw } of all) {
-      // Middles and corners of what they cover.
+      // Middles and corners of their ground areas.
       for (const [a, b] of [[0, 0], [0.5, 0.5], [0.5, -0.5], [-0.5, 0.5], [-0.5, -0.5]]) {
         const px = x + (length > 1 ? a * length * Math.cos(yaw) - b * width * Math.sin(yaw) : 0);
         const py = y + (length > 1 ? a * length * Math.sin(yaw) + b * width * Math.cos(yaw) : 0);
@@ -65,7 +65,7 @@ test('nothing stands on a lanelet', () => {
   }
 });
 
-test('houses hide no part of the roads around from another', () => {
+test('houses hide no part of the surrounding roads from another part', () => {
   const scene = winding({ types: ['urban'], speed_limit: 13.9 });
   const { houses } = placed(scene);
   assert.ok(houses.length > 20);
@@ -108,13 +108,13 @@ test('roads that lead in a circle have stations, too', () => {
   assert.deepEqual([...stationsOf(ring)], [[0, 0], [1, 100]]);
 });
 
-test('equal seeds, equal places; other seeds, other places', () => {
+test('equal seeds give equal places, other seeds other places', () => {
   const scene = winding();
   assert.deepEqual(placed(scene), placed(winding()));
   assert.notDeepEqual(placed(scene).trees, placed({ ...scene, id: 'other' }).trees);
 });
 
-test('fog: the contrast that Koschmieder leaves, as the product over thin layers of air', () => {
+test('fog: the contrast by Koschmieder is the product over thin layers of air', () => {
   for (const visibility of [40, 120, 1000]) {
     // 5 % at the visibility, by its definition; 3 stands for 2.996.
     close(contrastLeft(visibility, visibility), 0.05, 3e-4);
@@ -146,7 +146,7 @@ test('plates by kind: outline, paint and words', () => {
   assert.deepEqual(look('PRIORITY').slice(0, 2), ['diamond', 'priority']);
   assert.deepEqual(look('WARNING_RIGHT_BEFORE_LEFT'), ['triangle', 'warn', 'cross', '']);
   assert.deepEqual(look('WARNING_STEEP_HILL_DOWNWARDS'), ['triangle', 'warn', 'danger', '']);
-  // What has no drawing, or is no sign at all, is a plate with its name.
+  // A sign without a drawing, or an unknown one, is a plate with its name.
   assert.deepEqual(look('GUIDE_SIGN_TABLE'), ['wide', 'white', '', 'Guide sign table']);
   assert.deepEqual(look('constructor', 'x'), ['wide', 'white', '', 'Constructor x']);
   assert.ok(look('X'.repeat(500))[3].length < 60);
@@ -178,7 +178,7 @@ test('a limit of each lanelet is put up once, where it begins', () => {
   const xs = (signs) => placeSigns({ signs, lanelets }, index).map(({ x }) => x);
   assert.deepEqual(xs(virtual(['13.89', '13.89', '13.89'])), [0]);
   assert.deepEqual(xs(virtual(['13.89', '8.33', '8.33'])), [0, 100]);
-  // Signs that really stand there are all put up.
+  // All signs of the map are put up.
   assert.deepEqual(xs(virtual(['13.89', '13.89', '13.89']).map(
     (one) => ({ ...one, virtual: false }))), [0, 100, 200]);
 });
@@ -222,7 +222,7 @@ test('heights: between the bounds, on top of bridges, flat where the map is', ()
   const index = new RoadIndex([hill, bridge]);
   close([index.heightAt(50, 0), index.heightAt(25, 0), index.heightAt(50, 40)], [25, 13, 25],
     1e-9);
-  // Beside the road as the nearest one, far from all 0.
+  // Beside a road the height of the nearest one, far from all roads 0.
   close([index.heightAt(10, 10), index.heightAt(500, 500)], [11, 0], 0.5);
   assert.equal(new RoadIndex([laneletOf()]).heightAt(50, 0), 0);
 });

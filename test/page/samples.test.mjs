@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The ring of samples, the search in it, and the past that is made from it. */
+/** The ring of samples, the search in it, and the past made from it. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -18,7 +18,7 @@ const ringOf = (capacity, ...steps) => {
 };
 const stepsOf = (ring) => ring.toArray().map(({ n }) => n);
 
-test('counting agrees with going through one by one', () => {
+test('the search agrees with a linear scan', () => {
   for (let length = 0; length < 20; length += 1) {
     for (let place = 0; place <= length; place += 1) {
       let asked = 0;
@@ -32,7 +32,7 @@ test('counting agrees with going through one by one', () => {
   }
 });
 
-test('the oldest give way', () => {
+test('the oldest samples are overwritten', () => {
   const ring = ringOf(3, 1, 2, 3, 4, 5);
   assert.equal(ring.length, 3);
   assert.deepEqual(stepsOf(ring), [3, 4, 5]);
@@ -42,7 +42,7 @@ test('the oldest give way', () => {
   assert.equal(ring.at(-1), undefined);
 });
 
-test('the same step once more takes the place of the first', () => {
+test('a repeated step replaces the first sample', () => {
   const ring = ringOf(3, 1, 2);
   const again = { n: 2, t: 0.02 };
   assert.equal(ring.push(again), true);
@@ -50,25 +50,25 @@ test('the same step once more takes the place of the first', () => {
   assert.equal(ring.newest, again);
 });
 
-test('what is older than the newest is refused', () => {
+test('a sample older than the newest is refused', () => {
   const ring = ringOf(3, 1, 5);
   assert.equal(ring.push(sample(3)), false);
   assert.deepEqual(stepsOf(ring), [1, 5]);
 });
 
-test('samples that are too close are left out', () => {
+test('samples too close in time are left out', () => {
   const ring = new SampleRing(10, 0.05);
   const taken = [0, 1, 2, 3, 4, 5, 6, 9, 10].filter((n) => ring.push(sample(n)));
   assert.deepEqual(taken, [0, 5, 10]);
 });
 
-test('the sample at or before a time, after the ring has gone round', () => {
+test('the sample at or before a time, after the ring has wrapped', () => {
   const ring = ringOf(4, 10, 20, 30, 40, 50, 60);
   assert.deepEqual([0.29, 0.3, 0.31, 0.599, 0.6, 9].map((t) => ring.indexAt(t)),
     [-1, 0, 0, 2, 3, 3]);
 });
 
-test('an empty ring has nothing', () => {
+test('an empty ring returns nothing', () => {
   const ring = ringOf(3, 1, 2, 3);
   ring.clear();
   assert.deepEqual([ring.length, ring.newest, ring.indexAt(1)], [0, undefined, -1]);

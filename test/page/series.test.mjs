@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Series for plots: what is left out, what never is, and what the lines are made from. */
+/** Series for plots: their thinning, and the values of their lines. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -13,17 +13,17 @@ import { close } from './support.mjs';
 
 const times = (count, spacing_s) => Array.from({ length: count }, (_, i) => i * spacing_s);
 
-test('a short series stays as it is, within its window', () => {
+test('a short series stays unchanged within its window', () => {
   const { x, y } = thin([0, 1, 2, 3, 4], [5, 6, NaN, 8, 9], 1, 3);
   assert.deepEqual([x, y], [[1, 2, 3], [6, null, 8]]);
 });
 
-test('nothing comes of nothing', () => {
+test('an empty series stays empty', () => {
   assert.deepEqual(thin([], [], 0, 10), { x: [], y: [] });
   assert.deepEqual(thin([1, 2], [1, 2], 5, 10), { x: [], y: [] });
 });
 
-test('of a long series few points remain, among them every peak', () => {
+test('a long series keeps few points, among them every peak', () => {
   const t = times(12_000, 0.01);
   const values = t.map((time) => Math.sin(time));
   values[4321] = 50;
@@ -37,14 +37,14 @@ test('of a long series few points remain, among them every peak', () => {
   assert.ok(x.every((time, i) => values[Math.round(time / 0.01)] === y[i]));
 });
 
-test('what is drawn does not tremble while the window moves on', () => {
+test('the drawn line does not tremble while the window moves on', () => {
   const t = times(12_000, 0.01);
   const values = t.map((time) => Math.sin(37 * time));
   const inner = (from, to) => thin(t, values, from, to).x.filter((time) => time > 5 && time < 60);
   assert.deepEqual(inner(0, 100), inner(0.37, 100.37));
 });
 
-test('a gap stays a gap where stretches are thinned out', () => {
+test('a gap stays a gap in thinned-out stretches', () => {
   const t = times(10_000, 0.01);
   const values = t.map((time) => (time >= 40 && time < 60 ? NaN : 1));
   const { x, y } = thin(t, values, 0, 100);
@@ -52,14 +52,14 @@ test('a gap stays a gap where stretches are thinned out', () => {
   assert.ok(x.every((time, i) => y[i] !== null || (time >= 39 && time < 61)));
 });
 
-test('unwrapping a car that goes round and round gives a line', () => {
+test('unwrapping the heading of a circling car gives a line', () => {
   const straight = times(100, 0.4);
   const wrapped = straight.map((angle) => Math.atan2(Math.sin(angle), Math.cos(angle)));
   close(unwrap(wrapped), straight, 1e-9);
   close(unwrap(wrapped.map((angle) => -angle)), straight.map((angle) => -angle), 1e-9);
 });
 
-test('an angle that is missing breaks no other', () => {
+test('a missing angle does not affect the others', () => {
   close(unwrap([0, NaN, 0.1]), [0, NaN, 0.1]);
 });
 
@@ -67,7 +67,7 @@ const status = (t, latency_ms, lag) => ({
   t, planners: { av0: { latency_ms } }, timing: { final_error_ms: lag, mean_step_error_ms: 0.1 },
 });
 
-test('figures of the run are kept so long, and replaced where a replay goes back', () => {
+test('figures are kept for a limited time, and replaced if a replay goes back', () => {
   const log = new HealthLog(10);
   for (const t of [0, 1, 2, 11, 12]) {
     log.take(status(t, 10 * t, t));
@@ -80,7 +80,7 @@ test('figures of the run are kept so long, and replaced where a replay goes back
   assert.deepEqual(log.t, []);
 });
 
-test('a status without time, timing or planners says nothing that is not there', () => {
+test('a status without time, timing or planners gives no figures', () => {
   const log = new HealthLog(10);
   log.take({ t: null });
   assert.deepEqual(log.t, []);
@@ -100,7 +100,7 @@ test('headings are plotted in degrees, without their jumps', () => {
   close(trace.y, [3, 2 * Math.PI - 3, 3.1].map((angle) => angle * 180 / Math.PI), 1e-9);
 });
 
-test('a speed that jumps is no angle', () => {
+test('a jump in speed is not unwrapped as an angle', () => {
   const past = { t: [0, 1, 2], speed: [0, 20, 0] };
   const [trace] = traces(quantity('speed'), {
     vehicles: [vehicle('hv0', 'human', past)], health: new HealthLog(1), runColor: '' }, VIEW);
@@ -116,7 +116,7 @@ test('pedals are two lines a vehicle, in per cent; the value is that of the show
   assert.deepEqual(lines[0].y, [0, 50, 25, 100]);
 });
 
-test('latency is that of AVs alone, drift that of the run', () => {
+test('latency has lines of AVs only, drift those of the run', () => {
   const health = new HealthLog(100);
   health.take(status(1, 42, 7));
   const data = { vehicles: [vehicle('hv0', 'human', {}), vehicle('av0', 'autonomous', {})],

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Engine speeds, levels, directions and what a driver hears and feels, as numbers. */
+/** Numbers of sound and rumble: engine speeds, levels, directions, kerbs and motors. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -23,7 +23,7 @@ import { close, laneletOf } from './support.mjs';
 
 const QUIET = { collision: false, offRoad: false, kerb: 0 };
 
-test('an engine turns as its wheels and gears have it', () => {
+test('the engine speed follows from wheels and gears', () => {
   // 30 m/s: 96.77 rad/s at wheels of 0.31 m, in the sixth gear 0.691 * 3.46 times as fast.
   close(lockedSpeed_rpm(CAR, 5, 30), 2209.5, 0.5);
   close(engineSpeed_rpm(CAR, 5, 30, 0.4), 2209.5, 0.5);
@@ -36,7 +36,7 @@ test('an engine turns as its wheels and gears have it', () => {
   close(engineSpeed_rpm(CAR, REVERSE, 3, 0), lockedSpeed_rpm(CAR, REVERSE, 3));
 });
 
-test('gears change in order, later with more throttle, and never to and fro', () => {
+test('gears change in order, later with more throttle, and without hunting', () => {
   for (const train of [CAR, HEAVY, ELECTRIC]) {
     for (const throttle of [0, 0.3, 0.7, 1]) {
       let gear = 0;
@@ -72,7 +72,7 @@ test('Doppler, distance and direction', () => {
   assert.equal(attenuation(RANGE_M), 0);
   assert.equal(attenuation(1e9), 0);
 
-  // To the north, and somebody on each side: west is left.
+  // Heading north with a vehicle on each side: west is left.
   const north = { x: 0, y: 0, yaw: Math.PI / 2, vx: 0, vy: 0 };
   const at = (x, y, vx = 0, vy = 0) => arrival(north, { x, y, yaw: 0, vx, vy });
   close(at(-10, 0).pan, -1);
@@ -82,12 +82,12 @@ test('Doppler, distance and direction', () => {
   close(at(10, 10).pan, Math.SQRT1_2);
   close(at(10, 0, -20).doppler, 343 / (343 - 20));
   close(at(10, 0, 20).doppler, 343 / (343 + 20));
-  // Who drives alongside is heard as he is.
+  // A vehicle that drives alongside is heard without a Doppler shift.
   close(arrival({ ...north, vy: 30 }, { x: 3, y: 0, yaw: 0, vx: 0, vy: 30 }).doppler, 1);
   close(at(0, 0).doppler, 1);
 });
 
-test('levels grow with speed as vehicle acoustics has it', () => {
+test('levels grow with speed as in vehicle acoustics', () => {
   const decibel = (ratio) => 20 * Math.log10(ratio);
   close(decibel(tyreLevel(30) / tyreLevel(3)), 35);
   close(decibel(windLevel(30) / windLevel(3)), 60);
@@ -124,7 +124,7 @@ const shownOf = (vehicles, objects = [], t = 0) => ({
   t, vehicles: new Float64Array(vehicles.flat()), objects: new Float64Array(objects.flat()),
 });
 
-test('a driver hears the own vehicle, and who is near', () => {
+test('a driver hears the own vehicle and vehicles nearby', () => {
   const listener = new Listener();
   const objects = [
     { id: '1', type: 'truck', role: 'recorded', shape: { ...shape, length: 12 } },
@@ -153,7 +153,7 @@ test('a driver hears the own vehicle, and who is near', () => {
   assert.equal(listener.hear(scene, shown, 'av0').own.train, ELECTRIC);
 });
 
-test('backwards is the reverse gear, and braking there too slows down', () => {
+test('driving backwards uses the reverse gear, and deceleration there is braking', () => {
   const scene = sceneOf([vehicle('hv0')]);
   const { own } = new Listener().hear(
     scene, shownOf([row(0, 0, 0, -4, { acceleration: 6, throttle: 0, reverse: 1 })]), 'hv0');
@@ -162,7 +162,7 @@ test('backwards is the reverse gear, and braking there too slows down', () => {
   close(own.deceleration, 6);
 });
 
-test('of many only the nearest are heard', () => {
+test('only the nearest of many vehicles are heard', () => {
   const count = 30;
   const scene = sceneOf(Array.from({ length: count }, (_, i) => vehicle(`av${i}`)));
   const rows = Array.from({ length: count }, (_, i) => row(3 * i, 0, 0, 10));
@@ -171,7 +171,7 @@ test('of many only the nearest are heard', () => {
     Array.from({ length: MOST_OTHERS }, (_, i) => `av${i + 1}`));
 });
 
-// A car along x goes from one y to another, looked at every 30 ms; tells at which y it is felt.
+// Drive a car along x from one y to another, sampled every 30 ms; return the y of each kerb.
 const feltAcross = (lanelets, from, to, { speed = 10, dy = 0.05 } = {}) => {
   const kerbs = new Kerbs({ lanelets });
   const felt = [];
@@ -187,7 +187,7 @@ const feltAcross = (lanelets, from, to, { speed = 10, dy = 0.05 } = {}) => {
   return felt;
 };
 
-test('wheels are felt where they go over a kerb, and nowhere else', () => {
+test('kerbs are felt exactly where wheels cross them', () => {
   const kerb = laneletOf({ left_line: 'curb', right_line: 'lowered_curb' });
   // The kerbs lie at y = 2 and -2, the wheels 0.8 m from the middle: left ones, then right ones.
   assert.deepEqual(feltAcross([kerb], 0, 4), [[1.25, 1], [2.85, 1]]);
@@ -195,16 +195,16 @@ test('wheels are felt where they go over a kerb, and nowhere else', () => {
   assert.deepEqual(feltAcross([kerb], 0, -1.5), [[-1.2, 0.35]]);
   assert.deepEqual(feltAcross([kerb], 0, 1), [], 'along it');
   assert.deepEqual(feltAcross([laneletOf()], 0, 4), [], 'paint is flat');
-  // Put elsewhere, nobody has driven over it; a page that is late has.
+  // A vehicle that was moved has not crossed the kerb; one on a late page has.
   assert.deepEqual(feltAcross([kerb], 0, 4, { speed: 0.1, dy: 4 }), []);
   assert.deepEqual(feltAcross([kerb], 0, 1.5, { speed: 40, dy: 1.5 }), [[1.5, 1]]);
-  // Another lane leads across, as in junctions: there it is not built.
+  // Where another lane crosses, as in junctions, the kerb does not exist.
   const across = laneletOf({ id: 2, y: 2, width: 3 });
   assert.deepEqual(feltAcross([kerb, across], 0, 3), []);
   assert.deepEqual(feltAcross([{ ...kerb, adj_left: 2 }, across], 0, 2), [[1.25, 1]]);
 });
 
-test('what was before is no way to a kerb', () => {
+test('positions before a reset cross no kerb', () => {
   const kerbs = new Kerbs({ lanelets: [laneletOf({ left_line: 'curb' })] });
   const at = (y, t) => kerbs.over(vehicle('hv0'), shownOf([row(20, y, 0, 10)], [], t), 0);
   assert.equal(at(1.1, 0), 0);
@@ -234,12 +234,12 @@ test('a gamepad feels ground, kerbs, collisions and hard braking, and nothing el
   assert.ok(over(0, 2300) > 0 && over(0, 2400) === 0);
   assert.ok(over(0.35, 2500) < 0.5 * kerb.strong);
   feeling.of(calm, QUIET, 2800);
-  // What was before a pause is not felt after it.
+  // An event before a pause is not felt after it.
   feeling.reset();
   assert.deepEqual(feeling.of(calm, { ...QUIET, collision: true }, 2300), still);
 });
 
-test('motors get the strength that is set, and stand when they are to', () => {
+test('motors get the chosen strength and stop when they must', () => {
   const calls = [];
   const actuator = {
     playEffect: (type, effect) => {

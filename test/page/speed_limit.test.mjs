@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The speed limit under a vehicle, on lanelets whose place is known. */
+/** The speed limit under a vehicle, on lanelets with known places. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -11,7 +11,7 @@ import { laneletOf } from './support.mjs';
 const limits = (...lanelets) => new SpeedLimits({ lanelets });
 const north = { left: [48, -50, 48, 50], right: [52, -50, 52, 50], center: [50, -50, 50, 50] };
 
-test('inside the lane, and nowhere else', () => {
+test('the limit holds only inside the lane', () => {
   const road = limits(laneletOf({ speed_limit: 10 }));
   assert.equal(road.at(50, 1.9, 0), 10);
   assert.equal(road.at(50, 2.1, 0), null);
@@ -19,7 +19,7 @@ test('inside the lane, and nowhere else', () => {
   assert.equal(new SpeedLimits(null).at(0, 0, 0), null);
 });
 
-test('a lane that slants: half of its box lies beside it', () => {
+test('a slanted lane: half of its box is outside it', () => {
   const slanted = { left: [0, 2, 100, 102], right: [0, -2, 100, 98], center: [0, 0, 100, 100] };
   const road = limits(laneletOf({ ...slanted, speed_limit: 10 }));
   const east = Math.PI / 4;
@@ -31,21 +31,21 @@ test('a lane without a limit has none', () => {
   assert.equal(limits(laneletOf({ speed_limit: null })).at(50, 0, 0), null);
 });
 
-test('at a crossing that of the lane which leads the vehicle\'s way', () => {
+test('at a crossing the limit is that of the lane in the vehicle\'s direction', () => {
   const road = limits(laneletOf({ speed_limit: 10 }),
     laneletOf({ id: 2, ...north, speed_limit: 20 }));
   assert.equal(road.at(50, 0, 0.2), 10);
   assert.equal(road.at(50, 0, Math.PI / 2 - 0.2), 20);
 });
 
-test('against a one-way lane another counts; one for both directions counts both ways', () => {
+test('a one-way lane counts in its direction only, a two-way lane in both', () => {
   const across = laneletOf({ id: 2, ...north, speed_limit: 20 });
   const west = Math.PI - 0.5;
   assert.equal(limits(laneletOf({ speed_limit: 10 }), across).at(50, 0, west), 20);
   assert.equal(limits(laneletOf({ speed_limit: 10, one_way: false }), across).at(50, 0, west), 10);
 });
 
-test('in a bend the heading is that of the piece which is near', () => {
+test('in a bend the heading is that of the nearest segment', () => {
   const bend = { left: [0, 2, 48, 2, 48, 50], right: [0, -2, 52, -2, 52, 50],
     center: [0, 0, 50, 0, 50, 50] };
   const road = limits(laneletOf({ ...bend, speed_limit: 10 }),
@@ -53,7 +53,7 @@ test('in a bend the heading is that of the piece which is near', () => {
       center: [0, 40, 100, 40], speed_limit: 20 }));
   assert.equal(road.at(50, 40, Math.PI / 2), 10);
   assert.equal(road.at(50, 40, 0), 20);
-  // A lane that goes there, across and back, far from the origin: each piece by itself.
+  // A lane that goes there, across and back, far from the origin: each segment counts.
   const back = { left: [1000, 2, 1046, 2, 1046, 38, 1000, 38],
     right: [1000, -2, 1050, -2, 1050, 42, 1000, 42],
     center: [1000, 0, 1048, 0, 1048, 40, 1000, 40] };

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What the address of a stage asks for, and its words. */
+/** The parameters in a stage's address, and its texts. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -14,13 +14,13 @@ test('an address without a seat is the page with everything', () => {
   assert.equal(readStage('?view=driver&lang=de'), null);
 });
 
-test('what is left out is what shows a participant least', () => {
+test('defaults show a participant the least', () => {
   assert.deepEqual(readStage('?stage=hv0'), { seat: 'hv0', view: 'driver', map: true,
     names: false, plans: false, sound: true, mirrors: true, change: false, fieldOfView_deg: null,
     lang: 'en' });
 });
 
-test('everything can be said; what is no value is left out', () => {
+test('the address can set everything; invalid values are ignored', () => {
   assert.deepEqual(readStage('?stage=hv1&view=map&map=0&names=1&plans=1&sound=0&mirrors=0'
     + '&change=1&fov=60&lang=de'), { seat: 'hv1', view: 'map', map: false, names: true,
     plans: true, sound: false, mirrors: false, change: true, fieldOfView_deg: 60, lang: 'de' });
@@ -33,6 +33,6 @@ test('a stage is no side window', () => {
   assert.equal(readViewWindow('?view=driver')?.viewpoint, 'driver');
 });
 
-test('every language has all the words', () => {
+test('every language has all texts', () => {
   assert.deepEqual(Object.keys(WORDS.de), Object.keys(WORDS.en));
 });

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** The store: documents and frames of runs that begin anew, and what is to be seen at a time. */
+/** The store: documents and frames across resets, and the picture at a time. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -27,7 +27,7 @@ function running(...frames) {
   return store;
 }
 
-test('listeners hear what they listen to, until they no longer do', () => {
+test('subscribers get their messages until they unsubscribe', () => {
   const store = new Store();
   const heard = [];
   const end = store.on('notice', ({ text }) => heard.push(text));
@@ -39,13 +39,13 @@ test('listeners hear what they listen to, until they no longer do', () => {
   assert.deepEqual(heard, ['one', 'alarms: 1']);
 });
 
-test('a message of a newer server changes nothing', () => {
+test('an unknown message of a newer server changes nothing', () => {
   const store = running(state(0, 1, [1]));
   store.receive({ type: 'weather', rain: 1 });
   assert.equal(store.latest.n, 1);
 });
 
-test('frames of an epoch that is over are dropped, those of a new one begin it', () => {
+test('frames of a past epoch are dropped, those of a new one begin it', () => {
   const store = running(state(1, 500, [1]));
   store.receiveFrame(state(0, 900, [2]), 2000);
   assert.deepEqual([store.epoch, store.latest.n], [1, 500]);
@@ -53,22 +53,22 @@ test('frames of an epoch that is over are dropped, those of a new one begin it',
   assert.deepEqual([store.epoch, store.latest.n, store.samples.length], [2, 3, 1]);
 });
 
-test('after a hello it may be another simulation, which began anew', () => {
+test('after a hello it may be another simulation, which has restarted', () => {
   const hello = { type: 'hello', client: 'c1', name: 'Guest', mode: 'live', version: '' };
   const store = running(state(3, 500, [1]));
   store.receive(hello);
   store.receiveFrame(state(0, 7, [2]), 2000);
   assert.deepEqual([store.epoch, store.latest.n], [0, 7]);
-  // The same epoch, earlier: begun once more, too.
+  // An earlier time of the same epoch is also a restart.
   store.receive(hello);
   store.receiveFrame(state(0, 2, [2]), 2001);
   assert.deepEqual([store.latest.n, store.samples.length], [2, 1]);
-  // But not without a hello.
+  // Without a hello it is not.
   store.receiveFrame(state(0, 1, [2]), 2002);
   assert.equal(store.latest.n, 2);
 });
 
-test('a recording that is played once more begins its epoch again', () => {
+test('a recording played again restarts its epoch', () => {
   const store = running(state(0, 5, [1]));
   store.receive(scene(0));
   assert.equal(store.samples.length, 1);
@@ -76,16 +76,16 @@ test('a recording that is played once more begins its epoch again', () => {
   assert.equal(store.samples.length, 0);
 });
 
-test('a scene of another number of vehicles: older rows are not mixed with it', () => {
+test('rows of a scene with another number of vehicles are not mixed in', () => {
   const store = running(state(0, 1, [1]), state(0, 2, [1], [2]));
   assert.equal(store.samples.length, 1);
 });
 
-test('nothing is to be seen before the first state', () => {
+test('nothing is shown before the first state', () => {
   assert.equal(new Store().displayed(0), null);
 });
 
-test('between two samples, as the time source says', () => {
+test('the state between two samples is that of the time source', () => {
   const store = running(state(0, 100, [0, 0, 0, 10]), state(0, 110, [1, 2, 0, 20]));
   store.useTimeSource(() => 1.025);
   const shown = store.displayed(1);
@@ -94,13 +94,13 @@ test('between two samples, as the time source says', () => {
   assert.deepEqual([shown.n, shown.k], [100, 10]);
 });
 
-test('beyond the newest vehicles drive on', () => {
+test('vehicles are extrapolated beyond the newest sample', () => {
   const store = running(state(0, 100, [5, 0, 0, 10]));
   store.useTimeSource(() => 1.05);
   close(store.displayed(1).vehicles[0], 5.5);
 });
 
-test('asked twice in a frame it computes once, and again after something came', () => {
+test('it computes once per frame, and again after new data', () => {
   let asked = 0;
   const store = running(state(0, 100, [1]));
   store.useTimeSource(() => {
@@ -115,7 +115,7 @@ test('asked twice in a frame it computes once, and again after something came', 
   assert.equal(asked, 2);
 });
 
-test('objects move on from their step, for a step and a tenth of a second at most', () => {
+test('objects are extrapolated for at most one step and a tenth of a second', () => {
   const store = running(state(0, 100, [0]), objects(10, 5, 0, 0, 10, 0, 0));
   const x = (time) => {
     store.useTimeSource(() => time);
@@ -124,7 +124,7 @@ test('objects move on from their step, for a step and a tenth of a second at mos
   close([1.0, 1.05, 1.2, 1.5, 0.9].map(x), [5, 5.5, 7, 7, 5], 1e-9);
 });
 
-test('while the run stands still, or nobody is connected, the newest is shown', () => {
+test('the newest state is shown while the run stands still or without a connection', () => {
   const store = running(...Array.from({ length: 100 }, (_, n) => state(0, n, [n])));
   store.receive(status('paused'));
   assert.equal(store.displayed(5000).t, 0.99);
@@ -133,7 +133,7 @@ test('while the run stands still, or nobody is connected, the newest is shown', 
   assert.equal(store.displayed(6000).t, 0.99);
 });
 
-test('the past of a vehicle: every twentieth of a second, so far back', () => {
+test('the past of a vehicle: every twentieth of a second, for a given time', () => {
   const store = running(...Array.from({ length: 301 }, (_, n) => state(0, n, [n], [-n])));
   const past = store.history(1, 1);
   // After 2 s and up to 3 s.
@@ -147,7 +147,7 @@ test('indices by id', () => {
     new Store().vehicleIndex('av0')], [1, -1, -1]);
 });
 
-test('what was drawn is kept, though the store refills its arrays', () => {
+test('the drawn state is kept although the store refills its arrays', () => {
   const store = running(state(0, 100, [1]), state(0, 110, [2]));
   store.useTimeSource((now_ms) => now_ms / 1000);
   const kept = keepShown(null, store.displayed(1000));

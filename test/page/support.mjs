@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** What several tests of the page need: numbers compared, frames written, paths recorded. */
+/** Shared helpers of the page's tests: compare numbers, write frames, record paths. */
 
 import assert from 'node:assert/strict';
 
@@ -37,7 +37,7 @@ export function frameOf(...values) {
  * Write a STATE frame.
  *
  * @param {{epoch?: number, n: number, k?: number, t: number}} head
- * @param {...number[]} rows of 13 values; what is left out is 0
+ * @param {...number[]} rows of 13 values; missing values are 0
  * @returns {ArrayBuffer}
  */
 export function stateFrame({ epoch = 0, n, k = 0, t }, ...rows) {
@@ -45,7 +45,7 @@ export function stateFrame({ epoch = 0, n, k = 0, t }, ...rows) {
     ...rows.flatMap((row) => Array.from({ length: 13 }, (_, i) => row[i] ?? 0)));
 }
 
-/** Stands for Path2D: keeps what is drawn, as straight pieces and the points that bound them. */
+/** Stands for Path2D: keeps the drawing as straight pieces and their bounding points. */
 export class PathRecorder {
   /** Each piece is a list of points [x, y]. */
   pieces = [];
@@ -95,13 +95,13 @@ export class PathRecorder {
     this.pieces.push(...other.pieces);
   }
 
-  /** Length of each piece that is drawn. */
+  /** Return the length of each drawn piece. */
   get lengths() {
     return this.pieces.filter((piece) => piece.length > 1).map((piece) => piece.slice(1).reduce(
       (sum, [x, y], i) => sum + Math.hypot(x - piece[i][0], y - piece[i][1]), 0));
   }
 
-  /** xmin, ymin, xmax, ymax of all points. */
+  /** Return xmin, ymin, xmax, ymax of all points. */
   get box() {
     const points = this.pieces.flat();
     const [xs, ys] = [points.map(([x]) => x), points.map(([, y]) => y)];
@@ -109,7 +109,7 @@ export class PathRecorder {
   }
 }
 
-/** Let modules that draw be loaded where there is no browser. */
+/** Make modules that draw loadable without a browser. */
 export function recordPaths() {
   globalThis.Path2D = PathRecorder;
 }
@@ -117,8 +117,8 @@ export function recordPaths() {
 /**
  * Give the page a storage of its own.
  *
- * @param {Record<string, string>} [content] of it at first
- * @returns {Map<string, string>} what is kept
+ * @param {Record<string, string>} [content] its initial content
+ * @returns {Map<string, string>} the stored items
  */
 export function keepStorage(content = {}) {
   const kept = new Map(Object.entries(content));
@@ -133,10 +133,10 @@ export function keepStorage(content = {}) {
 }
 
 /**
- * A straight lanelet along x, 4 m wide around y = 0 unless said otherwise.
+ * Make a straight lanelet along x, by default 4 m wide around y = 0.
  *
- * @param {object} [more] what differs
- * @returns {object} as the scene has them
+ * @param {object} [more] changed properties
+ * @returns {object} lanelet as in a scene
  */
 export function laneletOf({ id = 1, length = 100, y = 0, width = 4, ...more } = {}) {
   return {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Tasks: how long something was to be seen without pauses, which buttons answer, languages. */
+/** Tasks: the time on screen without pauses, the answering buttons, languages. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -25,14 +25,14 @@ function drawn(running) {
   return prompt;
 }
 
-test('a response is timed from the first picture, and its delay from when it was heard of', () => {
+test('a response is timed from the first picture, its delay from the message', () => {
   const prompt = drawn(new RunningTime());
   assert.deepEqual(prompt.times(10_380),
     { delay_ms: 40, picture_ms: 16, response_ms: 350, paused_ms: 0 });
   assert.deepEqual(prompt.times(), { delay_ms: 40, picture_ms: 16 });
 });
 
-test('the light is on for its time, an answer is taken for longer', () => {
+test('the light is on for its time; an answer is accepted for longer', () => {
   const prompt = drawn(new RunningTime());
   assert.deepEqual([10_029, 10_030, 11_029, 11_030].map((at) => prompt.lit(at)),
     [true, true, true, false]);
@@ -42,7 +42,7 @@ test('the light is on for its time, an answer is taken for longer', () => {
   assert.equal(prompt.lit(10_100) || prompt.takes(10_100), false);
 });
 
-test('nothing is taken before it is drawn', () => {
+test('no answer is accepted before the light is drawn', () => {
   const prompt = new Prompt({ task: 'light', seat: 'hv0', number: 1, n: 300, seen: false }, LIGHT,
     new RunningTime(), 10_000, NaN);
   assert.equal(prompt.takes(10_500) || prompt.lit(10_500), false);
@@ -64,7 +64,7 @@ test('pauses count neither for the light nor for the response', () => {
     { delay_ms: 40, picture_ms: 16, response_ms: 300, paused_ms: 50_000 });
 });
 
-test('buttons that steer, shift or blink answer nothing, all others do', () => {
+test('all buttons answer but those that steer, shift or blink', () => {
   /** @type {(index: number) => object} */
   const axis = (index) => ({ kind: 'axis', index, min: 0, max: 1, deadzone: 0 });
   /** @type {any} */
@@ -75,7 +75,7 @@ test('buttons that steer, shift or blink answer nothing, all others do', () => {
     [1, 2, 8, 9]);
 });
 
-test('the address names the language, else the game, else English', () => {
+test('the language is that of the address, else of the game, else English', () => {
   assert.equal(languageOf('?lang=de', 'en'), 'de');
   assert.equal(languageOf('?lang=de-AT', undefined), 'de');
   assert.equal(languageOf('?lang=xx', 'de'), 'de');

@@ -12,7 +12,7 @@ import shutil
 from page_tools import HERE, installed_tools, is_stale, missing, ROOT, run
 import pytest
 
-# In a worker with what else walks through this folder: npm writes into it.
+# In one worker with the other tests that scan this folder, as npm writes into it.
 pytestmark = pytest.mark.xdist_group('test_lint')
 
 PAGE = ROOT / 'crgame_ros' / 'cockpit' / 'page' / 'js'
@@ -23,18 +23,18 @@ MAX_COLUMNS = 99
 
 @pytest.fixture(scope='module')
 def tools() -> Path:
-    """Return the folder of the tools that package-lock.json pins."""
+    """Return the folder of the tools pinned by package-lock.json."""
     return installed_tools()
 
 
 def check_types(root: Path) -> None:
-    """Let tsc check the page of a tree."""
+    """Check the page of a tree with tsc."""
     here = root / HERE.relative_to(ROOT)
     run('node', here / 'node_modules' / 'typescript' / 'bin' / 'tsc', '--project', here)
 
 
 def check_rules(root: Path) -> None:
-    """Let eslint check the page of a tree, and its tests."""
+    """Check the page of a tree and its tests with eslint."""
     here = root / HERE.relative_to(ROOT)
     run('node', here / 'node_modules' / 'eslint' / 'bin' / 'eslint.js', '--max-warnings', '0',
         '--config', here / 'eslint.config.mjs',
@@ -44,21 +44,21 @@ def check_rules(root: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures('tools')
 def test_types() -> None:
-    """Everything in the page has a type, and is used as that."""
+    """The page passes the type check."""
     check_types(ROOT)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures('tools')
 def test_rules() -> None:
-    """The page and its tests keep the rules of eslint.config.mjs, without a warning."""
+    """The page and its tests pass the rules of eslint.config.mjs without a warning."""
     check_rules(ROOT)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures('tools')
 def test_units() -> None:
-    """What needs no browser computes what it should, in Node's own runner."""
+    """The unit tests without a browser pass in Node's own runner."""
     files = sorted(HERE.glob('*.test.mjs'))
     assert len(files) > 10
     run('node', '--test', *files)
@@ -72,7 +72,7 @@ def test_units() -> None:
      ['no-restricted-properties', 'eqeqeq', 'no-undef'])], ids=['types', 'rules'])
 def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], None], code: str,
                         told: list[str]) -> None:
-    """Each of them fails on a page with such a file in it, and says why."""
+    """Each check fails on a page with a faulty file and gives the reason."""
     for pages in (PAGE, DESK):
         shutil.copytree(pages, tmp_path / pages.relative_to(ROOT))
     here = tmp_path / HERE.relative_to(ROOT)
@@ -89,7 +89,7 @@ def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], Non
 
 
 def test_a_machine_without_node_is_told(tmp_path: Path) -> None:
-    """Without both programs, or with a Node that eslint does not take."""
+    """Missing programs, or a Node version that eslint refuses, are reported."""
     assert missing(str(tmp_path)) == 'node and npm missing'
     for name, version in (('npm', '11.0.0'), ('node', 'v18.20.4')):
         (tmp_path / name).write_text(f'#!/bin/sh\necho {version}\n')
@@ -100,7 +100,7 @@ def test_a_machine_without_node_is_told(tmp_path: Path) -> None:
 
 
 def test_tools_are_installed_anew_when_the_lock_changes(tmp_path: Path) -> None:
-    """Absent, half installed, complete, and older than the lock file."""
+    """Tools are checked when absent, half installed, complete, or older than the lock file."""
     lock, installed = tmp_path / 'package-lock.json', tmp_path / 'node_modules'
     lock.touch()
     assert is_stale(tmp_path)
@@ -114,7 +114,7 @@ def test_tools_are_installed_anew_when_the_lock_changes(tmp_path: Path) -> None:
 
 
 def test_tools_are_pinned_and_come_from_whatever_registry_is_set() -> None:
-    """Exact versions, each package with its checksum, and none with the address of a server."""
+    """The lock file has exact versions and checksums, and no address of a server."""
     wanted = json.loads((HERE / 'package.json').read_text(encoding='utf-8'))
     lock = json.loads((HERE / 'package-lock.json').read_text(encoding='utf-8'))
     assert 'dependencies' not in wanted

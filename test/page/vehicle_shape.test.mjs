@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Looks of vehicles and obstacles: as large as they are, with what their kind has. */
+/** Shapes of vehicles and obstacles: true sizes, and the parts of each kind. */
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -14,7 +14,7 @@ const { lookOf, TYRE } = await import(
 const rectangle = (length, width) => ({ kind: 'rectangle', length, width, vertices: [] });
 const parts = (look) => ['glass', 'roof', 'lamps', 'brakes'].filter((name) => look[name]);
 
-test('a car is as long and wide as it is, but for the bow of its bumper', () => {
+test('a car has its length and width, but for the bow of its bumper', () => {
   const { body, extent, radius } = lookOf('car', rectangle(4.5, 1.8), true);
   const [xmin, ymin, xmax, ymax] = body.box;
   close([xmin, ymin, ymax], [-2.25, -0.9, 0.9]);
@@ -25,7 +25,7 @@ test('a car is as long and wide as it is, but for the bow of its bumper', () => 
 });
 
 for (const [type, length, width] of [['truck', 12, 2.5], ['bus', 18, 2.5]]) {
-  test(`a ${type} is as long and wide as it is`, () => {
+  test(`a ${type} has its length and width`, () => {
     const look = lookOf(type, rectangle(length, width), true);
     close(look.body.box, [-length / 2, -width / 2, length / 2, width / 2]);
     assert.deepEqual(parts(look), ['glass', 'lamps', 'brakes']);
@@ -49,12 +49,12 @@ test('lamps are at the front and brake lights at the back, within the outline', 
   }
 });
 
-test('a windscreen is in the front half, so that one sees where it goes', () => {
+test('a windscreen is in the front half, so that the heading is visible', () => {
   const { glass, roof } = lookOf('car', rectangle(4.5, 1.8), true);
   assert.ok(glass.box[2] > roof.box[2], 'before the roof');
 });
 
-test('what has no proportions of a car is a block with a nose, or without if it stands', () => {
+test('a shape unlike a car is a block with a nose, or without one if static', () => {
   assert.deepEqual(parts(lookOf('car', rectangle(12, 1.8), true)), ['glass']);
   assert.deepEqual(parts(lookOf('unknown', rectangle(4, 4), false)), []);
   assert.deepEqual(parts(lookOf('car', rectangle(4.5, 1.8), false)), []);
@@ -95,7 +95,7 @@ test('a pedestrian is an ellipse of its size, and a nose that points ahead', () 
   assert.ok(body.box[2] > 0.2);
 });
 
-test('a bicycle is as long as it is, with a handlebar as wide', () => {
+test('a bicycle has its length, and its handlebar its width', () => {
   const { body } = lookOf('bicycle', rectangle(1.8, 0.7), true);
   const [xmin, ymin, xmax, ymax] = body.box;
   close([xmin, ymin, xmax, ymax], [-0.9, -0.35, 0.9, 0.35]);

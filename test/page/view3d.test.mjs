@@ -28,41 +28,41 @@ const PLACE = { height: 1.42, bonnet_height: 0.95, eye: [1.25, 0.36, 1.17],
   left_mirror: [1.78, 0.92, 0.98], right_mirror: [1.78, -0.92, 0.98],
   inner_mirror: [1.75, 0, 1.26] };
 
-test('a picture that is true to scale subtends what reality would', () => {
+test('a picture true to scale subtends the same angles as reality', () => {
   // A screen of 0.6 m, seen from 0.7 m: half of it from the middle is atan(0.3 / 0.7).
   near(trueAngle({ screen_width_m: 0.6, eye_distance_m: 0.7 }, 1), 2 * 23.1986 * DEGREE, 1e-5);
-  // Half as wide a window is not half the angle.
+  // A window of half the width does not have half the angle.
   near(trueAngle({ screen_width_m: 0.6, eye_distance_m: 0.7 }, 0.5), 2 * 12.0948 * DEGREE, 1e-5);
-  // 1.8 m at 20 m are 5.15 degrees: so they are on the glass.
+  // 1.8 m at 20 m are 5.15 degrees, also on the screen.
   const across = acrossAngle({ screen_width_m: 0.6, eye_distance_m: 0.7 }, 75, 960, 1920);
   const share = (0.9 / 20) / Math.tan(across / 2);
   const onGlass_m = 0.6 * 0.5 * share;
   near(2 * Math.atan(onGlass_m / 2 / 0.7) / DEGREE, 5.15, 0.01);
 });
 
-test('a chosen field of view is across the picture, within what can be drawn', () => {
+test('a chosen field of view is horizontal and within limits', () => {
   near(acrossAngle(null, 90, 800, 1920), 90 * DEGREE, 1e-9);
   near(acrossAngle(null, 500, 800, 1920), 140 * DEGREE, 1e-9);
   near(heightAngle(90 * DEGREE, 2), 2 * Math.atan(0.5), 1e-9);
   assert.ok(heightAngle(140 * DEGREE, 0.5) <= 110 * DEGREE);
 });
 
-test('pictures come out of turn just when a vehicle may answer a key', () => {
+test('extra pictures are drawn only when a vehicle may react to a key', () => {
   const answer = new KeyAnswer();
   assert.ok(!answer.isDue(3));
   answer.pressed(3, 1);
-  // Shown is what was simulated some time before the newest state, which is no answer yet.
+  // The shown state was simulated before the newest one and is no reaction yet.
   const due = [2.98, 3, 3.005, 3.02, 3.03, 3.045, 3.06, 9].filter((t) => answer.isDue(t));
   assert.deepEqual(due, [3.02, 3.03, 3.045]);
   answer.pressed(8.99, 1);
   assert.ok(!answer.isDue(3.02) && answer.isDue(9.01));
 });
 
-test('slow or fast, a key brings three pictures out of turn at most', () => {
+test('a key causes at most three extra pictures, at slow and fast pace', () => {
   for (const rate of [0.1, 1, 5]) {
     const answer = new KeyAnswer();
     answer.pressed(3, rate);
-    // Frames of a screen of 144 Hz, all out of turn, for as long as a key takes in any case.
+    // Frames of a screen of 144 Hz, all extra ones, for as long as a key takes at least.
     const drawn = [];
     for (let wall_s = 0; wall_s < 2; wall_s += 1 / 144) {
       if (answer.isDue(3 + rate * wall_s)) {
@@ -71,7 +71,7 @@ test('slow or fast, a key brings three pictures out of turn at most', () => {
       }
     }
     assert.equal(drawn.length, 3, `rate ${rate}`);
-    // The next cycle obeys the key, whatever a simulated second takes; then the way back.
+    // The next cycle obeys the key at any pace; then follows the transmission back.
     near(drawn[0], 0.008 / rate, 1 / 144);
     answer.pressed(20, rate);
     assert.ok(answer.isDue(20.009) && !answer.isDue(20.0081 + 0.042 * rate));
@@ -85,7 +85,7 @@ test('wheels are turned as those of a single-track model that moves so', () => {
     near(steeringOf(wheelbase, speed, -speed * Math.tan(angle) / wheelbase), -angle, 1e-12);
   }
   near(steeringOf(2.7, 10, 0), 0, 0);
-  // A recording may turn on the spot, which no wheels can.
+  // A recorded car may turn on the spot, which wheels cannot do.
   near(steeringOf(2.7, 1, 9), 0.65, 1e-12);
   near(steeringOf(2.7, -1, 9), -0.65, 1e-12);
   assert.equal(steeringOf(2.7, 0, 0.5), 0);
@@ -98,7 +98,7 @@ test('wheels are turned as those of a single-track model that moves so', () => {
   }
 });
 
-test('what is no screen is not taken for one', () => {
+test('an invalid screen is refused', () => {
   assert.deepEqual(readSeat('60', '70'), { screen_width_m: 0.6, eye_distance_m: 0.7 });
   for (const [width, distance] of [['', '70'], ['60', ''], ['-60', '70'], ['60', '0'],
     ['x', '70'], ['60', 'Infinity']]) {
@@ -127,10 +127,10 @@ test('chase is behind the vehicle, bird above it', () => {
   near(bird.pitch, -Math.PI / 2, 1e-9);
 });
 
-test('a flat mirror shows what is seen from the image of the eye behind it', () => {
+test('a flat mirror shows the view from the image of the eye behind it', () => {
   const inner = MIRRORS.find(({ name }) => name === 'inner');
   const { point, aside, pitch } = mirrorCamera(inner, PLACE);
-  // The image of the eye in the glass whose normal halves eye and line of sight.
+  // The eye's image in the glass, whose normal bisects the directions to eye and target.
   const glass = PLACE.inner_mirror;
   const toEye = PLACE.eye.map((value, axis) => value - glass[axis]);
   const distance = Math.hypot(...toEye);
@@ -145,7 +145,7 @@ test('a flat mirror shows what is seen from the image of the eye behind it', () 
   near(point.z, image[2], 1e-9);
 });
 
-test('outer mirrors are bent: what they show is wider than in a flat one', () => {
+test('outer mirrors are curved and show a wider view than a flat one', () => {
   const left = MIRRORS.find(({ name }) => name === 'left');
   const bent = mirrorCamera(left, PLACE);
   const flat = mirrorCamera({ ...left, radius: Infinity }, PLACE);
@@ -156,16 +156,16 @@ test('outer mirrors are bent: what they show is wider than in a flat one', () =>
   assert.ok(Math.atan2(-4, 20) > edge, `${edge / DEGREE}`);
 });
 
-test('the origin is amid the map, whole metres, and always the same', () => {
+test('the origin is in the middle of the map, in whole metres, and constant', () => {
   const scene = { bounds: [690500.3, 5335000.1, 691000.9, 5335900.7] };
   assert.deepEqual(localOrigin(scene), { x: 690751, y: 5335450 });
   const { x } = localOrigin(scene);
-  // From there float32 knows tenths of millimetres; from the map's zero it does not.
+  // From there float32 resolves tenths of millimetres; from the map's zero it does not.
   near(Math.fround(690999.123 - x), 690999.123 - x, 1e-4);
   assert.ok(Math.abs(Math.fround(690999.123) - 690999.123) > 1e-3);
 });
 
-test('the quality finds a ratio whose pictures cost what they may', () => {
+test('the quality control finds a pixel ratio within the time for a picture', () => {
   for (const factor of [4, 40, 400]) {
     const quality = new Quality(true, 1);
     const cost = () => 2 + factor * quality.ratio ** 2;
@@ -188,7 +188,7 @@ test('the quality finds a ratio whose pictures cost what they may', () => {
   assert.ok(!isSoftware('ANGLE (NVIDIA Corporation, NVIDIA GeForce RTX 3060/PCIe/SSE2)'));
 });
 
-test('detail is left out where pictures are too dear, and comes back where they are not', () => {
+test('detail is dropped when pictures take too long, and returns when they do not', () => {
   for (const software of [true, false]) {
     const quality = new Quality(software, 1);
     let now_ms = 0;
@@ -212,7 +212,7 @@ test('detail is left out where pictures are too dear, and comes back where they 
   }
 });
 
-test('a quality that was too dear is tried again ever more rarely', () => {
+test('a quality that took too long is retried ever more rarely', () => {
   const quality = new Quality(true, 1);
   const cost = () => (quality.ratio > 0.45 ? 40 : 5);
   const tries = [];
@@ -229,7 +229,7 @@ test('a quality that was too dear is tried again ever more rarely', () => {
   }
 });
 
-test('pictures of a processor come less often when each takes long, yet 20 times a second', () => {
+test('slow software pictures come less often, but at least 20 times a second', () => {
   const quality = new Quality(true, 1);
   quality.take(5, 0);
   assert.equal(quality.period_ms, 33);
@@ -249,7 +249,7 @@ test('a ball is within planes while any part of it is', () => {
   assert.ok(!isWithin(planes, 0, 0, -1.6, 0.5));
 });
 
-test('plain bodies are as large as the others, of few triangles', () => {
+test('plain bodies have the size of the others and few triangles', () => {
   const rectangle = (length, width) => ({ kind: 'rectangle', length, width, vertices: [] });
   for (const [type, length] of [['car', 4.5], ['car', 6], ['truck', 12], ['bus', 12]]) {
     const look = ofObject({ id: '7', type, role: 'recorded', shape: rectangle(length, 2) });
@@ -271,7 +271,7 @@ test('plain bodies are as large as the others, of few triangles', () => {
   assert.equal(plainBody(walker.key, walker.build()), null);
 });
 
-test('an address says what a window shows', () => {
+test('the address sets the view of a window', () => {
   assert.equal(readViewWindow(''), null);
   assert.equal(readViewWindow('?view=kitchen'), null);
   const side = readViewWindow('?view=driver&yaw=-60&vehicle=hv1&fov=50');

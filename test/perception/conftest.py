@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes perception_support.py beside this file importable."""
+"""Make perception_support.py beside this file importable."""
 
 from pathlib import Path
 import sys

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles on known courses, small worlds and requests that the tests of perception share."""
+"""Shared helpers of the perception tests: known courses, small worlds and requests."""
 
 from collections.abc import Sequence
 import math
@@ -69,7 +69,7 @@ class World:
     """
     One AV, perhaps a human, and objects that move at constant velocity.
 
-    :param objects: what there is, with pose and velocity of the centre at n = 0
+    :param objects: all objects, with pose and velocity of the centre at n = 0
     :param sensors: of the AV; None sees everything
     :param course: the AV's states; standing at the origin without one
     :param human: state of a standing human's vehicle hv0
@@ -117,7 +117,7 @@ class World:
         return self
 
     def request(self, n: int, points: int = 31) -> JointSeries:
-        """Make the true request of step n as the engine does, with nobody accelerating."""
+        """Make the true request of step n as the engine does, without accelerations."""
         columns: list[Array] = []
         names: list[str] = []
         ahead = 0.1 * np.arange(points)[:, None]
@@ -142,17 +142,17 @@ class World:
                            np.arange(points, dtype=np.int64) * 100_000_000, *arrays)
 
     def perceived(self, n: int, name: str) -> tuple[Array, Array]:
-        """Return the poses and velocities, each (P, 3), at which a request shows a thing."""
+        """Return the poses and velocities, each (P, 3), of a thing in a request."""
         request = self.perception.perceive(self.request(n))
         if f'{name}/x' not in request.names:
-            # It is left out where nobody knows of it.
+            # An unknown object is left out.
             nowhere = np.full((len(request.times_ns), 3), np.nan)
             return nowhere, nowhere
         first = request.names.index(f'{name}/x')
         return request.positions[:, first:first + 3], request.velocities[:, first:first + 3]
 
     def knows(self, n: int, name: str) -> bool:
-        """Return whether a request shows a thing; it does at all points or at none."""
+        """Return whether a request shows a thing, which holds at all points or at none."""
         poses, velocities = self.perceived(n, name)
         present = np.isfinite(poses)
         assert present.all() == present.any()

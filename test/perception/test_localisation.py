@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Noise, bias and the Kalman filter (FS II-B1), whose covariance is that of its errors."""
+"""Noise, bias and the Kalman filter (FS II-B1), with its errors' covariance."""
 
 import math
 
@@ -59,7 +59,7 @@ def test_covariance_is_that_of_the_errors(spec: LocalisationSpec, steps: int,
     pytest.param(LocalisationSpec(bias_walk=0.2), id='walk'),
 ])
 def test_filter_does_not_know_of_a_bias(spec: LocalisationSpec) -> None:
-    """Biased, the errors leave the bounds that the filter believes in."""
+    """With a bias the errors leave the filter's own bounds."""
     mean, inside = consistency(spec)
     assert mean > 6.0
     assert inside < 0.3
@@ -78,7 +78,7 @@ def test_estimate_takes_the_bias_over() -> None:
 @pytest.mark.slow
 def test_bias_walks_like_a_random_walk() -> None:
     """After 4 s its standard deviation is the walk times sqrt(4 s), within 95 %."""
-    # A filter that trusts nothing but the position shows what it is given.
+    # A filter that trusts only the position shows its input.
     spec = LocalisationSpec(bias_walk=1.0, rate=100.0, position_noise=0.001, motion_noise=100.0)
     course = straight(400, 10.0)
     last = np.array([localise(course, spec, seed)[0][-1, :2] for seed in range(60)]).ravel()
@@ -87,7 +87,7 @@ def test_bias_walks_like_a_random_walk() -> None:
 
 
 def test_steady_covariance_solves_the_riccati_equation() -> None:
-    """Along x at known heading, position and speed are a linear system, which scipy solves."""
+    """Position and speed along x at known heading form a linear system that scipy solves."""
     spec = LocalisationSpec(rate=100.0, yaw_noise=1e-5, yaw_rate_noise=0.0)
     _, covariances = localise(straight(3000, 15.0), spec)
     motion = np.array([[1.0, DT], [0.0, 1.0]])
@@ -116,13 +116,13 @@ def test_covariance_grows_in_a_dropout_and_recovers() -> None:
     assert elapsed_s >= 2.99
     assert after[2] == pytest.approx(before[2] + spec.yaw_rate_noise**2 * elapsed_s)
     assert after[1] > 4.0 * before[1]
-    # The wheels still give the speed.
+    # Wheel odometry still gives the speed.
     assert after[3] < 1.2 * before[3]
     assert variances[last + 100][1] < 2.0 * before[1]
 
 
 def test_dropouts_come_as_often_as_they_should() -> None:
-    """The share of time with a pose is exp(-rate * duration) of a Poisson process."""
+    """The share of time with a pose is exp(-rate * duration), as for a Poisson process."""
     spec = LocalisationSpec(dropout_rate=0.5, dropout_duration=1.0)
     lost = []
     for seed in range(20):
@@ -134,7 +134,7 @@ def test_dropouts_come_as_often_as_they_should() -> None:
 
 
 def test_standing_still() -> None:
-    """At rest the estimate stays put, does not roll backwards, and its covariance holds."""
+    """At rest the estimate stays in place without rolling back, and its covariance is valid."""
     course = [VehicleState(3.0, 4.0, math.pi, 0.0)] * 2001
     errors, covariances = localise(course)
     deviations = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
@@ -142,12 +142,12 @@ def test_standing_still() -> None:
     assert (errors[:, 3] >= 0.0).all()
     assert errors[:, 3].max() < 0.05
     assert deviations[-1, 0] < 0.05
-    # The wheels say that they stand, to a hundredth of a metre a second.
+    # Wheel odometry shows standstill to 0.01 m/s.
     assert deviations[-1, 3] < 0.01
 
 
 def test_reverse_keeps_its_sign() -> None:
-    """The gear is known: a vehicle that creeps backwards is never seen to go ahead."""
+    """The gear is known, so the estimate of a vehicle that creeps back never moves ahead."""
     creeping = [VehicleState(-0.02 * DT * n, 0.0, 0.0, -0.02) for n in range(1001)]
     localisation = Localisation(LocalisationSpec(), 2, 'av0', creeping[0], DT)
     for n, truth in enumerate(creeping[1:], start=1):
@@ -162,14 +162,14 @@ def test_reverse_keeps_its_sign() -> None:
     pytest.param(LocalisationSpec(position_noise=100.0, yaw_noise=3.0), id='rough'),
 ])
 def test_covariance_stays_symmetric_and_positive(spec: LocalisationSpec) -> None:
-    """Over 20 s, whatever the noise."""
+    """The covariance stays valid over 20 s for any noise."""
     _, covariances = localise(winding(2000), spec)
     np.testing.assert_array_equal(covariances, covariances.transpose(0, 2, 1))
     assert np.linalg.eigvalsh(covariances).min() > 0.0
 
 
 def test_heading_is_wrapped() -> None:
-    """Through three full circles the heading's error stays small, in (-pi, pi]."""
+    """The heading's error stays small over three full circles, with headings in (-pi, pi]."""
     yaw = 0.02 * np.arange(1000)
     course = [VehicleState(5.0 * math.sin(a), -5.0 * math.cos(a), math.remainder(a, 2 * math.pi),
                            10.0, yaw_rate=2.0) for a in yaw.tolist()]
@@ -192,7 +192,7 @@ def trace(course: list[VehicleState], steps: NDArray[np.int64], seed: int,
 
 
 def test_same_seed_same_bits_and_only_then() -> None:
-    """Seed and vehicle decide; nothing else does."""
+    """The estimate's noise depends on seed and vehicle only."""
     course, steps = winding(300), np.arange(1, 301)
     one, same = trace(course, steps, 7), trace(course, steps, 7)
     assert one.estimate == same.estimate
@@ -202,12 +202,12 @@ def test_same_seed_same_bits_and_only_then() -> None:
 
 
 def test_lost_steps_change_no_later_measurement() -> None:
-    """With steps 101 to 149 lost, measurements, dropouts and bias are later the same."""
+    """Losing steps 101 to 149 does not change later measurements, dropouts and bias."""
     course = winding(2000)
     steps = np.arange(1, 2001)
     whole = trace(course, steps, 4)
     holed = trace(course, steps[(steps <= 100) | (steps >= 150)], 4)
-    # Long after, the filters have forgotten what differed: they are fed the same.
+    # Long afterwards the filters agree again, as they get the same measurements.
     assert holed.lost == whole.lost
     np.testing.assert_allclose(holed.estimate[:4], whole.estimate[:4], atol=1e-3)
     np.testing.assert_allclose(holed.covariance, whole.covariance, rtol=1e-2, atol=1e-7)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Random numbers that belong to a step."""
+"""Random numbers by step."""
 
 from crgame_ros.perception.noise import KeyedNoise
 import numpy as np
@@ -10,7 +10,7 @@ from scipy import stats
 
 @pytest.mark.parametrize('block', [1, 256])
 def test_a_row_does_not_depend_on_what_was_drawn_before(block: int) -> None:
-    """In order, backwards with holes, or alone: step 700 has its numbers."""
+    """Step 700 has the same numbers in order, backwards with gaps, or alone."""
     noise = KeyedNoise(3, 'av0/front', 5, block)
     rows = np.array([noise.normal(n).copy() for n in range(800)])
     numbers = [noise.uniform(n) for n in range(800)]
@@ -32,7 +32,7 @@ def test_streams_of_other_seeds_and_names_are_independent() -> None:
 
 @pytest.mark.parametrize('block', [1, 256])
 def test_numbers_are_normal_and_uniform(block: int) -> None:
-    """Kolmogorov and Smirnov find nothing over blocks; neighbouring rows are uncorrelated."""
+    """Blocks pass the Kolmogorov-Smirnov test, and neighbouring rows are uncorrelated."""
     noise = KeyedNoise(11, 'av0', 4, block)
     rows = np.array([noise.normal(n) for n in range(3000)])
     numbers = np.array([noise.uniform(n) for n in range(3000)])

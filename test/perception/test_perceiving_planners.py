@@ -26,8 +26,8 @@ class Drive(NamedTuple):
     """
     A run whose first AV plans on what it perceives.
 
-    :param record: what became of its plans
-    :param seen: (ticks, V + M) what it knew
+    :param record: outcomes of its plans
+    :param seen: (ticks, V + M) vehicles and objects that it knew
     :param requests: true and perceived, of each tick
     :param setup: the run
     """
@@ -68,7 +68,7 @@ def drive(game: str, planner: str, spec: PerceptionSpec, steps: int) -> Drive:
 @pytest.mark.parametrize('planner', ['idm', 'reactive', 'constant-velocity', 'idm-package'])
 @pytest.mark.parametrize('game', ['traffic', 'crossing'])
 def test_planners_accept_what_is_perceived(game: str, planner: str) -> None:
-    """With the defaults: nobody falls back, every plan is accepted, not everybody is seen."""
+    """With the defaults no planner falls back, all plans are accepted, some vehicles unseen."""
     done = drive(game, planner, PerceptionSpec(), 150)
     assert done.record.statistics.reasons == {}
     assert done.record.counters.accepted == 15
@@ -77,8 +77,8 @@ def test_planners_accept_what_is_perceived(game: str, planner: str) -> None:
 
 
 @pytest.mark.parametrize('planner', ['idm', 'reactive', 'constant-velocity', 'idm-package'])
-def test_planners_accept_that_nobody_is_there(planner: str) -> None:
-    """The human too is absent, in all joints at all points."""
+def test_planners_accept_an_empty_road(planner: str) -> None:
+    """The human's vehicle is absent too, in all joints at all points."""
     done = drive('cut_in', planner, BLIND, 60)
     assert done.record.statistics.reasons == {}
     assert done.record.counters.accepted == 6
@@ -90,7 +90,7 @@ def test_planners_accept_that_nobody_is_there(planner: str) -> None:
 
 
 def test_a_planner_brakes_only_for_what_it_sees() -> None:
-    """The human cuts in and brakes: seen, it slows the AV down; unseen, it doesn't."""
+    """The AV slows down for a human that cuts in and brakes only if it sees the human."""
     speeds = {}
     for name, spec in (('front', replace(PerceptionSpec(), localisation=None)),
                        ('blind', BLIND)):
@@ -101,7 +101,7 @@ def test_a_planner_brakes_only_for_what_it_sees() -> None:
 
 
 def test_exact_sensors_show_recorded_cars_as_they_are() -> None:
-    """Of what a scan at this very tick saw, present poses and velocities are true."""
+    """Present poses and velocities are true for the cars that a scan of the same tick saw."""
     sensor = SensorSpec('roof', x=1.4, field_of_view=2 * math.pi, rays=1440, horizon=200.0,
                         **EXACT)
     done = drive('traffic', 'idm', PerceptionSpec(None, (sensor,), memory=0.0), 100)
@@ -111,7 +111,7 @@ def test_exact_sensors_show_recorded_cars_as_they_are() -> None:
         shown += int(present[4:].sum())
         np.testing.assert_allclose(perceived.positions[0, present], true.positions[0, present],
                                    atol=1e-9)
-        # Turn rates of recordings are not trusted beyond what a car can do.
+        # Turn rates of recordings are clipped to a car's limits.
         present &= [not name.endswith('/yaw') for name in true.names]
         np.testing.assert_allclose(perceived.velocities[0, present],
                                    true.velocities[0, present], atol=1e-9)
@@ -129,6 +129,6 @@ def test_ego_that_is_read_is_the_estimate() -> None:
     assert places == sorted(places)
     assert 1e-3 < math.hypot(told.ego.x - known.ego.x, told.ego.y - known.ego.y) < 1.0
     assert told.ego[4:] == pytest.approx(known.ego[4:], abs=0.02)
-    # What is told is there at all points; the rest is left out.
+    # Known vehicles are present at all points; the others are left out.
     assert np.isfinite(told.obstacle_poses).all()
     assert 0 < len(places) < len(known.obstacle_ids)

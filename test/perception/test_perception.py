@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What an AV is told of the world: occlusion, memory, latency, noise and coordinates (FS II-B)."""
+"""An AV's perception: occlusion, memory, latency, noise and coordinates (FS II-B)."""
 
 from dataclasses import replace
 import math
@@ -32,7 +32,7 @@ from scipy import stats
 
 FRONT = SensorSpec('front', **EXACT)
 ALL_ROUND = SensorSpec('roof', x=1.0, field_of_view=2 * math.pi, rays=720, **EXACT)
-# At 10 Hz and 0.01 s.
+# For a scan rate of 10 Hz and steps of 0.01 s.
 PERIOD = 10
 
 
@@ -53,7 +53,7 @@ def in_sight(world: World, n: int) -> bool:
 
 
 def test_hidden_until_a_ray_reaches_it() -> None:
-    """A pedestrian behind a van is absent at all points until it steps into sight."""
+    """A pedestrian behind a van is absent at all points until a ray reaches it."""
     world = behind_a_van()
     shown = []
     for n in range(0, 351):
@@ -64,7 +64,7 @@ def test_hidden_until_a_ray_reaches_it() -> None:
     expected = [in_sight(world, n) for n in range(0, 351, PERIOD)]
     assert not expected[0]
     assert expected[-1]
-    # The edge of the fan's next ray, 0.33 degrees on, comes one scan later at most.
+    # The next ray, 0.33 degrees further, reaches the pedestrian one scan later at most.
     assert abs(shown.index(True) - expected.index(True)) <= 1
     assert all(shown[shown.index(True):])
     pose = world.perceived(350, 'o1')[0][0]
@@ -92,7 +92,7 @@ def test_remembered_for_a_while_and_moved_on(memory: float) -> None:
 
 
 def test_what_is_seen_is_known_after_the_latency() -> None:
-    """A car that appears at n = 50 is known 0.12 s later, where it then is."""
+    """A car that appears at n = 50 is known 0.12 s later, at its place of that time."""
     world = World([(CAR, (20.0, 0.0, 0.0), (5.0, 1.0, 0.0))], [replace(FRONT, latency=0.12)])
     for n in range(100):
         poses = world.poses(n) if n >= 50 else np.full((1, 3), np.nan)
@@ -112,7 +112,7 @@ def test_a_slow_sensor_does_not_flicker() -> None:
 
 
 def test_driven_vehicles_turn_on_and_pedestrians_do_not() -> None:
-    """A human at 8 m/s and 0.3 rad/s is predicted on its circle, from its rear axle."""
+    """A human's vehicle at 8 m/s and 0.3 rad/s is predicted on its circle, by its rear axle."""
     human = VehicleState(15.0, -3.0, 0.4, 8.0, 0.1, 0.0, 0.3)
     pedestrian = replace(PEDESTRIAN, id='o4')
     world = World([(pedestrian, (10.0, 2.0, 0.0), (1.0, 0.0, 0.5))], [ALL_ROUND], human=human)
@@ -131,7 +131,7 @@ def test_driven_vehicles_turn_on_and_pedestrians_do_not() -> None:
 
 
 def test_an_unseen_human_is_absent_in_every_joint() -> None:
-    """Behind a front sensor: NaN at all points, steering included; what it does is unknown."""
+    """A human behind a front sensor is NaN at all points, steering included."""
     world = World([], [FRONT], human=VehicleState(-30.0, 0.0, 0.0, 10.0)).run(0, 20)
     request = world.request(20)
     perceived = world.perception.perceive(request)
@@ -148,7 +148,7 @@ def test_steering_and_acceleration_of_others_cannot_be_seen() -> None:
     world = World([], [FRONT], human=VehicleState(30.0, 0.0, 0.0, 10.0, 0.1, 2.0)).run(0, 0)
     perceived = world.perception.perceive(world.request(0))
     assert np.isfinite(perceived.positions[:, 4:7]).all()
-    # Its rear end is met: half a length behind its centre, which is ahead of its rear axle.
+    # Rays hit its rear end, half a length behind its centre, which is ahead of its rear axle.
     sensor_x = VEHICLE.rear_to_center + 0.5 * VEHICLE.length
     assert world.perception.scans[0][2].ranges[180] == pytest.approx(
         30.0 + VEHICLE.rear_to_center - 0.5 * VEHICLE.length - sensor_x)
@@ -157,7 +157,7 @@ def test_steering_and_acceleration_of_others_cannot_be_seen() -> None:
 
 
 def test_perfect_perception_changes_nothing() -> None:
-    """Without localisation and with no sensors the request stays, byte for byte."""
+    """With neither localisation nor sensors the request stays byte for byte."""
     world = World([(CAR, (20.0, 0.0, 0.0), (5.0, 0.0, 0.0))], [],
                   human=VehicleState(9.0, 9.0, 1.0, 2.0), course=winding(30)).run(0, 30)
     request = world.request(30)
@@ -170,7 +170,7 @@ def test_perfect_perception_changes_nothing() -> None:
 
 
 def test_localisation_alone_replaces_the_ego_only() -> None:
-    """Others are as in the true request; the ego is the estimate."""
+    """Others are as in the true request; the ego state is the estimate."""
     world = World([(CAR, (20.0, 0.0, 0.0), (5.0, 0.0, 0.0))], [], course=winding(100),
                   localisation=LocalisationSpec()).run(0, 100)
     request = world.request(100)
@@ -185,7 +185,7 @@ def test_localisation_alone_replaces_the_ego_only() -> None:
 
 
 def test_spawn_transform_maps_everybody() -> None:
-    """As in the true request (CRG 9): with exact sensors it comes out the same."""
+    """With exact sensors the perceived request equals the true one (CRG 9)."""
     transform = RigidTransform(0.7, 30.0, -4.0)
     human = VehicleState(12.0, 5.0, 0.3, 6.0)
     world = World([(CAR, (25.0, -3.0, 0.2), (5.0, 1.0, 0.0))], [ALL_ROUND], human=human,
@@ -195,7 +195,7 @@ def test_spawn_transform_maps_everybody() -> None:
     np.testing.assert_allclose(perceived.positions[0, :7], request.positions[0, :7], atol=1e-9)
     np.testing.assert_allclose(perceived.positions[:, 8:], request.positions[:, 8:], atol=1e-9)
     np.testing.assert_allclose(perceived.velocities[:, 8:], request.velocities[:, 8:], atol=1e-9)
-    # The human was at these very coordinates before; in the scenario's it drives at 0.3 + 0.7.
+    # The human has the same coordinates as before; in the scenario's it drives at 0.3 + 0.7.
     np.testing.assert_allclose(perceived.velocities[0, 4:6], (6 * math.cos(1.0), 6 * math.sin(1)))
     # And the car, 25 m ahead and 3 m to the right of the AV's origin, at 0.2 + 0.7.
     assert perceived.positions[0, 10] == pytest.approx(0.9)
@@ -219,7 +219,7 @@ def test_ego_is_estimated_in_scenario_coordinates() -> None:
 
 
 def test_an_error_of_localisation_shifts_what_is_seen_alike() -> None:
-    """The car ahead keeps its place as seen from the AV, not in the map."""
+    """The car ahead keeps its place relative to the AV, not in the map."""
     spec = LocalisationSpec(position_bias=(2.0, -1.0), yaw_bias=0.05)
     world = World([(CAR, (30.0, 4.0, 0.0), (3.0, 0.0, 0.0))], [FRONT],
                   localisation=spec).run(0, 500)
@@ -234,7 +234,7 @@ def test_an_error_of_localisation_shifts_what_is_seen_alike() -> None:
 
 
 def test_noise_has_the_deviations_that_are_asked_for() -> None:
-    """Over 400 scans: chi-square within 99 % for each; of ranges over all rays that hit."""
+    """Chi-square is within 99 % for each over 400 scans; for ranges over all rays that hit."""
     spec = SensorSpec('front', position_noise=0.3, yaw_noise=0.05, velocity_noise=0.7,
                       range_noise=0.2, rate=100.0)
     world = World([(CAR, (20.0, 0.0, 0.0), (5.0, 0.0, 0.0))], [spec])
@@ -272,7 +272,7 @@ def test_static_objects_stand_still() -> None:
 
 
 def test_needs_as_many_rays_as_are_asked_for() -> None:
-    """A pedestrian at 30 m covers about 1.3 degrees: four rays of a third of a degree."""
+    """A pedestrian at 30 m covers about 1.3 degrees, which are four rays of 1/3 degree."""
     objects = [(PEDESTRIAN, (30.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
     for least, seen in ((1, True), (3, True), (6, False)):
         world = World(objects, [replace(FRONT, min_rays=least)]).run(0, 0)
@@ -280,7 +280,7 @@ def test_needs_as_many_rays_as_are_asked_for() -> None:
 
 
 def test_several_sensors_share_what_they_see() -> None:
-    """Front and rear: a car on each side; the mounting pose turns the rear one round."""
+    """A front and a rear sensor see a car each; the mounting pose turns the rear one round."""
     rear = replace(FRONT, name='rear', x=-1.0, yaw=math.pi, horizon=30.0)
     other = ObjectDescription('o5', 'car', Role.TRAFFIC, CAR.shape)
     objects = [(CAR, (20.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
@@ -296,14 +296,14 @@ def test_several_sensors_share_what_they_see() -> None:
 
 
 def test_own_vehicle_is_not_in_the_way() -> None:
-    """From its roof, within its own outline, a sensor sees all around."""
+    """A sensor on the roof, within the vehicle's own outline, sees all around."""
     world = World([(CAR, (-20.0, 3.0, 0.0), (0.0, 0.0, 0.0))], [ALL_ROUND]).run(0, 0)
     assert world.knows(0, 'o3')
     assert set(world.perception.scans[0][2].hits.tolist()) == {-1, 1}
 
 
 class Wall:
-    """A map with a wall at x = 12 m, which notes what it is asked for."""
+    """A map with a wall at x = 12 m that records its queries."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[float, float, float]] = []
@@ -315,7 +315,7 @@ class Wall:
 
 @pytest.mark.parametrize('as_function', [False, True])
 def test_permanent_obstacles_hide_objects(as_function: bool) -> None:
-    """The car behind a wall is unknown; the map is asked around the sensor up to its horizon."""
+    """A car behind a wall is unknown; the map is queried around the sensor to its horizon."""
     wall = Wall()
     objects = [(CAR, (20.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
     world = World(objects, [FRONT], occupancy=wall.near if as_function else wall).run(0, 0)
@@ -326,14 +326,14 @@ def test_permanent_obstacles_hide_objects(as_function: bool) -> None:
 
 
 def test_objects_are_moved_on_between_scenario_steps() -> None:
-    """Seen at n = 4, a car that moves at scenario steps only is 0.04 s farther."""
+    """A car that moves at scenario steps only is seen 0.04 s farther at n = 4."""
     world = World([(CAR, (20.0, 0.0, 0.0), (10.0, 0.0, 0.0))], [replace(FRONT, rate=100.0)])
     world.perception.observe(4, world.states(4), world.poses(0), world.velocities, 0.04)
     np.testing.assert_allclose(world.perceived(4, 'o3')[0][0, :2], (20.4, 0.0))
 
 
 def noisy(seed: int = 1, sensor: str = 'front') -> World:
-    """Follow a car, with the noise of the defaults."""
+    """Perceive a car ahead with the default noise."""
     return World([(CAR, (20.0, 0.0, 0.0), (5.0, 0.0, 0.0))], [SensorSpec(sensor)],
                  localisation=LocalisationSpec(), course=straight(300, 5.0), seed=seed)
 
@@ -344,7 +344,7 @@ def joint_bytes(world: World, n: int) -> bytes:
 
 
 def test_same_seed_same_bits_and_only_then() -> None:
-    """The seed and the sensor's name decide; nothing else does."""
+    """The noise depends on the seed and the sensor's name only."""
     one = joint_bytes(noisy().run(0, 300), 300)
     assert joint_bytes(noisy().run(0, 300), 300) == one
     assert joint_bytes(noisy(seed=2).run(0, 300), 300) != one
@@ -352,7 +352,7 @@ def test_same_seed_same_bits_and_only_then() -> None:
 
 
 def test_seed_of_the_specification_comes_before_the_games() -> None:
-    """Two games of other seeds give the same perception, if the specification has a seed."""
+    """Two games with different seeds perceive the same if the specification has a seed."""
     def run(game_seed: int, own_seed: int | None) -> bytes:
         world = World([(CAR, (20.0, 0.0, 0.0), (5.0, 0.0, 0.0))], [SensorSpec('front')],
                       localisation=LocalisationSpec(), seed=game_seed)
@@ -366,7 +366,7 @@ def test_seed_of_the_specification_comes_before_the_games() -> None:
 
 
 def test_lost_steps_leave_later_scans_as_they_are() -> None:
-    """Steps 31 to 74 never arrive: the scan at 200 has the same noise on the same ranges."""
+    """Losing steps 31 to 74 does not change the noise or the ranges of the scan at 200."""
     whole, holed = noisy().run(0, 200), noisy().run(0, 30).run(75, 200)
     first, second = whole.perception.scans[0], holed.perception.scans[0]
     assert first[1] == second[1] == 200
@@ -379,7 +379,7 @@ def test_lost_steps_leave_later_scans_as_they_are() -> None:
     pytest.param(lambda names: (*names[:4], 'o3/x', 'o3/y'), id='joint missing'),
     pytest.param(lambda names: tuple(n.replace('av0', 'av1') for n in names), id='other AV')])
 def test_a_request_of_something_else_is_refused(change: Any) -> None:
-    """One line that names the object or the joints."""
+    """The message is one line that names the object or the joints."""
     world = noisy().run(0, 0)
     request = world.request(0)
     names = change(request.names)
@@ -389,7 +389,7 @@ def test_a_request_of_something_else_is_refused(change: Any) -> None:
 
 
 def test_a_sensor_of_the_users_own(tmp_path: Any) -> None:
-    """A file's class with an option sees what it says; improper scans are refused by name."""
+    """A class from a file works with its option; malformed scans are refused by name."""
     (tmp_path / 'blind.py').write_text(
         'import numpy as np\n'
         'from crgame_ros.perception.sensors import Scan, Sensor\n'

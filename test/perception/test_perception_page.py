@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The examples of docs/perception.md do what the page says."""
+"""The examples of docs/perception.md work as described."""
 
 import math
 from pathlib import Path
@@ -16,14 +16,14 @@ import yaml
 
 
 def examples(root: Path, language: str) -> list[str]:
-    """Return the page's code of a language, in order."""
+    """Return the page's code blocks of a language, in order."""
     page = (root / 'docs' / 'perception.md').read_text(encoding='utf-8')
     found: list[str] = re.findall(rf'```{language}\n(.*?)```', page, re.DOTALL)
     return found
 
 
 def test_written_defaults_are_the_defaults(project_root: Path, tmp_path: Path) -> None:
-    """Every key of the specification is there, with its default value."""
+    """The page lists every key of the specification with its default value."""
     values = yaml.safe_load(examples(project_root, 'yaml')[1])['perception']
     said = write(read(PerceptionSpec, values, 'docs/perception.md', tmp_path))
     sensor = write(PerceptionSpec())['sensors'][0]
@@ -38,7 +38,7 @@ def test_written_defaults_are_the_defaults(project_root: Path, tmp_path: Path) -
 
 
 def test_the_sensor_of_the_page_works(project_root: Path, tmp_path: Path) -> None:
-    """Within its reach of 100 m and its field of view it sees a car, else nothing."""
+    """It sees a car only within its range of 100 m and its field of view."""
     (tmp_path / 'radar.py').write_text(examples(project_root, 'python')[0])
     spec = read(PerceptionSpec, yaml.safe_load(examples(project_root, 'yaml')[2]),
                 'page', tmp_path)

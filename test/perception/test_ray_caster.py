@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Line tracing (FS II-B2) against shapely, which knows nothing of sectors."""
+"""Line tracing (FS II-B2) compared with shapely, which does not use sectors."""
 
 import math
 from typing import Any
@@ -39,7 +39,7 @@ def caster(**fields: Any) -> RayCaster:
 
 
 def outline(shape: Shape, pose: Array) -> shapely.Geometry:
-    """Return the outline of a body; a circle as one of 4,096 corners."""
+    """Return the outline of a body; a circle becomes a polygon of 4,096 corners."""
     if shape.kind == 'circle':
         ground = shapely.Point(0.0, 0.0).buffer(shape.radius, quad_segs=1024)
     elif shape.kind == 'polygon':
@@ -60,7 +60,7 @@ def lines_of(scan: Scan, horizon: float) -> Array:
 
 
 def first_met(scan: Scan, things: list[Any], horizon: float) -> tuple[Array, Array]:
-    """Return the distance (R) to the first thing that each ray meets, and to the second (R)."""
+    """Return the distances (R) at which each ray meets its first and its second body (R)."""
     origin = shapely.Point(scan.pose[:2])
     met = shapely.intersection(lines_of(scan, horizon)[:, None], np.array(things)[None, :])
     distance = shapely.distance(origin, met)
@@ -72,7 +72,7 @@ def first_met(scan: Scan, things: list[Any], horizon: float) -> tuple[Array, Arr
 @pytest.mark.parametrize('seed', range(4))
 @pytest.mark.parametrize('kind', KINDS)
 def test_ranges_and_hits_are_those_of_shapely(kind: str, seed: int) -> None:
-    """Of every ray, in a crowd around a turned sensor; its own field of view each time."""
+    """Every ray agrees among many bodies around a turned sensor, for several fields of view."""
     rng = np.random.default_rng(seed)
     shapes = [KINDS[kind][i % len(KINDS[kind])] for i in range(30)]
     poses = np.column_stack((rng.uniform(-40.0, 40.0, (30, 2)), rng.uniform(-9.0, 9.0, 30)))
@@ -83,7 +83,7 @@ def test_ranges_and_hits_are_those_of_shapely(kind: str, seed: int) -> None:
     present = np.flatnonzero(np.isfinite(poses[:, 0]))
     things = [outline(shapes[i], poses[i]) for i in present]
     each, expected = first_met(scan, things, 35.0)
-    # A ray within a hair of an outline may go either way; a circle of corners lies inside.
+    # A ray very near an outline may hit or miss; the polygon of a circle lies inside it.
     sure = np.isfinite(scan.ranges) == np.isfinite(expected)
     assert (~sure).sum() <= (0 if kind in ('rectangles', 'polygons') else 1)
     hit = sure & np.isfinite(expected)
@@ -96,7 +96,7 @@ def test_ranges_and_hits_are_those_of_shapely(kind: str, seed: int) -> None:
 
 
 def test_rays_spread_over_the_field_of_view() -> None:
-    """The first and the last on its borders; around a full circle none twice."""
+    """The first and last ray are on its borders; in a full circle no ray occurs twice."""
     quarter = caster(field_of_view=math.pi / 2, rays=3).scan((0, 0, 0), bodies_of([], []))
     np.testing.assert_allclose(quarter.angles, (-math.pi / 4, 0.0, math.pi / 4))
     circle = caster(field_of_view=FULL, rays=4).scan((0, 0, 0), bodies_of([], []))
@@ -110,7 +110,7 @@ def test_rays_spread_over_the_field_of_view() -> None:
 @pytest.mark.parametrize(('bearing', 'seen'), [
     (59.0, True), (61.0, False), (-59.0, True), (-61.0, False), (180.0, False)])
 def test_field_of_view_ends_at_its_borders(bearing: float, seen: bool) -> None:
-    """Of 120 degrees, 60 to each side; the disc covers half a degree."""
+    """A field of view of 120 degrees has 60 to each side; the disc covers half a degree."""
     angle = math.radians(bearing)
     disc = bodies_of([Shape.circle(0.1)], [(20 * math.cos(angle), 20 * math.sin(angle), 0.0)])
     scan = caster(field_of_view=math.radians(120.0), rays=721).scan((0, 0, 0), disc)
@@ -129,7 +129,7 @@ def test_horizon_is_constant(x: float, seen: bool) -> None:
 
 
 def test_the_nearest_body_hides_what_is_behind() -> None:
-    """All rays towards the far car end at the near van; beside the van they pass."""
+    """All rays towards the far car end at the near van; rays beside the van pass."""
     bodies = bodies_of([Shape.rectangle(4.5, 1.8), Shape.rectangle(6.0, 2.2)],
                        [(30.0, 0.0, 0.0), (10.0, 0.0, 0.0)])
     spec: dict[str, Any] = {'field_of_view': 0.6, 'rays': 301}
@@ -140,7 +140,7 @@ def test_the_nearest_body_hides_what_is_behind() -> None:
 
 
 def test_a_body_across_the_seam_is_met() -> None:
-    """Behind a full-circle sensor, where bearings jump from pi to -pi."""
+    """Rays hit a body behind a full-circle sensor, where bearings jump from pi to -pi."""
     wall = bodies_of([Shape.rectangle(1.0, 20.0)], [(-10.0, 0.0, 0.0)])
     scan = caster(field_of_view=FULL, rays=360).scan((0, 0, 0), wall)
     behind = np.abs(scan.angles) > math.pi - 0.7
@@ -150,7 +150,7 @@ def test_a_body_across_the_seam_is_met() -> None:
 
 @pytest.mark.parametrize('yaw', [0.0, math.pi / 2, math.pi, -math.pi / 2])
 def test_an_edge_seen_from_its_end(yaw: float) -> None:
-    """A ray that runs along a side stops at the corner, neither before it nor behind."""
+    """A ray along a side of a body stops exactly at the corner."""
     cos, sin = round(math.cos(yaw)), round(math.sin(yaw))
     # Its left side lies on the middle ray.
     center = (12.0 * cos + 1.0 * sin, 12.0 * sin - 1.0 * cos)
@@ -164,7 +164,7 @@ def test_an_edge_seen_from_its_end(yaw: float) -> None:
 @pytest.mark.parametrize(('shape', 'ahead'), [
     (Shape.rectangle(4.0, 2.0), 2.0), (Shape.circle(3.0), 3.0)], ids=['rectangle', 'circle'])
 def test_inside_a_body_its_walls_are_seen(shape: Shape, ahead: float) -> None:
-    """All rays meet it from within."""
+    """All rays of a sensor inside a body hit its walls."""
     scan = caster(field_of_view=FULL, rays=4).scan((0, 0, 0), bodies_of([shape], [(0, 0, 0)]))
     assert (scan.hits == 0).all()
     assert scan.ranges[2] == pytest.approx(ahead)
@@ -175,7 +175,7 @@ def grid_of(occupied: Any) -> OccupancyGrid:
 
 
 def test_a_wall_of_the_grid_hides_what_is_behind() -> None:
-    """Cells from x = 5 m on: the car behind is not seen, the map is, at 5 m / cos."""
+    """With cells from x = 5 m on, rays end at 5 m / cos and the car behind is not seen."""
     occupied = np.zeros((20, 60), dtype=bool)
     occupied[:, 30:32] = True
     car = bodies_of([Shape.rectangle(4.5, 1.8)], [(12.0, 0.0, 0.0)])
@@ -190,7 +190,7 @@ def test_a_wall_of_the_grid_hides_what_is_behind() -> None:
 
 @pytest.mark.parametrize('seed', range(3))
 def test_ranges_to_cells_are_found_by_walking_the_rays(seed: int) -> None:
-    """Stepping along each ray by a millimetre meets the first occupied cell where it says."""
+    """Walking each ray by a millimetre meets the first occupied cell at the given range."""
     rng = np.random.default_rng(seed)
     occupied = rng.uniform(size=(40, 60)) < 0.02
     occupied[28:36, 40:55] = True
@@ -206,7 +206,7 @@ def test_ranges_to_cells_are_found_by_walking_the_rays(seed: int) -> None:
     met = inside.any(axis=1)
     assert 10 < met.sum() < 90
     expected = np.where(met, steps[inside.argmax(axis=1)], np.inf)
-    # Walking may step over a corner that is cut by less than a millimetre.
+    # The walk may miss a corner that the ray cuts by less than a millimetre.
     differ = ~np.isclose(scan.ranges, expected, atol=1.1e-3)
     assert (scan.ranges[differ] < expected[differ]).all()
     assert differ.sum() <= 1
@@ -224,7 +224,7 @@ def test_no_ray_slips_between_two_cells(yaw: float) -> None:
 
 
 def test_a_sensor_within_an_obstacle_is_blind() -> None:
-    """It is in an occupied cell: every ray ends where it begins."""
+    """In an occupied cell every ray has range 0."""
     scan = caster(rays=9).scan((0.0, 0.0, 0.0), bodies_of([Shape.circle(1.0)], [(5, 0, 0)]),
                                grid_of(np.ones((20, 60))))
     assert (scan.hits == PERMANENT).all()

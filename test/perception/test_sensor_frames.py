@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scans and frames together: by the transforms alone every ray ends on what it has hit."""
+"""Scans and frames agree: by the transforms alone every ray ends on the body that it hit."""
 
 from importlib.util import find_spec
 import math
@@ -35,7 +35,7 @@ OFFSET_NS = 7_000_000_000
 SENSORS = (SensorSpec('front', **EXACT),
            SensorSpec('rear', x=-0.9, yaw=math.pi, **EXACT),
            SensorSpec('left', x=1.2, y=0.8, yaw=1.1, field_of_view=2.0, **EXACT))
-# Ranges go out as 32-bit floats: 80 m to 4 µm; circles stand for themselves to 1 µm.
+# Ranges are 32-bit floats, exact to 4 µm at 80 m; polygons match circles to 1 µm.
 TOLERANCE = 1e-4
 PATIENCE_S = 10.0
 
@@ -80,7 +80,7 @@ def _surfaces(world: World, n: int) -> shapely.Geometry:
 
 @pytest.fixture
 def endpoints(ros_domain: int) -> Endpoints:
-    """Return the endpoints of a node of the test's own."""
+    """Return the endpoints of a node that belongs to the test."""
     rclpy.init(domain_id=ros_domain)
     node = rclpy.create_node('tester')
     yield Endpoints(node)
@@ -94,7 +94,7 @@ def _av(world: World, perceives: bool = True) -> DrivenAv:
 
 
 def test_scans_lie_on_what_they_hit(endpoints: Endpoints) -> None:
-    """Through DDS and map → av0/base_link → av0/<sensor>, for three mounts on a winding course."""
+    """It holds through DDS and map → av0/base_link → av0/<sensor> for three mounts in bends."""
     world = _world()
     scheduler = ScenarioScheduler.from_rate(0.1, 1.0 / DT, clock_offset_ns=OFFSET_NS)
     scans, slot = ScanMessages(endpoints, 'av0'), endpoints.polled('/<av>/scan', 'av0')
@@ -127,7 +127,7 @@ def test_scans_lie_on_what_they_hit(endpoints: Endpoints) -> None:
 
 
 def test_only_those_that_perceive_have_sensor_frames() -> None:
-    """An AV that knows the truth has none; a sensor without a place is in the front bumper."""
+    """An AV without perception has none; a sensor without a pose is in the front bumper."""
     world = _world()
     assert sensor_transforms([_av(world, perceives=False)], 0) == []
     front = sensor_transforms([_av(world)], 0)[0].transform.translation
@@ -135,7 +135,7 @@ def test_only_those_that_perceive_have_sensor_frames() -> None:
 
 
 def test_tf_is_there_where_its_package_is(endpoints: Endpoints) -> None:
-    """Without tf2_msgs nothing is published and nothing fails; with it both topics are there."""
+    """Without tf2_msgs the node runs and publishes no transform; with it both topics exist."""
     transforms = Transforms(endpoints)
     assert transforms.available == (find_spec('tf2_msgs') is not None)
     transforms.place_sensors([_av(_world())], OFFSET_NS)
@@ -158,7 +158,7 @@ def test_tf_is_there_where_its_package_is(endpoints: Endpoints) -> None:
 
 @pytest.mark.parametrize('known', [False, True])
 def test_an_estimate_carries_its_filters_covariance(endpoints: Endpoints, known: bool) -> None:
-    """x, y, yaw and speed have the filter's, all else 1e-9: no part is singular, or claims 0."""
+    """x, y, yaw and speed have the filter's covariance, all else 1e-9: none is singular or 0."""
     world = _world()
     if known:
         world = World([], [], winding(50))
@@ -179,7 +179,7 @@ def test_an_estimate_carries_its_filters_covariance(endpoints: Endpoints, known:
     expected = np.diag([1e-9] * 6)
     if not known:
         expected[np.ix_((0, 1, 5), (0, 1, 5))] = world.perception.covariance[:3, :3]
-        # A measured position has 0.1 m; the filter is better than that, and not much.
+        # A measured position has 0.1 m; the filter is slightly better.
         assert 0.01 < math.sqrt(pose[0, 0]) < 0.1
     assert np.array_equal(pose, expected)
     assert twist[0, 0] == pytest.approx(1e-9 if known else world.perception.covariance[3, 3])

@@ -51,7 +51,7 @@ def straight(length: float = 2000.0) -> Scenario:
 
 
 def plain() -> Scenario:
-    """Make one lane so wide that nobody leaves it."""
+    """Make one lane so wide that no vehicle leaves it."""
     x = np.linspace(-50.0, 500.0, 56)
     return road([strip(np.column_stack((x, np.zeros_like(x))), 100.0, 1)])
 
@@ -97,7 +97,7 @@ def drive(planner: Planner, start: VehicleState, ticks: int,
 
 
 def file_id(path: object) -> str:
-    """Name a test after its file; pytest asks even where there is no file to test."""
+    """Name a test after its file; pytest calls this even if there is no file to test."""
     return str(getattr(path, 'stem', 'none'))
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The adapter: whatever a planner does wrong becomes a counted braking plan."""
+"""The adapter turns every fault of a planner into a counted braking plan."""
 
 from collections.abc import Callable
 import dataclasses
@@ -26,7 +26,7 @@ Answer = Callable[[PlanRequest], Plan]
 
 
 class Scripted(Planner):
-    """Answer as told."""
+    """A planner that answers as set."""
 
     name: ClassVar[str] = 'scripted'
 
@@ -101,7 +101,7 @@ def test_good_plans_pass_unchanged_and_are_timed() -> None:
 
 
 def sideways(distance: float) -> Answer:
-    """Answer with 3 s straight ahead at 10 m/s that move aside evenly, to the left [m]."""
+    """Answer with 3 s straight ahead at 10 m/s that evenly move to the left by a distance [m]."""
     def answer(request: PlanRequest) -> Plan:
         states = np.tile(np.array(request.ego), (31, 1))
         states[:, 0] += np.arange(31)
@@ -114,9 +114,9 @@ def sideways(distance: float) -> Answer:
 # 0.2 m more are tolerated.
 @pytest.mark.parametrize(('start', 'aside', 'refused'), [
     (0.0, 0.9, False), (0.0, 1.1, False), (0.0, 1.2, True), (0.0, -3.0, True),
-    # One that starts 0.55 m off the road may go along it and return, but not further away.
+    # A plan that starts 0.55 m off the road may go along it and return, but not further away.
     (1.5, 0.0, False), (1.5, 0.15, False), (1.5, 0.3, True), (1.5, -1.5, False),
-    # 9 m from the road likewise.
+    # The same holds 9 m from the road.
     (10.0, 0.1, False), (10.0, 1.0, True), (10.0, -5.0, False),
 ])
 def test_plan_that_leaves_the_road_is_refused(start: float, aside: float, refused: bool) -> None:
@@ -131,7 +131,7 @@ def test_plan_that_leaves_the_road_is_refused(start: float, aside: float, refuse
 
 
 def test_road_with_slits_refuses_nothing() -> None:
-    """Lanelets of converted maps leave centimetres between them, which no vehicle falls into."""
+    """Lanelets of converted maps have slits of centimetres between them, which do not count."""
     x = np.linspace(-50.0, 500.0, 56)
     lanes = [support.strip(np.column_stack((x, np.full_like(x, y))), 3.45, number)
              for number, y in ((1, 0.0), (2, 3.5))]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Predicted obstacles by time step: none vanishes that a plan could drive into."""
+"""Predicted obstacles by time step: no obstacle that a plan could hit is left out."""
 
 from commonroad_dc import pycrcc
 from crgame_ros.planner.collision_slices import CollisionSlices
@@ -28,22 +28,22 @@ def hits(made: CollisionSlices, vehicle: VehicleParameters, k: int, ahead: float
 @pytest.mark.parametrize('gap', [2.0, 0.16, 0.14, 0.05, 0.001, -0.05, -0.3])
 def test_standing_obstacle_ahead_is_in_every_slice(gap: float,
                                                    vehicle: VehicleParameters) -> None:
-    """To stand is free, also in contact; to drive on by more than the gap and a metre is not."""
+    """Standing is free, also in contact; driving on by more than the gap and a metre is not."""
     front = vehicle.rear_to_center + 0.5 * vehicle.length
     made = slices(vehicle, (front + gap + HALF_CAR, 0.0, 0.0, 0.0))
     for k in (0, 1, 15, 30):
         assert not hits(made, vehicle, k, 0.0)
         assert hits(made, vehicle, k, max(gap, 0.0) + 1.0)
         assert hits(made, vehicle, k, 3.0)
-    # What is near but not touched is not entered by a centimetre.
+    # The ego may not enter a near obstacle without contact by even a centimetre.
     if 0.0 < gap < 0.15:
         assert hits(made, vehicle, 30, gap + 0.01)
 
 
-def test_follower_is_left_out_and_who_is_beside_is_not(vehicle: VehicleParameters) -> None:
+def test_follower_is_left_out_and_a_vehicle_beside_is_not(vehicle: VehicleParameters) -> None:
     follower = slices(vehicle, (-9.0, 0.3, 0.0, 15.0))
     assert not any(hits(follower, vehicle, k, 0.5 * k) for k in range(31))
-    # Who has run into the rear by 0.2 m is predicted to drive through the ego: no plan avoids it.
+    # A follower 0.2 m inside the rear is predicted to drive through the ego: no plan avoids it.
     pushing = slices(vehicle, (-0.83 - HALF_CAR + 0.2, 0.3, 0.0, 10.0))
     assert not any(hits(pushing, vehicle, k, 0.5 * k) for k in range(31))
     # Its centre is behind the ego's rear axle, its front is not: it is beside.

@@ -99,13 +99,13 @@ def test_never_hits_a_leader_that_brakes_hard(vehicle: VehicleParameters) -> Non
     assert plans[-1].states[0, 3] == 0.0
 
 
-def test_brakes_for_someone_who_will_cross(vehicle: VehicleParameters) -> None:
+def test_brakes_for_a_vehicle_that_will_cross(vehicle: VehicleParameters) -> None:
     # A car from the right, 12 m beside the lane at 6 m/s, is in the lane 1.5 s later.
     crossing = ((30.0, -12.0, 0.5 * math.pi, 6.0),)
     free = planner(10.0).plan(support.request(ego(vehicle, 10.0))).states
     braked = planner(10.0).plan(support.request(ego(vehicle, 10.0), 0, crossing)).states
     assert braked[10, 3] < free[10, 3] - 1.0
-    # One who drives beside the lane, and one behind, are none of our business.
+    # The AV does not react to a vehicle beside the lane or behind.
     others = ((30.0, 4.0, 0.0, 5.0), (-15.0, 0.0, 0.0, 25.0))
     same = planner(10.0, count=2).plan(support.request(ego(vehicle, 10.0), 0, others)).states
     assert np.array_equal(same, free)
@@ -134,7 +134,7 @@ def test_returns_to_the_lane_without_jump_or_oscillation(vehicle: VehicleParamet
 
 
 def test_plans_obey_the_kinematic_single_track_model(vehicle: VehicleParameters) -> None:
-    """Integrate each step anew, finely, from its own speed and steering rate."""
+    """A fine integration of each step from its own speed and steering rate agrees."""
     angle = np.linspace(-0.5 * math.pi, 1.2 * math.pi, 120)
     line = 25.0 * np.column_stack((np.cos(angle), 1.0 + np.sin(angle)))
     scenario = support.road([support.strip(line, 3.5, 1)])
@@ -212,7 +212,7 @@ def test_options_must_be_positive(option: str) -> None:
         IdmPlanner(**{option: -1.0})
 
 
-def test_sees_someone_who_appears_later(vehicle: VehicleParameters) -> None:
+def test_reacts_to_a_vehicle_that_appears_later(vehicle: VehicleParameters) -> None:
     asked = support.request(ego(vehicle, 10.0), 0, ((32.0, 0.0, 0.0, 0.0),))
     asked.obstacle_poses[:4] = math.nan
     free = planner(10.0).plan(support.request(ego(vehicle, 10.0))).states

@@ -46,7 +46,7 @@ def test_stops_behind_a_standing_car(name: str, vehicle: VehicleParameters) -> N
                           lambda k: ((90.0, 0.0, 0.0, 0.0),))
     assert accepted(plans, vehicle)
     assert plans[-1].states[0, 3] < 0.2
-    # It stands behind the car's rear, and not for away: within twice the car's length.
+    # It stands behind the car's rear, and not far away: within twice the car's length.
     assert 87.75 - 2.0 * 4.5 < front(plans[-1], vehicle) < 87.75 - 0.1
 
 
@@ -72,7 +72,7 @@ def test_starts_from_rest(name: str, vehicle: VehicleParameters) -> None:
 @pytest.mark.parametrize('scenario', ['USA_US101', 'ZAM_Tjunction', 'ZAM_Over'])
 def test_real_scenarios_give_accepted_plans(name: str, scenario: str,
                                             vehicle: VehicleParameters) -> None:
-    """The demanded share is 80 % of the ticks."""
+    """The required share is 80 % of the ticks."""
     found = [path for path in support.shared_scenarios() if path.name.startswith(scenario)]
     if not found:
         pytest.skip('the shared scenarios are not beside the project')
@@ -109,7 +109,7 @@ def test_idm_package_advances_as_its_speed_says(vehicle: VehicleParameters) -> N
 
 
 def test_idm_package_sees_the_leader_move(vehicle: VehicleParameters) -> None:
-    """The package holds a leader frozen over the horizon; here its prediction counts."""
+    """The package freezes a leader over the horizon; here its prediction counts."""
     parting = ready('idm-package').plan(
         support.request(ego(vehicle, 10.0), 0, ((35.0, 0.0, 0.0, 15.0),)))
     standing = ready('idm-package').plan(

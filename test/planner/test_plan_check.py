@@ -67,7 +67,7 @@ def test_each_fault_is_refused(row: int, column: StateColumn, change: float, rea
 
 
 def test_no_jump_hides_behind_a_heading_beyond_all_measure(vehicle: VehicleParameters) -> None:
-    """Differences of such headings are no numbers, with which no comparison says too much."""
+    """Differences of such headings are NaN, and no comparison with NaN reports an excess."""
     plan = turning(10.0, 0.02, vehicle)
     plan.states[5:, 0] += 500.0
     plan.states[4, 2], plan.states[5, 2] = 1.7e308, -1.7e308

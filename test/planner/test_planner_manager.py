@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The planners of one AV: who is in office, on which roads, after which events."""
+"""The planners of one AV: which one is active, on which roads, after which events."""
 
 from dataclasses import replace
 from typing import ClassVar
@@ -25,7 +25,7 @@ FAILING = EventSpec('failing', PlannerSwap('av0', f'{__file__}:Witness', {'name_
 
 
 class Witness(Planner):
-    """Remembers the limits of lanelet 11 that it was set up with; one tag fails."""
+    """A planner that remembers the limits of lanelet 11 from its setups; one tag fails."""
 
     name: ClassVar[str] = 'witness'
 
@@ -40,31 +40,31 @@ class Witness(Planner):
         self.limits.append(RoadNetwork(context.scenario.lanelet_network).speed_limit(11))
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Find nothing: not asked here."""
+        """Raise an error: the tests do not ask for plans."""
         raise PlanningError('none')
 
 
 @pytest.fixture(scope='module')
 def context() -> PlannerContext:
-    """Return a planner the street of the crossing."""
+    """Return a planner's context on the street of the crossing."""
     loaded = load_scenario(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml')
     return PlannerContext('av0', loaded.scenario, loaded.planning_problems[0],
                           load_vehicle_parameters('bmw_320i'), {}, 0.1)
 
 
 def manager_of(context: PlannerContext, *events: EventSpec) -> PlannerManager:
-    """Begin with witness a."""
+    """Make a manager that begins with witness a."""
     return PlannerManager(context, f'{__file__}:Witness', {'name_tag': 'a'}, events)
 
 
 def present(manager: PlannerManager) -> tuple[str, list[float | None]]:
-    """Return who is in office, and which limits it was set up with."""
+    """Return the active planner, and the limits that it was set up with."""
     planner = manager.adapter.planner
     return planner.name_tag, [round(limit, 3) for limit in planner.limits]
 
 
 def test_in_office_and_after_each_event(context: PlannerContext) -> None:
-    """Whatever comes first, the planner in office knows the limit that holds."""
+    """For any order of the events, the active planner knows the current limit."""
     town = round(TOWN, 3)
     manager = manager_of(context, SLOW, SWAP, ELSEWHERE)
     assert present(manager) == ('a', [town])
@@ -74,7 +74,7 @@ def test_in_office_and_after_each_event(context: PlannerContext) -> None:
     assert present(manager) == ('b', [town, 5.0])
     assert manager.apply(['slow', 'elsewhere', 'swap']) == []
     other = manager_of(context, SLOW, SWAP)
-    # Set up before the run, once: the swap itself costs nothing.
+    # Set up once before the run: the swap itself costs no time.
     other.apply(['swap'])
     assert present(other) == ('b', [town])
     other.apply(['swap', 'slow'])
@@ -95,7 +95,7 @@ def test_answers_of_all_planners_are_counted_together(context: PlannerContext) -
 
 
 def test_failure_is_told(context: PlannerContext) -> None:
-    """A newcomer that cannot be set up answers by braking, and says why."""
+    """A new planner that cannot be set up answers by braking, and reports the reason."""
     manager = manager_of(context, FAILING)
     assert manager.failure is None
     assert manager.apply(['failing']) == [f'planner {__file__}:Witness: setup failed: no way']
@@ -103,6 +103,6 @@ def test_failure_is_told(context: PlannerContext) -> None:
 
 
 def test_unknown_planner_is_refused_before_the_run(context: PlannerContext) -> None:
-    """Not in the middle of it."""
+    """The refusal does not come in the middle of the run."""
     with pytest.raises(InputError, match='there is no planner "ghost"'):
         manager_of(context, EventSpec('swap', PlannerSwap('av0', 'ghost')))

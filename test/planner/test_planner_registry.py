@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finding planners and checking their options; the example of the documentation runs."""
+"""Planners are found and their options checked; the example of the documentation runs."""
 
 from importlib.metadata import EntryPoint
 import inspect

@@ -46,7 +46,7 @@ def drive(road: support.Scenario, start: VehicleState, cars: tuple[Car, ...], ti
 
 
 def test_a_frame_of_a_loop_stops_before_a_whole_turn() -> None:
-    """The library refuses headings beyond ±2 pi: roundabouts and closed loops come in pieces."""
+    """The library refuses headings beyond ±2 pi: roundabouts and closed loops are split."""
     core = pytest.importorskip('crgame_ros.planner.reactive_core')
     angle = np.linspace(0.0, 6.0 * np.pi, 240)
     path = ReferencePath.from_polyline(30.0 * np.column_stack((np.sin(angle), -np.cos(angle))))
@@ -64,7 +64,7 @@ def test_a_frame_of_a_loop_stops_before_a_whole_turn() -> None:
 
 def check_free(plans: list[Plan], road: support.Scenario, cars: tuple[Car, ...],
                vehicle: VehicleParameters) -> None:
-    """Check from outside, at each tick: on the road, and in contact with nobody."""
+    """Check each tick independently: the ego is on the road, and in contact with no vehicle."""
     boundary = RoadBoundary(road.lanelet_network)
     shape = Shape.rectangle(vehicle.length, vehicle.width)
     for k, plan in enumerate(plans):
@@ -87,17 +87,17 @@ def test_passes_a_slow_car_in_the_free_lane_beside(speed: float,
     plans = drive(road, VehicleState(0.0, 0.0, 0.0, 15.0), cars, 200)
     check_free(plans, road, cars, vehicle)
     offsets = [plan.states[0, 1] for plan in plans]
-    # In the middle of the left lane while it passes, and back in its own in the end.
+    # In the middle of the left lane while it passes, and back in its own lane at the end.
     assert max(offsets) == pytest.approx(WIDTH, abs=0.4)
     assert abs(offsets[-1]) < 0.3
     assert plans[-1].states[0, 0] > 80.0 + 20.0 * speed + 20.0
 
 
 @pytest.mark.parametrize('cars', [
-    # One lane only would be enough to pass, but somebody drives beside.
+    # The other lane would be enough to pass, but cars drive there.
     ((60.0, 0.0, 0.0, 8.0), (0.0, WIDTH, 0.0, 8.0), (-14.0, WIDTH, 0.0, 8.0),
      (14.0, WIDTH, 0.0, 8.0), (28.0, WIDTH, 0.0, 8.0), (42.0, WIDTH, 0.0, 8.0)),
-    # Whoever comes from behind comes much faster.
+    # The vehicle from behind is much faster.
     ((45.0, 0.0, 0.0, 9.0), (-20.0, WIDTH, 0.0, 25.0)),
 ], ids=['beside', 'faster'])
 def test_stays_while_there_is_no_gap(cars: tuple[Car, ...], vehicle: VehicleParameters) -> None:
@@ -107,7 +107,7 @@ def test_stays_while_there_is_no_gap(cars: tuple[Car, ...], vehicle: VehiclePara
 
 
 @pytest.mark.slow
-def test_does_not_use_the_lane_of_who_comes_towards_it(vehicle: VehicleParameters) -> None:
+def test_does_not_use_the_lane_of_oncoming_traffic(vehicle: VehicleParameters) -> None:
     road, cars = lanes(2, oncoming=True), ((80.0, 0.0, 0.0, 0.0),)
     plans = drive(road, VehicleState(0.0, 0.0, 0.0, 12.0), cars, 150)
     check_free(plans, road, cars, vehicle)
@@ -133,7 +133,7 @@ def test_stays_where_the_side_lane_ends(vehicle: VehicleParameters) -> None:
 
 
 def test_stands_by_the_package_where_nothing_else_is_free(vehicle: VehicleParameters) -> None:
-    """At rest, with a car 0.1 m ahead and another one behind, no sample moves: it stands."""
+    """At rest, with a car 0.1 m ahead and another one behind, no sample moves: the ego stands."""
     front = vehicle.rear_to_center + 0.5 * vehicle.length
     cars = ((front + 0.1 + HALF_CAR, 0.0, 0.0, 0.0), (-4.0, 0.0, 0.0, 0.0))
     start = VehicleState(0.0, 0.0, 0.0, 0.0)
@@ -143,7 +143,7 @@ def test_stands_by_the_package_where_nothing_else_is_free(vehicle: VehicleParame
 
 
 def test_package_plans_as_its_authors_ship_it(vehicle: VehicleParameters) -> None:
-    """Its defaults: 60 steps, four sampling levels, and the speed at the start."""
+    """The package's defaults: 60 steps, four sampling levels, and the speed at the start."""
     planner = create_planner('reactive-package')
     planner.setup(support.context(lanes(2), support.problem(15.0)))
     asked = support.request(VehicleState(0.0, 0.0, 0.0, 15.0), 0, ((150.0, 0.0, 0.0, 15.0),))
@@ -156,7 +156,7 @@ def test_package_plans_as_its_authors_ship_it(vehicle: VehicleParameters) -> Non
 
 @pytest.mark.exhaustive
 def test_package_leaves_its_lane_for_a_standing_car(vehicle: VehicleParameters) -> None:
-    """It swings out as far as it must, at the speed that it had, and knows no lanes."""
+    """It swings out as far as needed, at its initial speed, and ignores lanes."""
     road, cars = lanes(2), ((60.0, 0.0, 0.0, 0.0),)
     planner = create_planner('reactive-package', {'horizon': 3.0, 'levels': 3})
     planner.setup(support.context(road, support.problem(12.0)))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A planner's view of a request: who is where, as centres."""
+"""A planner's view of a request: the objects' positions, as centres."""
 
 from dataclasses import replace
 import math
@@ -81,7 +81,7 @@ def test_other_objects_are_centres_already() -> None:
 
 
 def test_absent_object_is_nan() -> None:
-    """In all its components, and nobody else is."""
+    """In all its components; no other object is NaN."""
     read = reader().read(request())
     assert np.isnan(read.obstacle_poses[:, 2]).all()
     assert np.isnan(read.obstacle_velocities[:, 2]).all()
@@ -109,7 +109,7 @@ def test_other_joints_are_learnt_anew() -> None:
 
 
 def test_ego_alone() -> None:
-    """Nobody else in the scenario: empty arrays of the right shape."""
+    """No other object in the scenario: empty arrays of the right shape."""
     series = request()
     alone = replace(series, names=series.names[:4], positions=series.positions[:, :4],
                     velocities=series.velocities[:, :4], accelerations=series.accelerations[:, :4])
@@ -126,13 +126,13 @@ def test_ego_alone() -> None:
     ({'names': (*request().names[:11], 'o4/x', 'o4/y', 'o4/z')}, '"o4" lacks a joint'),
     ({'names': (), 'positions': np.empty((2, 0))}, 'does not begin with')])
 def test_other_requests_are_refused(change: dict[str, object], named: str) -> None:
-    """One error that names the topic."""
+    """It raises one error that names the topic."""
     with pytest.raises(InputError, match=f'/av0/plan_request: .*{named}'):
         reader().read(replace(request(), **change))
 
 
 def test_request_without_points_is_refused() -> None:
-    """A message from anybody may be empty."""
+    """Any publisher may send an empty message."""
     empty = np.empty((0, 14))
     series = replace(request(), times_ns=np.empty(0, np.int64), positions=empty,
                      velocities=empty, accelerations=empty)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Lane changes of a route: into a gap only, and put off until there is one."""
+"""Lane changes of a route: only into a gap, and postponed until there is one."""
 
 from commonroad.geometry.shape import Rectangle
 from crgame_ros.messages.plan import Plan
@@ -38,7 +38,7 @@ def drive(cars: Cars, ticks: int, end: float, planner: str = 'idm') -> list[Plan
 
 
 def gaps(plans: list[Plan], cars: Cars, vehicle: VehicleParameters) -> list[float]:
-    """Measure the way to the nearest car while a part of the ego is in the left lane [m]."""
+    """Return the distance to the nearest car while a part of the ego is in the left lane [m]."""
     found = []
     for k, plan in enumerate(plans):
         x, y = plan.states[0, :2]
@@ -53,7 +53,7 @@ def test_changes_at_once_where_it_is_free() -> None:
     assert plans[50].states[0, 1] > 3.0
 
 
-# Ahead of one that is as fast, a vehicle's length beside one, and into a row without any gap.
+# Ahead of an equally fast car, a vehicle's length beside one, and into a row without any gap.
 @pytest.mark.matrix
 @pytest.mark.parametrize('cars', [
     ((-8.0, 10.0),), ((-2.0, 10.0),), ((4.0, 10.0),), ((-22.0, 16.0),),
@@ -65,15 +65,15 @@ def test_waits_for_a_gap_and_then_changes(cars: Cars, planner: str,
     ticks = 260 if len(cars) > 1 else 160
     plans = drive(cars, ticks, 200.0 if len(cars) > 1 else 400.0, planner)
     assert plans[-1].states[0, 1] == pytest.approx(WIDTH, abs=0.3)
-    # It enters the lane no nearer than the gap at standstill to anybody.
+    # It enters the lane no nearer to any car than the gap at standstill.
     assert min(gaps(plans, cars, vehicle)) > 2.0
 
 
 def test_stops_at_the_end_of_its_lane_for_a_queue(vehicle: VehicleParameters) -> None:
-    """There is no way in at all: bumper to bumper they stand beside the whole lane."""
+    """There is no gap at all: cars stand bumper to bumper beside the whole lane."""
     cars = tuple((-45.0 + 6.0 * i, 0.0) for i in range(42))
     plans = drive(cars, 220, 150.0)
     assert plans[-1].states[0, 3] < 0.1
     assert np.abs([plan.states[0, 1] for plan in plans]).max() < 0.3
-    # With what the change takes from rest, 25 m, still ahead, but not more than twice that.
+    # It stands with the 25 m of a change from rest still ahead, but not more than twice that.
     assert 100.0 < plans[-1].states[0, 0] + vehicle.length < 125.0

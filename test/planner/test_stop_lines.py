@@ -60,7 +60,7 @@ def test_halts_half_a_metre_before_the_line(state: TrafficLightState,
     _, series = run(junction(((state, 1000),)), vehicle, 300)
     front, speed = series[-1]
     assert speed == 0.0
-    # It aims at 0.5 m before the line and stands within the creeping distance of that.
+    # It aims at 0.5 m before the line and stands within the creeping distance of that point.
     assert LINE - 0.85 < front < LINE - 0.45
 
 

@@ -13,7 +13,7 @@ HERE = Path(__file__)
 
 
 def follow_lane(seen: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
-    """Steer back to the route and hold 0.8 of the speed limit; brake for who is ahead."""
+    """Steer back to the route and hold 0.8 of the speed limit; brake for the leader."""
     speed, _, _, _, offset, heading, curvature, limit, _ = seen['state'].tolist()
     wanted = curvature - 0.02 * offset - 0.3 * heading
     share = wanted / min(0.6, 5.0 / max(speed * speed, 1e-6))
@@ -53,18 +53,18 @@ def by_plans() -> Policy:
 
 
 def with_lidar() -> Policy:
-    """Look at the lidar alone."""
+    """Drive by the lidar alone."""
     return Policy(lambda seen: np.array((float(seen['lidar'].min() > 20.0), 0.0), np.float32),
                   observation={'parts': ['lidar'], 'rays': 12})
 
 
 def failing() -> Policy:
-    """Fail at the first question."""
+    """Fail at the first action."""
     def act(seen: Mapping[str, NDArray[np.float32]]) -> None:
         raise RuntimeError('no weights')
     return Policy(act)
 
 
 def nothing() -> int:
-    """Return what is no policy."""
+    """Return a value that is no policy."""
     return 3

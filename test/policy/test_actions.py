@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What actions mean: in plans, and in pedals."""
+"""The effect of actions: as plans, and as pedals."""
 
 import math
 
@@ -99,5 +99,5 @@ def test_pedals_hold_a_car_that_shall_not_move() -> None:
         assert driven.state.speed == 0.0
     for _ in range(100):
         driven.step(inverse.command(WantedMotion(1.0, 0.0), driven.state.speed), 0.01)
-    # The lag of CRG 25 costs its time constant of the motion, and no more.
+    # The lag of CRG 25 delays the motion by its time constant, and no more.
     assert driven.state.speed == pytest.approx(1.0 - CAR.longitudinal_lag, abs=0.1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a policy is told, beside geometry done by hand."""
+"""The observations of a policy, against geometry by hand."""
 
 import math
 from pathlib import Path

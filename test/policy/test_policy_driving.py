@@ -21,7 +21,7 @@ SCENARIOS = Path(__file__).resolve().parents[2] / 'scenarios'
 
 
 def driven(name: str, function: str, *, av: bool, seconds: float = 3.0) -> OfflineResult:
-    """Let a policy drive the AV or the human of a game."""
+    """Run a game whose AV or human is driven by a policy."""
     game = load_game(SCENARIOS / f'{name}.yaml')
     policy = f'policy:{HERE}:{function}'
     if av:
@@ -53,7 +53,7 @@ def test_a_policy_drives_a_human_along_the_lane() -> None:
     states = result.states_of('hv0')
     assert [item for item in result.violations
             if item.vehicle_id == 'hv0' and not item.is_valid] == []
-    # It has been told 0.8 of the limit, and the pedals bring it there.
+    # Its desired speed is 0.8 of the limit, and the pedals reach it.
     assert np.abs(np.diff(states[-100:, StateColumn.SPEED])).max() < 0.02
     assert result.commands[:, 0, 2].any()
 

@@ -157,7 +157,7 @@ class RunRecorder:
                   for name in object_joint_names(item.id)]
         rows = CycleRows(setup.vehicle_ids, 1)
         self.rows = np.zeros((len(result.vehicle_states), len(rows.columns)))
-        # With every interval as it was measured, their sum is ahead of n dt by the lag.
+        # With all intervals as measured, their sum is ahead of n dt by the lag.
         lags_s = np.zeros(len(self.rows)) if intervals_s is None else np.concatenate(
             ([0.0], np.cumsum(intervals_s - scheduler.dt_s)))
         for n, states in enumerate(result.vehicle_states):
@@ -240,7 +240,7 @@ def runs() -> type[ExportRuns]:
 
 @pytest.fixture(scope='session')
 def studied(recorder: RunRecorder, tmp_path_factory: pytest.TempPathFactory) -> Studied:
-    """Return a study that people took part in, with its data."""
+    """Return a study with participants, with its data."""
     folder = tmp_path_factory.mktemp('studies') / 'demo'
     found = take_part(StudyMaker(recorder, folder, scenarios_directory() / 'cut_in.yaml'))
     assert main(['study', 'data', str(folder), '--bids']) == 0

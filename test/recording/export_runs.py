@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs to export, and what every exported file is checked for."""
+"""Runs to export, and the checks of every exported file."""
 
 from collections import Counter
 from dataclasses import replace
@@ -42,7 +42,7 @@ class ExportRuns:
     @staticmethod
     def drive(text: str, directory: Path, avs: tuple[AvSpec, ...] | None = None,
               duration_s: float = 2.0) -> RunTrajectories:
-        """Drive a scenario with a human who accelerates and steers, and AVs at constant speed."""
+        """Drive a scenario with a human that accelerates and steers, and AVs at constant speed."""
         file = directory / 'original.xml'
         file.write_text(text, encoding='utf-8')
         game = Game(file, humans=(HumanSpec('hv0', 'idle'),), avs=avs)
@@ -53,7 +53,7 @@ class ExportRuns:
         commands = np.zeros((steps, 5))
         commands[:, 0] = 0.3
         commands[:, 2] = 0.1 * np.sin(np.arange(steps) / 40.0)
-        # Second by second: left, right with the horn, hazard, nothing but the brake.
+        # Second by second: left, right with the horn, hazard, only the brake.
         commands[:, 4] = np.resize((1, 6, 3, 0), steps // 50 + 1).repeat(50)[:steps]
         commands[150:, 1] = 0.05
         return trajectories_of(run_offline(setup, duration_s=duration_s, check_drivability=False,
@@ -117,7 +117,7 @@ class ExportRuns:
 
     @staticmethod
     def shifted(text: str, k0: int) -> str:
-        """Let the planning problems begin at k0, and their goals and the lights as much later."""
+        """Make planning problems begin at k0, with their goals and the lights as much later."""
         root = etree.fromstring(text.encode('utf-8'))
         for problem in root.findall('planningProblem'):
             problem.find('initialState/time/exact').text = str(k0)
@@ -128,7 +128,7 @@ class ExportRuns:
     @staticmethod
     def with_objects(log: RunTrajectories,
                      *objects: tuple[ObjectDescription, Any]) -> RunTrajectories:
-        """Put objects with poses (K, 3) into a log without any; all of them drive at 3 m/s."""
+        """Add objects with poses (K, 3) to a log without any; all of them drive at 3 m/s."""
         poses = np.stack([np.asarray(track, dtype=np.float64) for _, track in objects], axis=1)
         velocities = np.stack((3.0 * np.cos(poses[..., 2]), 3.0 * np.sin(poses[..., 2]),
                                np.zeros_like(poses[..., 0])), axis=-1)

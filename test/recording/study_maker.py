@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A study that people have taken part in: real sessions, real recordings of what they drove."""
+"""A study with participants: real sessions, and real recordings of their drives."""
 
 from dataclasses import dataclass, replace
 import json
@@ -53,7 +53,7 @@ questions:
 @dataclass
 class Studied:
     """
-    A study's folder, and what its people did.
+    A study's folder, and its participants' answers.
 
     :param folder: of the study.
     :param answers: by participant and trial, to the questions of van_der_laan.
@@ -65,7 +65,7 @@ class Studied:
 
 class StudyMaker:
     """
-    Lets people take part, as `crgame study run` would write it.
+    Makes sessions of participants, as `crgame study run` would write them.
 
     :param recorder: of runs.
     :param folder: of the study, is made.
@@ -94,7 +94,7 @@ class StudyMaker:
 
     def do(self, session: ParticipantSession, rng: np.random.Generator,
            remark: str | None = None) -> str:
-        """Do the next item; give its id."""
+        """Do the next item; return its id."""
         item = session.next_item
         assert item is not None
         if isinstance(item.what, Page):
@@ -144,7 +144,7 @@ def lines_of(path: Path) -> list[dict[str, Any]]:
 
 
 def take_part(make: StudyMaker) -> Studied:
-    """Let four people take part: two wholly, one with troubles, one who leaves."""
+    """Make four participants: two complete, one with troubles, one that leaves."""
     for place, name in enumerate(('P01', 'P02')):
         with make.session(name, place) as session:
             for _ in range(2):

@@ -74,7 +74,7 @@ def test_recordings_of_every_make(tmp_path: Path, recorder: Any, drive: Drive, k
 @pytest.mark.slow
 def test_recording_that_was_cut_off_or_began_late(tmp_path: Path, recorder: Any,
                                                   drive: Drive) -> None:
-    """What is there becomes the scenario; the notices say what is not."""
+    """The existing part becomes the scenario; the notices name the missing part."""
     result = drive(TRAFFIC, duration_s=2.0, avs=AV)
     messages = recorder.messages(result)
     folder = recorder.ours(tmp_path / 'bag', messages)

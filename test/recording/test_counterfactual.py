@@ -70,9 +70,9 @@ def test_the_same_human_against_the_same_planner_and_another(
         name: str, record: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     """
-    The same planner gives the recorded run again, to the last bit; another one another AV.
+    The same planner repeats the recorded run to the last bit; another one moves the AV otherwise.
 
-    With traffic and with perception, too; the human does what it did in each.
+    This holds with traffic and with perception, too; the human repeats its motion in each.
     """
     folder, result = record(name)
     (tmp_path / 'own.py').write_text(OWN_PLANNER)
@@ -99,7 +99,7 @@ def test_the_same_human_against_the_same_planner_and_another(
 @pytest.mark.slow
 def test_traffic_that_reacts_makes_another_world(
         record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An AV that stops in the merge: agents behind it brake, and the table says from when on."""
+    """An AV stops in the merge: agents behind it brake, and the table has the time."""
     folder, _ = record('dense_merge')
     (tmp_path / 'standing.py').write_text(STANDING_PLANNER)
     assert main(['replay', str(folder), '--planner', f'{tmp_path / "standing.py"}:Standing',
@@ -130,7 +130,7 @@ def test_folders_are_new_and_files_have_names_of_their_own(
 @pytest.mark.slow
 def test_a_human_without_inputs_takes_its_recorded_way(
         record: Any, recorder: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of a recording without cycles the inputs are not known, the ways are."""
+    """A recording without cycles has no inputs, but the paths are known."""
     _, result = record('cut_in')
     messages = [each for each in recorder.messages(result) if each[0] != '/timing/cycle']
     bag = recorder.ours(tmp_path / 'run' / 'bag', messages)

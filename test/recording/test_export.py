@@ -48,7 +48,7 @@ def test_round_trip_of_our_own_scenarios(runs: Any, tmp_path: Path, name: str) -
 
 
 def test_what_a_driver_shows_and_sounds_reads_back(runs: Any, tmp_path: Path) -> None:
-    """Of hv0 half a second each left, right and horn, hazard; then the brake. Not of an AV."""
+    """hv0 has half a second each of left, right and horn, hazard; then the brake. AVs have no."""
     log = runs.drive(runs.own(CUT_IN), tmp_path)
     exported = export_scenario(log)
     scenario, _ = runs.read_back(exported)
@@ -153,7 +153,7 @@ def test_benchmark_id(runs: Any, tmp_path: Path, given: str, avs: Any, expected:
 
 
 def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
-    """No step, no vehicle, states without numbers, a problem that is not there: no file."""
+    """Without a step, a vehicle, numbers in states or the problem there is no file."""
     log = runs.drive(runs.own(CUT_IN), tmp_path, duration_s=0.2)
     states = log.vehicle_states.copy()
     states[1, 0, 3] = np.nan
@@ -173,8 +173,8 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize('problem', [True, False])
-def test_run_in_which_nobody_drives(runs: Any, tmp_path: Path, problem: bool) -> None:
-    """Recorded vehicles alone: the problem stays as it was, or there is one that all meet."""
+def test_run_without_a_driven_vehicle(runs: Any, tmp_path: Path, problem: bool) -> None:
+    """With recorded vehicles alone the problem is unchanged, or there is one that all meet."""
     text = runs.own(TRAFFIC)
     if not problem:
         text = re.sub('<planningProblem.*</planningProblem>', '', text, flags=re.DOTALL)
@@ -208,7 +208,7 @@ def test_nothing_invalid_is_ever_written(runs: Any, tmp_path: Path) -> None:
 
 
 def test_header_of_the_file(runs: Any, tmp_path: Path) -> None:
-    """The original's author stays, what is given goes first, and the source says what it is."""
+    """The original's author stays, given values take precedence, and the source is named."""
     log = runs.drive(runs.own(CUT_IN), tmp_path, duration_s=0.2)
     root = etree.fromstring(export_scenario(log).xml_text.encode('utf-8'))
     assert root.get('author') == 'The crgame_ros authors'
@@ -226,7 +226,7 @@ def test_header_of_the_file(runs: Any, tmp_path: Path) -> None:
 
 
 def test_file_is_written_whole_and_replaces_only_exports(runs: Any, tmp_path: Path) -> None:
-    """A folder gets `<benchmark id>.xml`; somebody's own file of that name is never replaced."""
+    """A folder gets `<benchmark id>.xml`; a user's own file of that name is never replaced."""
     log = runs.drive(runs.own(CUT_IN), tmp_path, avs=(), duration_s=0.2)
     folder = tmp_path / 'out'
     folder.mkdir()

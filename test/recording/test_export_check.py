@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever runs can be written: ids, goals and roads that the schema refuses, files at random."""
+"""All driven runs can be written: ids, goals and roads that the schema refuses, random files."""
 
 from collections import Counter
 from pathlib import Path
@@ -85,7 +85,7 @@ def test_intersections_that_the_schema_refuses(runs: Any, tmp_path: Path, patter
 
 
 def test_states_and_goals_without_a_time(runs: Any, tmp_path: Path) -> None:
-    """They count as those of time step 0, and as goals for any time; both are told."""
+    """They count as those of time step 0, and as goals for any time; both are reported."""
     text = re.sub(r'<time>.*?</time>', '', runs.own(CUT_IN), flags=re.DOTALL)
     loaded = parse_scenario(text, 'x')
     problem = loaded.planning_problems[0]
@@ -111,7 +111,7 @@ def test_what_cannot_be_written_is_refused_before_the_first_step(
 
 def test_where_nothing_can_be_written_is_told_before_the_run(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """No report of a run comes before the refusal; a file name is a file, not a folder."""
+    """The refusal comes before any report of a run; a file name is a file, not a folder."""
     (tmp_path / 'file').touch()
     for arguments, reason in ((('1', str(tmp_path / 'file' / 'x')), 'Not a directory'),
                               (('0.05', str(tmp_path / 'out')), 'less than a time step')):

@@ -58,7 +58,7 @@ def test_planning_problems(runs: Any, tmp_path: Path) -> None:
 
 
 def test_goals_of_every_form(runs: Any, tmp_path: Path) -> None:
-    """Lanelets, shapes, orientation and velocity of a goal pass; a time that is over is mended."""
+    """Lanelets, shapes, orientation and velocity of a goal pass; a time that is over is fixed."""
     goals = (
         '<goalState><time><intervalStart>30</intervalStart><intervalEnd>40</intervalEnd></time>'
         '<position><lanelet ref="11"/></position><velocity><intervalStart>1.5</intervalStart>'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Exported roads: as in the original, mended where the schema would refuse them."""
+"""Exported roads: as in the original, fixed where the schema would refuse them."""
 
 from pathlib import Path
 import re
@@ -17,7 +17,7 @@ CUT_IN = 'ZAM_CutIn-1_1_T-1.xml'
 @pytest.mark.slow
 def test_traffic_lights_keep_their_states(
         runs: Any, tmp_path: Path, shared_scenarios: Path) -> None:
-    """What a light showed at k of the original it shows at k - k0 of the export."""
+    """The state of a light at k of the original is that at k - k0 of the export."""
     text = (shared_scenarios / 'USA_Lanker-1_3_T-1.xml').read_text(encoding='utf-8')
     original = parse_scenario(text, 'x').scenario
     cycle = sum(e.duration for e in original.lanelet_network.traffic_lights[0]
@@ -44,7 +44,7 @@ def test_header_elements_that_the_original_lacks(runs: Any, tmp_path: Path, patt
     exported = export_scenario(log)
     scenario, _ = runs.read_back(exported)
     assert scenario.location.gps_latitude is not None
-    assert not any('written anew' in notice for notice in exported.notices)
+    assert not any('rewritten' in notice for notice in exported.notices)
 
 
 @pytest.mark.parametrize(('pattern', 'replacement'), [
@@ -59,7 +59,7 @@ def test_roads_that_break_the_schema(runs: Any, tmp_path: Path, pattern: str,
     exported = export_scenario(log)
     scenario, _ = runs.read_back(exported)
     runs.assert_poses(log, exported, scenario)
-    assert any('written anew' in notice for notice in exported.notices)
+    assert any('rewritten' in notice for notice in exported.notices)
     assert len(scenario.lanelet_network.lanelets) == len(re.findall('<lanelet id', text))
 
 

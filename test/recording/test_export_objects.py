@@ -24,7 +24,7 @@ POSITION_TOLERANCE = 0.5e-4 * math.sqrt(2.0) + 1e-9
 
 
 def test_objects_that_come_and_go(runs: Any, tmp_path: Path) -> None:
-    """Trajectories begin at step 0; what comes later is a phantom obstacle; the rest is said."""
+    """Trajectories begin at step 0; later objects are phantom obstacles; the rest is reported."""
     log = runs.drive(runs.own(CUT_IN), tmp_path)
     steps = len(log.ks)
     log = runs.with_objects(
@@ -69,7 +69,7 @@ def test_objects_that_come_and_go(runs: Any, tmp_path: Path) -> None:
 
 
 def test_shapes_and_types_of_everything(runs: Any, tmp_path: Path) -> None:
-    """Circles, polygons, static and environment obstacles; unknown types are said."""
+    """Circles, polygons, static and environment obstacles; unknown types are reported."""
     log = runs.drive(runs.own(CUT_IN), tmp_path)
     steps = len(log.ks)
     always = set(range(steps))

@@ -36,7 +36,7 @@ def result() -> OfflineResult:
 
 def _plans(result: OfflineResult, samples: Any, every: int, ahead: int, latency_ns: int
            ) -> list[tuple[str, str, int, bytes]]:
-    """Answer every so many steps with what the AV did then, some time after it was asked."""
+    """Answer every so many steps with the AV's motion then, some time after the request."""
     scheduler = result.setup.scheduler
     states = result.states_of('av0')[::scheduler.steps_per_tick]
     found = []
@@ -73,7 +73,7 @@ def run(result: OfflineResult, recorder: Any, samples: Any,
 @pytest.mark.slow
 def test_everything_of_a_run_is_drawn(run: Path, tmp_path: Path,
                                       capsys: pytest.CaptureFixture[str]) -> None:
-    """Frames, profiles, timing, table: whole files, each named with what it shows; same again."""
+    """Frames, profiles, timing and table are whole files, named by content; repeats are equal."""
     for folder in ('a', 'b'):
         assert main(['figures', str(run), '--out', str(tmp_path / folder), '--format', 'svg,pdf',
                      '--panels', '2', '--moments', '1']) == 0
@@ -89,14 +89,14 @@ def test_everything_of_a_run_is_drawn(run: Path, tmp_path: Path,
             assert content.startswith(b'%PDF')
     told = capsys.readouterr().out
     assert str(tmp_path / 'a' / 'frames_1.svg') in told and 'run around' in told
-    # Where nothing is named, the files lie beside the recording.
+    # Without a named folder the files lie beside the recording.
     assert main(['figures', str(run / 'bag'), '--figures', 'table']) == 0
     assert (run / 'figures' / 'timing.tex').is_file()
 
 
 def test_two_runs_are_compared(run: Path, result: OfflineResult, recorder: Any, tmp_path: Path,
                                capsys: pytest.CaptureFixture[str]) -> None:
-    """Under their labels; the second lags by 1 ms more at each of its 800 cycles."""
+    """They have their labels; the second lags by 1 ms more at each of its 800 cycles."""
     slow = tmp_path / 'slow'
     intervals_s = np.full(800, result.setup.scheduler.dt_s + 0.001)
     recorder.ours(slow / 'bag', recorder.messages(result, intervals_s=intervals_s))
@@ -113,13 +113,13 @@ def test_two_runs_are_compared(run: Path, result: OfflineResult, recorder: Any, 
 
 
 def test_plans_are_drawn_as_recorded(run: Path, result: OfflineResult) -> None:
-    """In force 30 ms after they were asked for, the first from the start on, for it is awaited."""
+    """They hold 30 ms after the request; the first, for which the run waits, from the start."""
     log = read_trajectories(run / 'bag')
     (plans,) = read_followed_plans(run / 'bag', log).values()
     assert [plan.stamp_s for plan in plans] == pytest.approx(0.5 * np.arange(len(plans)))
     assert [plan.start_s for plan in plans] == pytest.approx(
         [0.0, *(0.5 * np.arange(1, len(plans)) + 0.03)])
-    # The AV did what its plans said: its way lies on each of them.
+    # The AV followed its plans: its path lies on each of them.
     scene = FigureRun(run, None, None, print).scene
     window = scene.windows([20])[0]
     (plan,) = scene.at(22, window).plans
@@ -135,7 +135,7 @@ def test_frames_at_given_times(run: Path, tmp_path: Path) -> None:
 
 
 def test_a_run_becomes_a_film(result: OfflineResult, recorder: Any, tmp_path: Path) -> None:
-    """Of its first second; and nothing else is made, unless figures are asked for."""
+    """The film has its first second; nothing else is made, unless figures are asked for."""
     messages = [each for each in recorder.messages(result, log_ns=LOG_NS)
                 if each[2] <= LOG_NS + 1_005_000_000]
     recorder.ours(tmp_path / 'run' / 'bag', messages)

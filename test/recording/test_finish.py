@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of runs that ended before they began, and of recorders that were started again."""
+"""Results of runs that ended before they began, and of recorders that were started again."""
 
 from collections.abc import Callable
 import json
@@ -30,14 +30,14 @@ def result(drive: Drive) -> OfflineResult:
 
 
 def _between(messages: list[Message], from_s: float, until_s: float) -> list[Message]:
-    """Take the documents, which every recorder gets, and what was logged in between."""
+    """Return the documents, which every recorder gets, and the messages logged in between."""
     first_ns = START_NS + round(from_s * 1e9)
     return [(*m[:2], first_ns, m[3]) if m[0].startswith('/scenario/') else m for m in messages
             if m[0].startswith('/scenario/') or first_ns <= m[2] < START_NS + round(until_s * 1e9)]
 
 
 def _killed(folder: Path) -> None:
-    """Leave what a killed recorder leaves: a file without its end."""
+    """Write the file of a killed recorder: it has no end."""
     (folder / 'metadata.yaml').unlink()
     file = next(folder.glob('*.mcap'))
     file.write_bytes(file.read_bytes()[:-200])
@@ -60,7 +60,7 @@ def test_a_run_that_ended_before_it_began_is_no_error(tmp_path: Path, recorder: 
 @pytest.mark.exhaustive
 def test_two_quick_resets_in_one_recording(tmp_path: Path, recorder: Any, drive: Drive,
                                            capsys: pytest.CaptureFixture[str]) -> None:
-    """Of `ros2 bag record -a`: the last run that began becomes the scenario, the others a note."""
+    """By `ros2 bag record -a`: the last run that began becomes the scenario; a note has others."""
     first = drive(TRAFFIC, duration_s=1.0)
     messages = recorder.messages(first)
     for epoch in (1, 2):
@@ -109,7 +109,7 @@ def test_a_recorder_that_was_started_again(tmp_path: Path, recorder: Any,
 
 def test_a_recorder_that_lost_more_than_is_bridged(tmp_path: Path, recorder: Any,
                                                    result: OfflineResult) -> None:
-    """Whichever part is longer becomes the scenario, and the notice names the gap."""
+    """The longer part becomes the scenario, and the notice names the gap."""
     messages = recorder.messages(result)
     recorder.ours(tmp_path / 'bag', _between(messages, 0.0, 1.0))
     recorder.ours(tmp_path / 'bag_part2', _between(messages, 3.0, 9.0))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of another type on a run's topics, and log times that are none, cost themselves."""
+"""Messages of another type on a run's topics, and bad log times, cost only themselves."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -32,7 +32,7 @@ def result(drive: Callable[..., OfflineResult]) -> OfflineResult:
 
 
 def record(folder: Path, samples: Any, messages: Any, storage: StoragePlugin) -> Path:
-    """Record; one topic may have several types, as ROS lets it."""
+    """Record messages; one topic may have several types, as in ROS."""
     connections: dict[tuple[str, str], Any] = {}
     with RosbagsWriter(folder, version=9, storage_plugin=storage) as writer:
         for topic, type_name, log_ns, data in messages:
@@ -48,7 +48,7 @@ def record(folder: Path, samples: Any, messages: Any, storage: StoragePlugin) ->
 def test_another_type_on_every_topic_of_a_run(
         storage: StoragePlugin, result: OfflineResult, recorder: Any, samples: Any,
         tmp_path: Path) -> None:
-    """Before, among and after the run's own; everything that is made of the run stays the same."""
+    """Before, among and after the run's own they change no output of the run."""
     own = recorder.messages(result)
     topics = sorted({topic for topic, *_ in own} | {
         '/av0/plan', '/av0/plan_request', '/scenario/events', '/diagnostics', '/seats',
@@ -80,13 +80,13 @@ def test_another_type_on_every_topic_of_a_run(
 @pytest.mark.parametrize('log_ns', [2 ** 63 - 1, 2 ** 63, 2 ** 64 - 1])
 def test_log_times_that_no_clock_gives(log_ns: int, result: OfflineResult, recorder: Any,
                                        samples: Any, tmp_path: Path) -> None:
-    """MCAP holds unsigned times, ROS and indices signed ones: the latest that there is counts."""
+    """MCAP holds unsigned times, ROS and indices signed ones: the latest possible counts."""
     own = recorder.messages(result)
     bag = recorder.ours(tmp_path / 'bag', [
         *own, (own[-1][0], own[-1][1], 2 ** 63 - 1, own[-1][3]),
         ('/diagnostics', STRING, 2 ** 63 - 1, samples.string('x'))])
     file = next(bag.glob('*.mcap'))
-    # In the chunk, its head and the summary alike; without checksums nothing notices.
+    # In the chunk, its head and the summary alike; without checksums this is not noticed.
     _unpack(file, struct.pack('<Q', 2 ** 63 - 1), struct.pack('<Q', log_ns))
     with BagReader(bag) as reader:
         assert reader.end_ns == 2 ** 63 - 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of a busy recorder: what is missing is bridged, or cuts the run, and is told."""
+"""Recordings of a busy recorder: gaps are bridged or cut the run, and are reported."""
 
 from collections.abc import Callable
 import json
@@ -30,7 +30,7 @@ STALL_N, STALL_S = 700, 0.2
 
 
 class Whole(NamedTuple):
-    """A run of 20 s, its messages as `ros2 bag record -a` has them, and what they hold."""
+    """A run of 20 s, its messages as of `ros2 bag record -a`, and their contents."""
 
     result: OfflineResult
     messages: list[Message]
@@ -93,7 +93,7 @@ def test_single_ticks_of_a_topic_are_missing(tmp_path: Path, recorder: Any, whol
     log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, np.arange(201))
     vehicles_m, objects_m = _worst_m(log, whole.log)
-    # Of what another topic holds to the last bit nothing but the roundings differs.
+    # States that another topic holds to the last bit differ by roundings only.
     assert vehicles_m < 1e-9
     assert objects_m < (0.08 if topic == OBJECTS else 1e-12)
     assert len(log.notices) == (0 if topic == TICK_STATES else 1)
@@ -105,7 +105,7 @@ def test_single_ticks_of_a_topic_are_missing(tmp_path: Path, recorder: Any, whol
 @pytest.mark.parametrize('at_s', [4.03, 6.9])
 def test_a_third_of_a_second_of_everything_is_missing(tmp_path: Path, recorder: Any,
                                                       whole: Whole, at_s: float) -> None:
-    """It is bridged, also where a stall was in it: the lag of the cycles behind tells of it."""
+    """It is bridged, also with a stall in it: the lag of the cycles after it shows the stall."""
     messages = [m for m in whole.messages if not at_s <= _time_s(m) < at_s + 0.3]
     log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
     np.testing.assert_array_equal(log.ks, np.arange(201))
@@ -115,7 +115,7 @@ def test_a_third_of_a_second_of_everything_is_missing(tmp_path: Path, recorder: 
     assert vehicles_m < 8.0 * 0.5**2 / 32
     assert objects_m < 8.0 * 0.4**2 / 32 + 0.08
     assert sum('interpolated between states' in notice for notice in log.notices) == 2
-    # All else is as it was.
+    # All else is unchanged.
     rows = (np.arange(201) * 0.1 < at_s) | (np.arange(201) * 0.1 > at_s + 0.6)
     np.testing.assert_allclose(log.vehicle_states[rows, :, :3],
                                whole.log.vehicle_states[rows, :, :3], atol=1e-6)
@@ -160,7 +160,7 @@ def test_gaps_longer_than_the_limit_are_never_bridged(tmp_path: Path, recorder: 
 
 
 def test_documents_that_come_late(tmp_path: Path, recorder: Any, whole: Whole) -> None:
-    """Discovered after ten seconds: the run is theirs from its first step on."""
+    """Discovered after ten seconds, they hold for the run from its first step on."""
     late = [(*m[:2], m[2] + 10_000_000_000, m[3]) if m[0].startswith('/scenario/') else m
             for m in whole.messages]
     log = read_trajectories(recorder.ours(tmp_path / 'bag', sorted(late, key=lambda m: m[2])))
@@ -170,7 +170,7 @@ def test_documents_that_come_late(tmp_path: Path, recorder: Any, whole: Whole) -
 
 def test_a_recording_that_begins_in_the_middle_of_a_stall(tmp_path: Path, recorder: Any,
                                                           whole: Whole) -> None:
-    """From the lag of the first cycle follows where on its own time a human is."""
+    """The lag of the first cycle determines the human's own time."""
     messages = [m for m in whole.messages
                 if _time_s(m) > 8.0 or m[0].startswith('/scenario/')]
     log = read_trajectories(recorder.ours(tmp_path / 'bag', messages))
@@ -181,7 +181,7 @@ def test_a_recording_that_begins_in_the_middle_of_a_stall(tmp_path: Path, record
 
 def test_the_states_of_a_run_whose_game_is_missing_are_not_those_of_the_run_before(
         tmp_path: Path, recorder: Any, drive: Callable[..., OfflineResult]) -> None:
-    """The cycles tell that there was another run."""
+    """The cycles show that there was another run."""
     first, second = drive(TRAFFIC, duration_s=1.0), drive(TRAFFIC, duration_s=2.0, seed=2)
     messages = recorder.messages(first)
     messages += [m for m in recorder.messages(second, epoch=1, offset_ns=1_500_000_000,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What people are told of a recording."""
+"""The description of a recording for users."""
 
 import json
 from pathlib import Path
@@ -98,7 +98,7 @@ def test_unfinished_recording_says_so(tmp_path: Path, samples: Any) -> None:
 
 
 def test_recording_without_game_and_cycles(tmp_path: Path, samples: Any) -> None:
-    """Topics of the same names but other types, as a stranger may record, are no game."""
+    """Topics of the same names but other types, as in foreign recordings, are no game."""
     folder = record(tmp_path / 'run', samples, [
         ('/scenario/game', 'rosgraph_msgs/msg/Clock', samples.clock(5)),
         ('/timing/cycle', STRING, samples.string('x'))])

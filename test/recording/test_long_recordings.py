@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Long recordings: little is done for each message, and people hear how far it is."""
+"""Long recordings: little work for each message, and reports of progress."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +28,7 @@ def result(drive: Callable[..., OfflineResult]) -> OfflineResult:
 def test_what_differs_in_its_numbers_alone_is_decoded_once(
         tmp_path: Path, recorder: Any, result: OfflineResult,
         monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of 1,262 messages a dozen are decoded, and what is read is the same to the last bit."""
+    """Of 1,262 messages a dozen are decoded, and the results are the same to the last bit."""
     messages = recorder.messages(result)
     folder = recorder.ours(tmp_path / 'bag', messages)
     decoded: list[str] = []
@@ -51,7 +51,7 @@ def test_what_differs_in_its_numbers_alone_is_decoded_once(
 
 def test_messages_of_another_layout_among_the_others(tmp_path: Path, recorder: Any, samples: Any,
                                                      result: OfflineResult) -> None:
-    """Big-endian, of other joints, cut short: each is read as it is, or left out and counted."""
+    """Big-endian, of other joints, cut short: each is read, or left out and counted."""
     messages = recorder.messages(result)
     states = [index for index, message in enumerate(messages) if message[0] == '/vehicles/state']
     for index in states[50:60]:
@@ -69,7 +69,7 @@ def test_messages_of_another_layout_among_the_others(tmp_path: Path, recorder: A
 
 def test_progress_is_told_where_it_takes_long(tmp_path: Path, recorder: Any,
                                               result: OfflineResult) -> None:
-    """From nothing to all, for states and for cycles; said after two seconds, not before."""
+    """It goes from nothing to all, for states and for cycles, first after two seconds."""
     folder = recorder.ours(tmp_path / 'bag', recorder.messages(result))
     shares: list[float] = []
     read_trajectories(folder, progress=shares.append)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The Python interface: as the document shows it, and the same as the commands."""
+"""The Python interface: as documented, and the same as the commands."""
 
 import ast
 from dataclasses import replace
@@ -53,7 +53,7 @@ def folder(run: OfflineRun, recorder: Any, tmp_path_factory: pytest.TempPathFact
 
 
 def test_importing_the_package_loads_nothing() -> None:
-    """No module but the package itself, until somebody asks for a name."""
+    """Only the package itself is loaded before a name is used."""
     code = ('import sys; before = set(sys.modules); import crgame_ros; '
             'print(*sorted(set(sys.modules) - before)); crgame_ros.InputError; '
             'print(*sorted(name for name in sys.modules if name.startswith("crgame_ros")))')
@@ -62,7 +62,7 @@ def test_importing_the_package_loads_nothing() -> None:
 
 
 def test_names_are_there_for_people_editors_and_types() -> None:
-    """The same ones in `__all__`, in `dir`, in what type checkers read, and when asked for."""
+    """`__all__`, `dir`, the stubs for type checkers and attributes have the same names."""
     tree = ast.parse((ROOT / 'crgame_ros' / '__init__.py').read_text())
     typed = {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
              and (node.module or '').startswith('crgame_ros') for alias in node.names}
@@ -76,7 +76,7 @@ def test_names_are_there_for_people_editors_and_types() -> None:
 
 @pytest.mark.slow
 def test_the_document_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its lines in order, beside the games and a recording; what it promises is so."""
+    """Its lines run in order, beside the games and a recording; its claims hold."""
     (tmp_path / 'scenarios').symlink_to(scenarios_directory())
     (tmp_path / 'runs').symlink_to(folder.parent)
     monkeypatch.chdir(tmp_path)
@@ -100,7 +100,7 @@ def test_the_document_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_run_is_that_of_the_command(run: OfflineRun, capsys: pytest.CaptureFixture[str]) -> None:
-    """Everything but the times it took; two AVs by other planners and a trigger, too."""
+    """All but the computing times is equal; also with two other planners and a trigger."""
     assert main(['offline', str(CUT_IN), '--duration', '3']) == 0
     told = json.loads(capsys.readouterr().out)
     assert {**run.summary(), 'wall_s': 0} == {**told, 'wall_s': 0}
@@ -134,7 +134,7 @@ def test_a_recording_is_the_same_kind_of_object(
         written = polars.read_parquet(folder / 'tables' / f'{name}.parquet')
         assert polars.from_arrow(table).equals(written), name
     assert recorded.tables(scores=False)['vehicles']['score_nuplan'].null_count == 2
-    # By its own game, too.
+    # With its own game, too.
     driver = f'replay:{folder / "bag"}'
     assert crgame_ros.run(driver=driver, duration_s=3.0).state_hash == run.state_hash
     with pytest.raises(crgame_ros.InputError, match='seed: the game is that of the recording'):
@@ -151,7 +151,7 @@ def test_an_offline_run_knows_what_a_recording_tells(tmp_path: Path) -> None:
     counters = run.result.planners['av0'].counters
     assert tables['vehicles']['score_accepted_share'] == [None, run.answers['av0'].accepted_share]
     assert tables['vehicles']['requests'] == [None, counters.requests]
-    # The AV runs into the human, who has cut in and brakes.
+    # The AV runs into the human, which has cut in and brakes.
     first = next(each.n for each in run.result.violations if not each.is_valid)
     assert [each['n'] for each in run.contacts or ()] == [first]
     assert {(each['n'], each['vehicle'], each['what']) for each in run.violations or ()} == {
@@ -164,7 +164,7 @@ def test_an_offline_run_knows_what_a_recording_tells(tmp_path: Path) -> None:
 
 
 def test_objects_and_classes_drive_alike(run: OfflineRun) -> None:
-    """By name, class and object the same states; what fails is counted, and no name stays."""
+    """Name, class and object have the same states; failures are counted, and no name stays."""
     hashes = {crgame_ros.run(CUT_IN, planner=planner, duration_s=1.0).state_hash
               for planner in ('constant-velocity', ConstantVelocityPlanner,
                               ConstantVelocityPlanner())}
@@ -189,7 +189,7 @@ def test_each_av_has_a_planner_of_its_own() -> None:
 
 
 def test_a_notebook_shows_it(run: OfflineRun) -> None:
-    """A picture, a row for each vehicle, and whatever a game is called as text."""
+    """It has a picture, a row for each vehicle, and any game's name as text."""
     hostile = OfflineRun('<script>x</script>', run.result, 1.0)
     html = hostile._repr_html_()
     assert '<img alt="The scene from above' in html and html.count('<tr>') == 3
@@ -216,14 +216,14 @@ def test_a_notebook_shows_it(run: OfflineRun) -> None:
     ({'driver': 'cockpit'}, 'needs a person'), ({'triggers': {'x': 0.0}}, 'no event "x"'),
     ({'problems': [1]}, 'problems: the game names its AVs')])
 def test_what_cannot_be_used_is_an_input_error(arguments: dict[str, Any], said: str) -> None:
-    """Argument or file, what is wrong, in a line."""
+    """The error is one line with the argument or file and the reason."""
     with pytest.raises(crgame_ros.InputError) as caught:
         crgame_ros.run(**{'game': CUT_IN, 'duration_s': 0.2, **arguments})
     assert said in str(caught.value) and len(str(caught.value).splitlines()) == 1
 
 
 def test_refusals_of_what_is_made_of_runs(run: OfflineRun, tmp_path: Path) -> None:
-    """Files that cannot be, runs that lack what is asked."""
+    """Impossible files and runs without the required data are refused."""
     alone = crgame_ros.run(replace(crgame_ros.load_game(CUT_IN), humans=()), duration_s=0.2)
     for attempt, said in (
             (lambda: run.report(tmp_path / 'x.pdf'), 'no name of an HTML file'),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading recordings of every make, finished or not, and refusing what is none."""
+"""Reading recordings of every kind, finished or not, and refusing other files."""
 
 from pathlib import Path
 import random
@@ -31,7 +31,7 @@ TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 
 
 def record_ours(folder: Path, samples: Any) -> list[tuple[str, str, int, bytes]]:
-    """Record 30 messages on two topics; return what a reader has to yield."""
+    """Record 30 messages on two topics; return the expected output of a reader."""
     expected = [('/b' if i % 3 else '/a', STRING, 1_000 + i, samples.string(f'message {i}'))
                 for i in range(30)]
     with BagWriter(folder, now_ns=time.monotonic_ns) as writer:
@@ -118,7 +118,7 @@ def test_only_what_may_hold_the_answer_is_read(tmp_path: Path, samples: Any, cut
     with BagWriter(tmp_path / 'bag', now_ns=lambda: next(times)) as writer:
         rare, often = (writer.add_topic(name, STRING, TopicQos(1)) for name in ('/rare', '/often'))
         for i in range(10):
-            # Each look at the clock is a second later than the one before, so each writes a chunk.
+            # Each reading of the clock is a second after the one before, so each writes a chunk.
             writer.write(rare if i == 3 else often, samples.string('x'), 1_000 + i)
     file = tmp_path / 'bag' / 'bag_0.mcap'
     if cut:
@@ -142,7 +142,7 @@ def test_only_what_may_hold_the_answer_is_read(tmp_path: Path, samples: Any, cut
 
 @pytest.mark.exhaustive
 def test_a_damage_anywhere_is_told_or_harmless(tmp_path: Path, samples: Any) -> None:
-    """Four bytes changed: refused, told, or each topic reads as recorded, one by one too."""
+    """Four changed bytes are refused, reported, or harmless to each topic, one by one too."""
     times = iter(range(0, 10**13, 10**9))
     with BagWriter(tmp_path / 'bag', now_ns=lambda: next(times)) as writer:
         channels = [writer.add_topic(name, STRING, TopicQos(1)) for name in ('/a', '/b', '/c')]
@@ -339,7 +339,7 @@ def test_type_that_only_the_recording_knows(tmp_path: Path) -> None:
 
 
 def make_refused(folder: Path, kind: str, samples: Any) -> Path:
-    """Make something that is no recording; return its path."""
+    """Make a file or folder that is no recording; return its path."""
     folder.mkdir()
     if kind == 'missing':
         return folder / 'absent'
@@ -379,7 +379,7 @@ def make_refused(folder: Path, kind: str, samples: Any) -> Path:
     ('unknown storage', "unknown storage 'tape'"), ('missing file', 'the file is missing')])
 def test_what_is_no_recording_gets_one_clear_line(tmp_path: Path, samples: Any, kind: str,
                                                   message: str) -> None:
-    """What is wrong, where, and what to do."""
+    """The line has the fault, its place and the remedy."""
     path = make_refused(tmp_path / 'place', kind, samples)
     with pytest.raises(InputError) as caught:
         BagReader(path)
@@ -390,7 +390,7 @@ def test_what_is_no_recording_gets_one_clear_line(tmp_path: Path, samples: Any, 
 
 
 def test_metadata_cannot_lead_outside_of_its_folder(tmp_path: Path, samples: Any) -> None:
-    """Only names of files in the folder are taken."""
+    """Only names of files in the folder are accepted."""
     record_ours(tmp_path / 'secret', samples)
     record_ours(tmp_path / 'run', samples)
     metadata = tmp_path / 'run' / 'metadata.yaml'

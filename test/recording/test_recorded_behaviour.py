@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How people drove, from a recording: the same as from the run; take-overs; the command."""
+"""Driving behaviour from a recording: the same as from the run; take-overs; the command."""
 
 from dataclasses import replace
 import json
@@ -29,7 +29,7 @@ FROM, TO, HANDS_ON = 300, 700, 350
 
 @pytest.fixture(scope='module')
 def taken_over() -> OfflineResult:
-    """Run the crossing with two events; somebody drives the AV from n = 300 to 700."""
+    """Run the crossing with two events; the AV is driven by hand from n = 300 to 700."""
     setup = build_setup(load_game(scenarios_directory() / 'crossing.yaml'))
     hands = np.full((800, 4), np.nan)
     hands[FROM:TO] = 0.0
@@ -60,7 +60,7 @@ def bag(taken_over: OfflineResult, recorder: Any, samples: Any,
 
 def test_orders_of_seats_are_read(bag: Path, recorder: Any, tmp_path: Path,
                                   taken_over: OfflineResult) -> None:
-    """At the step of the newest state; nothing that is no order; none of a run without orders."""
+    """They are at the step of the newest state; invalid orders and runs without have none."""
     assert read_seat_orders(bag) == (
         SeatOrder(180, 'av0', 'game'), SeatOrder(250, 'av0', 'cockpit'),
         SeatOrder(700, 'av0', 'game'))
@@ -70,7 +70,7 @@ def test_orders_of_seats_are_read(bag: Path, recorder: Any, tmp_path: Path,
 
 def test_a_recording_says_the_same_as_the_run(bag: Path,
                                               taken_over: OfflineResult) -> None:
-    """Every number, to the last bit; only a recording holds who asked for a seat."""
+    """All numbers agree to the last bit; only a recording has the requests for seats."""
     here = measure_behaviour(run_record_of(taken_over))
     record = read_run_record(bag)
     there = measure_behaviour(record)
@@ -81,14 +81,14 @@ def test_a_recording_says_the_same_as_the_run(bag: Path,
     assert there[0].reactions[1].reaction.throttle_s == pytest.approx(0.51)
     take_over, = there[1].take_overs
     assert take_over.request == (2.5, 'order')
-    # The row n holds what the step to n consumed.
+    # The row n holds the command that the step to n consumed.
     assert take_over.seat_s == pytest.approx(0.01 * (FROM + 1))
     assert take_over.to_hands_on_s == pytest.approx(0.01 * (HANDS_ON + 1) - 2.5)
     assert there[1].values['throttle_share'] == pytest.approx((TO - HANDS_ON) / (TO - FROM))
 
 
 def test_the_command_tells_it(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """For people, as JSON beside the keys that were there, and with an event that asks."""
+    """It prints text, or JSON beside the earlier keys, also with an event as request."""
     assert main(['measure', str(bag), '--json']) == 0
     found = json.loads(capsys.readouterr().out)
     assert set(found) == {'thresholds', 'vehicles', 'behaviour'}
@@ -104,14 +104,14 @@ def test_the_command_tells_it(bag: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_an_event_that_there_is_not_is_refused(bag: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
-    """In a line that names those that there are."""
+    """The error is one line that names the existing events."""
     assert main(['measure', str(bag), '--request', 'nothing']) == 2
     error = capsys.readouterr().err
     assert "--request: the run has no event 'nothing'" in error and 'slow-zone' in error
 
 
 def test_without_commands_motion_is_left(bag: Path) -> None:
-    """A recording that lacks its cycles: no pedals and no wheel, the rest as it is."""
+    """A recording without cycles has no pedals and no wheel; the rest is unchanged."""
     record = read_run_record(bag)
     bare = replace(record, ns=record.ns[:0], commands=record.commands[:0])
     human = measure_behaviour(bare)[0]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded humans in an evaluation: they drive as they did, against whoever is asked for."""
+"""Recorded humans in an evaluation: they repeat their drive, against any planner."""
 
 from dataclasses import replace
 from pathlib import Path

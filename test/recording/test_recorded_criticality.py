@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The criticality of a run: looked on at offline, from its log and from its recording."""
+"""The criticality of a run: observed offline, from its log and from its recording."""
 
 import json
 from pathlib import Path
@@ -42,7 +42,7 @@ def _flat(found: Any, name: str = '') -> dict[str, Any]:
 @pytest.mark.matrix
 def test_one_code_for_runs_logs_and_recordings(
         observed: tuple[Criticality, OfflineResult], recorder: Any, tmp_path: Path) -> None:
-    """The same worst moments, times and crossings, however the run comes."""
+    """Worst moments, times and crossings are the same for each source of the run."""
     criticality, result = observed
     expected = _flat(criticality.as_dict())
     assert len(expected) > 30

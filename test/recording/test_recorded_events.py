@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Events of recorded runs: read back, repeated, and what becomes of the objects in an export."""
+"""Events of recorded runs: read back, repeated, and their objects in an export."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,7 +31,7 @@ def play(triggers: Sequence[tuple[int, str]] = TRIGGERS) -> OfflineResult:
 
 
 def test_events_are_read_back(tmp_path: Path, recorder: Any) -> None:
-    """Of the run that is asked for, the last by default; also that nothing took effect."""
+    """They are those of the chosen run, the last by default; there may be none."""
     first, second = play(), play(())
     bag = recorder.ours(tmp_path / 'bag', [
         *recorder.messages(first),
@@ -46,7 +46,7 @@ def test_events_are_read_back(tmp_path: Path, recorder: Any) -> None:
 
 
 def test_recording_repeats_with_its_events(tmp_path: Path, recorder: Any) -> None:
-    """`replay:BAG` alone brings the human and the events back; other bits than without them."""
+    """`replay:BAG` alone repeats the human and the events; the bits differ from those without."""
     original = play()
     recorder.ours(tmp_path / 'bag', recorder.messages(original))
     game = replace(load_game(CROSSING), base=tmp_path)
@@ -88,7 +88,7 @@ def test_converted_run_holds_what_events_did(tmp_path: Path, recorder: Any) -> N
 
 
 def test_put_from_the_start_is_a_static_obstacle(tmp_path: Path, recorder: Any) -> None:
-    """With its type, which a phantom obstacle has not."""
+    """It has its type, unlike a phantom obstacle."""
     bag = recorder.ours(tmp_path / 'bag', recorder.messages(play([(0, 'roadworks')])))
     report = convert(bag, tmp_path)
     scenario = load_scenario(report.path).scenario

@@ -58,9 +58,9 @@ def test_replay_alone_is_the_recorded_run(
         name: str, shared_scenarios: Path, record: Any, tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """
-    The recording alone gives every state again, wherever its files are by then.
+    The recording alone reproduces every state, wherever its files are by then.
 
-    The human was placed by itself: where it started is in the recording, too.
+    The human was placed automatically: its start is in the recording, too.
     """
     copy = tmp_path / 'copy.xml'
     copy.write_bytes((shared_scenarios / f'{name}.xml').read_bytes())
@@ -78,7 +78,7 @@ def test_replay_alone_is_the_recorded_run(
     assert {av.spec.planner for av in setup.avs} == {'constant-velocity'}
 
 
-def test_everybody_in_the_recording_drives_again(record: Any,
+def test_all_in_the_recording_drive_again(record: Any,
                                                  capsys: pytest.CaptureFixture[str]) -> None:
     """Two humans, one on the dynamic bicycle, and an AV with options, seed and perception."""
     game = replace(load_game(scenarios_directory() / 'occluded_pedestrian.yaml'), duration=1.5)
@@ -112,7 +112,7 @@ def test_live_run_gets_the_scenario_as_a_file(record: Any, tmp_path: Path) -> No
 
 def test_recording_of_another_scenario_or_rate_is_refused(
         record: Any, shared_scenarios: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Its commands would drive into nowhere: one line, exit code 2, and what to do instead."""
+    """Its commands would not fit: one line, exit code 2, and the remedy."""
     bag, _ = record(Game(shared_scenarios / 'ZAM_Over-1_1.xml',
                          humans=(HumanSpec('hv0', 'idle'),), duration=1.5))
     cut_in = str(scenarios_directory() / 'cut_in.yaml')
@@ -131,7 +131,7 @@ def test_recording_of_another_scenario_or_rate_is_refused(
 
 
 def test_other_start_is_told(record: Any) -> None:
-    """A game that places the human elsewhere, or gives it another car, repeats no way."""
+    """With the human elsewhere or in another car a game does not repeat the path."""
     bag, original = record(Game(CUT_IN_XML, humans=(HumanSpec('hv0', 'idle'),), duration=1.5))
     state = original.setup.humans[0].state
     same, moved = (PoseSpawn(state.x + dx, state.y, state.yaw, state.speed) for dx in (0.0, 1.0))
@@ -148,7 +148,7 @@ def test_other_start_is_told(record: Any) -> None:
 
 
 def test_code_is_not_taken_from_a_recording(record: Any, tmp_path: Path) -> None:
-    """A planner of one's own has to be named again; the message says how."""
+    """A user's own planner has to be named again; the message says how."""
     planner = tmp_path / 'mine.py'
     planner.write_text('from crgame_ros.planner.constant_velocity import '
                        'ConstantVelocityPlanner as Mine\n')
@@ -165,7 +165,7 @@ def test_code_is_not_taken_from_a_recording(record: Any, tmp_path: Path) -> None
 
 def test_recording_without_its_game_file_is_refused(tmp_path: Path, recorder: Any,
                                                     drive: Any, samples: Any) -> None:
-    """One of an earlier version, or of something else: then a game must be named."""
+    """For a recording of an earlier version or another program a game must be named."""
     messages = []
     for topic, kind, log_ns, data in recorder.messages(drive('ZAM_CutIn-1_1_T-1.xml')):
         if topic == GAME_TOPIC:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The plans of a recorded run: which request each answers, when, and what it says."""
+"""The plans of a recorded run: the request that each answers, its time and its states."""
 
 import math
 from pathlib import Path
@@ -26,7 +26,7 @@ def state_at(tick: int, step: int = 0) -> VehicleState:
 
 
 def request(recorder: Any, tick: int, after_ms: float = 0.0) -> Message:
-    """Ask av0 at a tick, with an object beside it."""
+    """Make a request of av0 at a tick, with an object beside it."""
     joints = [np.append(row, (9.0, 9.0, 0.0)) for row in vehicle_to_joints(state_at(tick))]
     return ('/av0/plan_request', TRAJECTORY, START + tick * TICK_NS + round(after_ms * 1e6),
             recorder.joints(tick * TICK_NS, [*vehicle_joint_names('av0'), 'o1/x', 'o1/y',
@@ -34,7 +34,7 @@ def request(recorder: Any, tick: int, after_ms: float = 0.0) -> Message:
 
 
 def answer(samples: Any, tick: int, after_ms: float, points: int = 4) -> Message:
-    """Answer it so much later."""
+    """Make the answer to a request, so much later."""
     states = np.array([state_at(tick, step) for step in range(points)]).reshape(-1, STATE_WIDTH)
     series = plan_to_joints(Plan(tick * TICK_NS, states), 'av0', TICK_NS)
     header = samples.make('std_msgs/msg/Header', samples.make(
@@ -59,7 +59,7 @@ def documents(recorder: Any, drive: Any) -> list[Message]:
 
 def test_each_plan_has_its_request(tmp_path: Path, recorder: Any, samples: Any,
                                    drive: Any) -> None:
-    """One sent twice counts from the second time; answers again, and to nothing, have no time."""
+    """A repeated request counts from its second time; repeated or stray answers have no time."""
     messages = [
         *documents(recorder, drive), request(recorder, 0), request(recorder, 0, 500.0),
         answer(samples, 0, 520.0), answer(samples, 0, 530.0), request(recorder, 6),
@@ -82,7 +82,7 @@ def test_each_plan_has_its_request(tmp_path: Path, recorder: Any, samples: Any,
 
 def test_what_is_no_plan_is_told_as_such(tmp_path: Path, recorder: Any, samples: Any,
                                          drive: Any) -> None:
-    """Joints of another, no bytes of a plan, a stamp of no tick; the next one is read on."""
+    """Other joints, bad bytes, a stamp of no tick: each is reported, and the next one is read."""
     other = recorder.joints(0, ['av9/x'], [0.0], [0.0], [0.0])
     kind, at_ns, data = answer(samples, 2, 1.0)[1:]
     messages = [*documents(recorder, drive), ('/av0/plan', TRAJECTORY, START + 1, other),
@@ -101,7 +101,7 @@ def test_what_is_no_plan_is_told_as_such(tmp_path: Path, recorder: Any, samples:
 
 def test_plans_of_other_runs_are_not_read(tmp_path: Path, recorder: Any, samples: Any,
                                           drive: Any) -> None:
-    """A reset begins another epoch, told apart by its stamps."""
+    """A reset begins another epoch, distinguished by its stamps."""
     result = drive('ZAM_CutIn-1_1_T-1.xml', duration_s=0.5,
                    avs=(AvSpec('av0', 'constant-velocity'),))
     later = [message for message in recorder.messages(

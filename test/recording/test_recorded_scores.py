@@ -30,7 +30,7 @@ import numpy as np
 import polars
 import pytest
 
-# Columns of the table of vehicles, and where their values stand in what `crgame score` says.
+# Columns of the table of vehicles, and the places of their values in `crgame score`'s output.
 COLUMNS = {
     'score_nuplan': ('nuplan', 'score'),
     **{f'score_{name}': ('nuplan', 'multipliers', name) for name in (
@@ -86,7 +86,7 @@ def run(result: OfflineResult, recorder: Any, tmp_path_factory: pytest.TempPathF
 
 @pytest.fixture(scope='module')
 def told(run: Path, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """Return what `crgame score` says of the vehicles of the recording."""
+    """Return the output of `crgame score` for the vehicles of the recording."""
     out = tmp_path_factory.mktemp('scores')
     assert main(['score', str(run), '--out', str(out)]) == 0
     found: list[dict[str, Any]] = json.loads((out / 'scores.json').read_text())['vehicles']
@@ -105,7 +105,7 @@ def vehicles(run: Path, tmp_path_factory: pytest.TempPathFactory) -> polars.Data
 @pytest.mark.parametrize('column', COLUMNS)
 def test_the_table_has_what_the_command_says(
         column: str, told: list[dict[str, Any]], vehicles: polars.DataFrame) -> None:
-    """Each score of both who drove; a human has no plans."""
+    """It has each score of both driven vehicles; a human has no plans."""
     expected = []
     for vehicle in told:
         value: Any = vehicle
@@ -119,14 +119,14 @@ def test_the_table_has_what_the_command_says(
 
 
 def test_no_score_is_left_out_of_the_table(vehicles: polars.DataFrame) -> None:
-    """Latencies, which stand with the plans, aside."""
+    """Only latencies, which stand with the plans, are exempt."""
     assert {name for name in vehicles.columns if name.startswith('score_')} == set(COLUMNS)
     assert len(COLUMNS) == len(MEASURES) - 1 + 2
 
 
 def test_a_run_that_cannot_be_scored_has_its_tables_all_the_same(
         run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table of runs says why; with `--no-scores` nobody asks."""
+    """The table of runs has the reason; with `--no-scores` nothing is scored."""
     def refuse(*_: Any) -> None:
         raise InputError('has no step', 'the run', 'record again')
     monkeypatch.setattr(ScoredScenario, 'from_run', refuse)
@@ -139,7 +139,7 @@ def test_a_run_that_cannot_be_scored_has_its_tables_all_the_same(
 
 
 def test_scores_of_an_offline_run(record: RunRecord, result: OfflineResult) -> None:
-    """Both who drove; everything that the table of measures names is there."""
+    """They cover both driven vehicles and everything that the table of measures names."""
     scores = score_run(record, plans=plans_of_result(result))
     told = scores.as_dict()
     assert json.loads(json.dumps(told, allow_nan=False)) == told
@@ -160,7 +160,7 @@ def test_scores_of_an_offline_run(record: RunRecord, result: OfflineResult) -> N
     assert av['plans']['requests'] == result.planners['av0'].counters.requests
     assert 'drivability-checker 2025' in told['checker']
     assert 'weights and the table of the benchmark site differ' in told['remarks'][0]
-    # 3 s at the scenario's 0.1 s, and nobody has reached a goal but the human its last place.
+    # 3 s at the scenario's 0.1 s; only the human has reached a goal, its last place.
     assert av['commonroad']['costs']['JB1']['total'] == pytest.approx(3.0)
     assert av['goal']['reached_s'] is None and human['goal']['reached_s'] is not None
     centre = record.log.vehicle_states[-1, 1, 0] + record.log.vehicles[1].rear_to_center
@@ -170,20 +170,20 @@ def test_scores_of_an_offline_run(record: RunRecord, result: OfflineResult) -> N
 
 
 def test_the_vehicle_itself_is_no_obstacle_to_its_solution(record: RunRecord) -> None:
-    """The exported scenario holds everybody; without the own vehicle nobody collides."""
+    """The exported scenario holds all vehicles; without the own vehicle there is no collision."""
     scored, exported = ScoredScenario.from_run(record.log)
     for name, number in exported.problem_ids.items():
         assert scored.own[number] == exported.obstacle_ids[name]
         left = {each.obstacle_id for each in scored.without_own({number}).obstacles}
         assert left == {each.obstacle_id for each in scored.loaded.scenario.obstacles} \
             - {exported.obstacle_ids[name]}
-    # The same from the file alone, which somebody else may have.
+    # The same holds from the file alone, as for other users.
     assert ScoredScenario.from_file(scored.loaded).own == scored.own
 
 
 def test_valid_solution_says_the_same(record: RunRecord,
                                       monkeypatch: pytest.MonkeyPatch) -> None:
-    """The checker's own function, but for the road, whose check needs a package of its own."""
+    """The checker's own function agrees, but for the road: its check needs another package."""
     monkeypatch.setattr(solution_checker, '_construct_boundary_checker',
                         lambda scenario: create_collision_checker(type(scenario)(scenario.dt)))
     scored, _ = ScoredScenario.from_run(record.log)
@@ -205,7 +205,7 @@ def test_valid_solution_says_the_same(record: RunRecord,
 @pytest.mark.slow
 def test_the_command_tells_the_same_of_the_recording(
         run: Path, record: RunRecord, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As JSON, in lines, and in files which commonroad-io reads and which score the same."""
+    """It agrees as JSON and in lines; commonroad-io reads its files, which score the same."""
     out = tmp_path / 'out'
     assert main(['score', str(run), '--json', '--out', str(out)]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -240,7 +240,7 @@ def test_the_command_tells_the_same_of_the_recording(
 @pytest.mark.slow
 def test_experts_and_solutions_of_a_run(run: Path, tmp_path: Path,
                                         capsys: pytest.CaptureFixture[str]) -> None:
-    """A run is its own expert: the human came as far as itself; solutions are scored beside."""
+    """A run is its own expert, so the human's progress is full; solutions are scored, too."""
     out = tmp_path / 'out'
     assert main(['score', str(run), '--expert', str(run), '--json', '--out', str(out)]) == 0
     human, av = json.loads(capsys.readouterr().out)['vehicles']
@@ -260,7 +260,7 @@ def test_experts_and_solutions_of_a_run(run: Path, tmp_path: Path,
     ('--scenario', 'missing.xml', '--solution', 'x'), ('.', '--scenario', 'x.xml')])
 def test_what_cannot_be_scored_is_told_in_a_line(
         words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    """Nothing to score, or nothing that can be read."""
+    """There is nothing to score, or nothing that can be read."""
     assert main(['score', *words]) == 2
     error = capsys.readouterr().err
     assert error.startswith('error: ') and error.count('\n') == 1
@@ -268,7 +268,7 @@ def test_what_cannot_be_scored_is_told_in_a_line(
 
 def test_solutions_of_other_scenarios_are_told(run: Path, tmp_path: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
-    """One of a problem that the scenario does not have is refused in a line."""
+    """A solution of a problem that the scenario does not have is refused in a line."""
     out = tmp_path / 'out'
     assert main(['score', str(run), '--out', str(out)]) == 0
     capsys.readouterr()

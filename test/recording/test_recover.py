@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Killed recorders and cut files: what was stored comes back, and nothing is ever lost."""
+"""Killed recorders and cut files: all stored data comes back, and nothing is ever lost."""
 
 from pathlib import Path
 import random
@@ -83,7 +83,7 @@ def test_killed_recorder_loses_at_most_its_last_second(tmp_path: Path) -> None:
     report = recover(folder)
     assert (report.messages, report.rewritten, report.metadata_written) == (
         len(stored), ('run_0.mcap',), True)
-    # The process may die between storing a message and telling of it.
+    # The process may die between storing a message and reporting it.
     assert stored[:len(written)] == written[:len(stored)]
     assert written[-1] - stored[-1] < 1_000_000_000
     with Reader(folder) as other:
@@ -130,7 +130,7 @@ def test_recovering_twice_changes_nothing_more(tmp_path: Path, samples: Any) -> 
     cut = file.read_bytes()
     with file.open('rb') as held:
         assert recover(tmp_path / 'run').changed
-        # The old file was replaced in one step, not written over: its bytes are still those.
+        # The old file was replaced in one step, not written over: its bytes are unchanged.
         assert held.read() == cut
     before = contents(tmp_path / 'run')
     assert sorted(before) == ['metadata.yaml', 'run_0.mcap']
@@ -349,7 +349,7 @@ def test_sqlite_recordings(tmp_path: Path, samples: Any) -> None:
 
 
 def test_a_killed_sqlite_recorder(tmp_path: Path, samples: Any) -> None:
-    """What it had not committed is taken back, the rest is there; a damaged file is refused."""
+    """Uncommitted data is rolled back, the rest is there; a damaged file is refused."""
     with RosbagsWriter(tmp_path / 'bag', version=9,
                        storage_plugin=StoragePlugin.SQLITE3) as writer:
         connection = writer.add_connection('/a', STRING, typestore=samples.store)

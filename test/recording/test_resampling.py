@@ -44,7 +44,7 @@ def intervals_through(stalls_ms: dict[int, int], steps: int, **timing: Any) -> N
 
 def drive(intervals_s: Any, commands: Sequence[float] = (0.3, 0.0, 0.02, 0.0),
           steps: int = 300) -> OfflineResult:
-    """Let a human on the motorway hold the pedal, turning gently, at 25 m/s."""
+    """Drive a human on the motorway at 25 m/s with the pedal held, turning gently."""
     loaded = load_game(scenarios_directory() / 'cut_in.yaml').scenario
     game = Game(loaded, humans=(ROLLING,), avs=(AvSpec('av0', 'constant-velocity'),))
     return run_offline(
@@ -65,7 +65,7 @@ def of_log(log: RunTrajectories, column: int = 0) -> float:
 
 
 def of_file(path: Path, number: int) -> float:
-    """Compare what a scenario file says of an obstacle."""
+    """Compare an obstacle's positions and speeds in a scenario file."""
     scenario, _ = XMLFileReader(str(path)).open()
     obstacle = scenario.obstacle_by_id(number)
     states = [obstacle.initial_state, *obstacle.prediction.trajectory.state_list]
@@ -74,7 +74,7 @@ def of_file(path: Path, number: int) -> float:
 
 
 def test_a_stall_of_110_ms_leaves_no_trace_in_the_export(tmp_path: Path) -> None:
-    """As stamped the car seems to drive at 35 m/s for a tick and at 15 later; it drives at 25."""
+    """By its stamps the car drives at 35 m/s for a tick and at 15 later; the export has 25."""
     stalled = drive(intervals_through({150: 110}, 300))
     raw = stalled.states_of('hv0')[::10]
     assert disagreement(raw[:, :2], raw[:, 3]) > 9.0
@@ -84,7 +84,7 @@ def test_a_stall_of_110_ms_leaves_no_trace_in_the_export(tmp_path: Path) -> None
     assert of_log(log) < 0.02
     exported = write_scenario(log, tmp_path)
     assert of_file(next(tmp_path.glob('*.xml')), exported.obstacle_ids['hv0']) < AGREES
-    # The AV is stepped by n, so that its states are what they were to the last bit.
+    # The AV is stepped by n, so that its states are unchanged to the last bit.
     assert np.array_equal(log.vehicle_states[:, 1], stalled.states_of('av0')[::10])
 
 
@@ -150,7 +150,7 @@ def test_conversion_resamples_by_the_recorded_intervals(tmp_path: Path, recorder
     (lambda topic, n: topic == '/timing/cycle' and 200 < n <= 205, '5 cycles were not recorded')])
 def test_missing_intervals_are_told(tmp_path: Path, recorder: Any, notice: str,
                                     lost: Callable[[str, int], bool]) -> None:
-    """Without its intervals motion can't be resampled; whoever converts it is told."""
+    """Without its intervals motion can't be resampled; the conversion reports it."""
     result = drive(intervals_through({}, 300))
     messages = recorder.messages(result)
     counts: dict[str, int] = {}
@@ -164,8 +164,8 @@ def test_missing_intervals_are_told(tmp_path: Path, recorder: Any, notice: str,
     assert report.time_steps == 31
 
 
-def test_an_av_that_somebody_took_over_moves_by_its_own_intervals() -> None:
-    """Driven through the stall it is resampled, too; on its plan it is where n says."""
+def test_an_av_taken_over_moves_by_its_own_intervals() -> None:
+    """Driven by hand through the stall it is resampled, too; on its plan it moves by n."""
     intervals_s = intervals_through({150: 110}, 300)
     game = load_game(scenarios_directory() / 'cut_in.yaml')
     setup = build_setup(replace(game, avs=(AvSpec('av0', 'constant-velocity'),)))
@@ -197,7 +197,7 @@ def test_circle_between_states_that_are_far_apart() -> None:
     np.testing.assert_allclose(found[:, 0], 50.0 * np.sin(way), atol=2e-5)
     np.testing.assert_allclose(found[:, 1], 50.0 - 50.0 * np.cos(way), atol=2e-5)
     np.testing.assert_allclose(found[:, 2], way, atol=1e-12)
-    # One step beyond the last state it goes on straight, further on nothing is known.
+    # One step beyond the last state it goes on straight; later states are unknown.
     beyond = resample(states, np.arange(4), intervals_s, 0.05, np.array([16, 17]))[:, 0]
     assert math.dist(beyond[0, :2], found[15, :2]) == pytest.approx(1.0)
     assert np.isnan(beyond[1]).all()

@@ -41,7 +41,7 @@ def _recorded(recorder: Any, result: OfflineResult) -> list[Message]:
 
 def test_a_recorded_car_that_runs_into_the_av(tmp_path: Path, recorder: Any,
                                               shared_scenarios: Path) -> None:
-    """The entries are those of `crgame offline`: who, where, when, and that o6 was to brake."""
+    """The entries are those of `crgame offline`: vehicles, place, time, and o6 had to brake."""
     game = Game(shared_scenarios / 'DEU_Test-1_1_T-1.xml', humans=(HumanSpec('hv0', 'idle'),),
                 avs=(AvSpec('av0', 'idm'),))
     result = run_offline(build_setup(game), duration_s=4.0)
@@ -56,7 +56,7 @@ def test_a_recorded_car_that_runs_into_the_av(tmp_path: Path, recorder: Any,
 
 @pytest.mark.parametrize('rate', [100.0, 500.0])
 def test_a_human_is_told_as_the_av_s_contact(rate: float, tmp_path: Path, recorder: Any) -> None:
-    """Once for both, with the AV's front; above 100 Hz only each fifth state is recorded."""
+    """One entry for both has the AV's front; above 100 Hz only each fifth state is recorded."""
     result = _crash(rate)
     every = round(rate / 100.0)
     messages = _recorded(recorder, result)
@@ -71,7 +71,7 @@ def test_a_human_is_told_as_the_av_s_contact(rate: float, tmp_path: Path, record
 
 
 def test_what_humans_touch_without_an_av(tmp_path: Path, recorder: Any) -> None:
-    """One rolls into the back of another at 15 m/s; each is told its own side."""
+    """One rolls into the back of another at 15 m/s; the entry of each has its own side."""
     humans = tuple(HumanSpec(f'hv{index}', 'idle', spawn=PoseSpawn(x, 0.0, 0.0, speed))
                    for index, (x, speed) in enumerate(((60.0, 0.0), (30.0, 15.0))))
     result = run_offline(build_setup(Game(
@@ -85,7 +85,7 @@ def test_what_humans_touch_without_an_av(tmp_path: Path, recorder: Any) -> None:
 
 
 def test_contacts_without_the_motion_that_led_to_them(tmp_path: Path, recorder: Any) -> None:
-    """They stay among the violations; the report says what is missing."""
+    """They stay among the violations; the report names the missing data."""
     messages = _recorded(recorder, _crash())
     result_states = [item for item in messages if item[0] == '/vehicles/state']
     late = [item for item in messages if item not in result_states] + result_states[:100]

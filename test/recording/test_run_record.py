@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What measures are given of a run: the same from its recording as from the run itself."""
+"""The measures' input from a recording is the same as from the run itself."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ def test_a_recording_has_the_same_record(recorder: Any, tmp_path: Path) -> None:
         assert np.array_equal(record.ns, here.ns)
         assert np.allclose(record.times_s, 0.01 * here.ns, rtol=0.0, atol=1e-12)
         assert np.array_equal(record.commands[:, 0], result.commands[1:, 0])
-        # Of who follows a plan, what others see of it.
+        # Of a vehicle that follows a plan: the motion that others see.
         assert np.isnan(record.commands[:, 1, [0, 1, 2, 3, 5]]).all()
         assert np.array_equal(record.commands[:, 1, 4], result.av_commands[1:, 0, 4])
         assert record.fired == result.fired

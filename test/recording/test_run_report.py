@@ -42,7 +42,7 @@ def session(recorded: Path, tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_the_command_writes_one_file(recorded: Path, tmp_path: Path,
                                      capsys: pytest.CaptureFixture[str]) -> None:
-    """Beside the recording or where it is told; the same bytes each time."""
+    """It lies beside the recording or at a given place, with the same bytes each time."""
     assert main(['report', str(recorded)]) == 0
     report = recorded / 'report.html'
     assert capsys.readouterr().out == f'{report}\n'
@@ -80,7 +80,7 @@ def test_bad_input_is_one_line(words: list[str], said: str, tmp_path: Path,
 
 
 def test_a_run_that_ends_writes_its_report_last(session: Path) -> None:
-    """Scenario and timing are there before it is begun; it says how long it took."""
+    """Scenario and timing are there before the report begins; it has its own duration."""
     there: list[list[str]] = []
     said: list[str] = []
 
@@ -98,10 +98,10 @@ def test_a_run_that_ends_writes_its_report_last(session: Path) -> None:
     assert 'Run and report are of crgame_ros' in text
 
 
-def test_at_the_end_of_a_run_nobody_waits_for_the_checker(
+def test_the_end_of_a_run_does_not_wait_for_the_checker(
         tmp_path: Path, recorder: Any, drive: Callable[..., OfflineResult],
         monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planners have nuPlan's score at once, CommonRoad's by the command."""
+    """Planners have nuPlan's score at once, and CommonRoad's by the command."""
     result = drive('ZAM_CutIn-1_1_T-1.xml', avs=(AvSpec('av0'),))
     recorder.ours(tmp_path / 'bag', recorder.messages(result))
     finisher = Finisher(tmp_path, lambda _: None)
@@ -116,14 +116,14 @@ def test_at_the_end_of_a_run_nobody_waits_for_the_checker(
     assert 'nuPlan score, of 1' in text and 'CommonRoad cost SM1' in text
 
 
-def test_an_end_before_the_start_is_no_failure_where_somebody_wanted_it(tmp_path: Path) -> None:
-    """Ctrl-C while a run waits for its driver; by itself a run records something."""
+def test_a_wanted_end_before_the_start_is_no_failure(tmp_path: Path) -> None:
+    """Ctrl-C may come while a run waits for its driver; without it a run records something."""
     assert Finisher(tmp_path, lambda _: None).finish_all(asked_to_end=True) == 0
     assert Finisher(tmp_path, lambda _: None).finish_all() == 1
 
 
 def test_without_report_there_is_none(session: Path) -> None:
-    """What `--no-report` asks for."""
+    """`--no-report` leaves it out."""
     finisher = Finisher(session, lambda _: None, reports=False)
     assert finisher.finish_all() == 0
     finisher.write_reports()
@@ -131,7 +131,7 @@ def test_without_report_there_is_none(session: Path) -> None:
 
 
 def test_two_signals_leave_the_report_out_and_all_else_whole(session: Path) -> None:
-    """The first is answered, the second ends the report alone."""
+    """The first has an answer, the second ends the report alone."""
     said: list[str] = []
 
     def say(line: str) -> None:

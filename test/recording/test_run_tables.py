@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of runs: from a recording and from the run itself, and what they say."""
+"""The tables of runs: from a recording and from the run itself, and their values."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -48,7 +48,7 @@ class Recorded(NamedTuple):
 
 @pytest.fixture(scope='module')
 def recorded(recorder: Any, tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    """Record the game in which a pedestrian crosses and the leader brakes, when told to."""
+    """Record the game in which a pedestrian crosses and the leader brakes at their events."""
     setup = build_setup(load_game(scenarios_directory() / 'crossing.yaml'))
     drivers, intervals_s = recorded_inputs(setup)
     result = run_offline(setup, duration_s=8.0, drivers=drivers, intervals_s=intervals_s,
@@ -67,7 +67,7 @@ def tables(recorded: Recorded) -> dict[str, polars.DataFrame]:
 
 
 @pytest.mark.slow
-def test_states_are_where_everybody_was(recorded: Recorded,
+def test_states_are_the_true_places(recorded: Recorded,
                                         tables: dict[str, polars.DataFrame]) -> None:
     """Centres from rear axles by hand, commands as they were consumed, objects as they moved."""
     result, every = recorded.result, recorded.result.setup.scheduler.steps_per_tick
@@ -117,7 +117,7 @@ def test_places_in_the_lane_are_on_its_centre_line(
 
 
 def test_the_worst_of_a_vehicle_is_in_its_pairs(tables: dict[str, polars.DataFrame]) -> None:
-    """Of each measure the extreme of all rows, where and when it was; and crossings counted."""
+    """It is each measure's extreme of all rows, with place and time; crossings are counted."""
     pairs = tables['pairs']
     for vehicle in tables['vehicles'].iter_rows(named=True):
         mine = pairs.filter(polars.col('subject') == vehicle['id'])
@@ -137,7 +137,7 @@ def test_the_worst_of_a_vehicle_is_in_its_pairs(tables: dict[str, polars.DataFra
         assert vehicle['crossings'] == len(met)
     keys = pairs.select('run', 'k', 'subject', 'other')
     assert keys.is_unique().all()
-    # Whoever is a subject is in states at that time, under the same time to the last bit.
+    # Every subject is in states at that time, equal to the last bit.
     joined = pairs.join(tables['states'], left_on=['run', 'k', 'time_s', 'subject'],
                         right_on=['run', 'k', 'time_s', 'id'])
     assert len(joined) == len(pairs) > 100
@@ -145,7 +145,7 @@ def test_the_worst_of_a_vehicle_is_in_its_pairs(tables: dict[str, polars.DataFra
 
 def test_events_and_runs_say_what_was_played(recorded: Recorded,
                                              tables: dict[str, polars.DataFrame]) -> None:
-    """Names, times and the scenario's digest, and the human's way by its states."""
+    """They have names, times, the scenario's digest, and the length of the human's path."""
     result = recorded.result
     assert tables['events']['name'].to_list() == [event.name for event in result.fired]
     assert tables['events']['name'].to_list() == ['leader-brakes', 'pedestrian']
@@ -192,7 +192,7 @@ def test_dictionary_and_files_agree(recorded: Recorded,
 @pytest.mark.slow
 def test_the_same_recording_gives_the_same_bytes(recorded: Recorded, tmp_path: Path,
                                                  tables: dict[str, polars.DataFrame]) -> None:
-    """In both formats; and CSV says the same as Parquet, to the last bit."""
+    """This holds in both formats; CSV and Parquet agree to the last bit."""
     for file_format in ('parquet', 'csv'):
         for name in ('one', 'two'):
             assert main(['export', str(recorded.folder / 'bag'), '--to', file_format, '--out',
@@ -211,7 +211,7 @@ def test_the_same_recording_gives_the_same_bytes(recorded: Recorded, tmp_path: P
 
 def test_offline_run_and_recording_have_the_same_tables(
         recorded: Recorded, tmp_path: Path, tables: dict[str, polars.DataFrame]) -> None:
-    """Every number up to 1e-9, but for what only a recording has."""
+    """All numbers agree up to 1e-9, but for columns that only a recording has."""
     write_tables([TableRun('pedestrian:0', run_record_of(recorded.result))], tmp_path,
                  'parquet')
     for name in ('states', 'pairs', 'crossings', 'events', 'vehicles'):
@@ -223,7 +223,7 @@ def test_offline_run_and_recording_have_the_same_tables(
                     assert here[column].equals(there[column]), column
                 continue
             one, two = (frame[column].fill_null(np.nan).to_numpy() for frame in (here, there))
-            # Jerks in scores magnify what rounding in messages leaves.
+            # Jerks in scores magnify the rounding in messages.
             rounding = 1e-6 if column.startswith('score_') else 1e-9
             assert np.allclose(one, two, rtol=rounding, atol=1e-9, equal_nan=True), column
     assert polars.read_parquet(tmp_path / 'plans.parquet').height == 0
@@ -231,7 +231,7 @@ def test_offline_run_and_recording_have_the_same_tables(
 
 def _plan(result: OfflineResult, tick: int, aside: float, told: VehicleState | None
           ) -> RecordedPlan:
-    """Return a plan of av0 that is what it drove, moved to its left."""
+    """Return a plan of av0: its driven path, moved to the left."""
     states = result.states_of('av0')[::10][tick:tick + 21].copy()
     states[:, 0] -= aside * np.sin(states[:, 2])
     states[:, 1] += aside * np.cos(states[:, 2])
@@ -241,7 +241,7 @@ def _plan(result: OfflineResult, tick: int, aside: float, told: VehicleState | N
 
 
 def test_plans_are_compared_with_what_was_driven(recorded: Recorded, tmp_path: Path) -> None:
-    """A plan beside the way by 0.3 m deviates by that; one that starts too far off is refused."""
+    """A plan 0.3 m beside the path deviates by 0.3 m; one that starts too far off is refused."""
     result = recorded.result
     own = [VehicleState(*row) for row in result.states_of('av0')[::10].tolist()]
     last = len(own) - 1
@@ -285,7 +285,7 @@ def test_several_runs_in_the_same_tables(recorded: Recorded, tmp_path: Path, dri
     for words, what in (((recorded.folder, recorded.folder / 'bag', '--out', out), 'twice'),
                         ((recorded.folder, other), '--out')):
         assert main(['export', *map(str, words)]) == 2
-        # Before it there may be word of progress.
+        # Reports of progress may come before it.
         *_, error = capsys.readouterr().err.splitlines()
         assert error.startswith('error: ')
         assert what in error
@@ -306,7 +306,7 @@ def _overwrite(bag: Path) -> None:
 def test_broken_recordings_give_a_line_and_no_file(
         recorded: Recorded, tmp_path: Path, harm: Callable[[Path], None],
         capsys: pytest.CaptureFixture[str]) -> None:
-    """Whatever is wrong: exit code 2, one line, and nothing half."""
+    """Every fault has exit code 2 and one line, and leaves no half-made file."""
     shutil.copytree(recorded.folder / 'bag', tmp_path / 'run' / 'bag')
     harm(tmp_path / 'run' / 'bag')
     assert main(['export', str(tmp_path / 'run'), '--out', str(tmp_path / 'out')]) == 2
@@ -318,7 +318,7 @@ def test_broken_recordings_give_a_line_and_no_file(
 @pytest.mark.parametrize(('n', 'k'), [(10**400, 1), (10, 10**30)])
 def test_numbers_beyond_all_bounds_give_a_line(recorded: Recorded, tmp_path: Path, n: int,
                                                k: int) -> None:
-    """JSON has no largest number; a column has."""
+    """JSON has no largest number, but a column has."""
     record = replace(run_record_of(recorded.result), fired=(FiredEvent('x', n, k, 'trigger'),))
     with pytest.raises(InputError, match='out of all bounds'):
         write_tables([TableRun('a', record)], tmp_path, 'parquet')
@@ -336,7 +336,7 @@ def test_interruption_leaves_no_half_file(recorded: Recorded, tmp_path: Path,
 
 
 def test_runs_are_named_by_their_folders(tmp_path: Path) -> None:
-    """The folder of a session, whichever part of it is given."""
+    """The name is the session's folder, whichever part of it is given."""
     for given, name in (('A', 'A'), ('A/bag', 'A'), ('A/bag_2', 'A'), ('A/run_3', 'A'),
                         ('A/run_3/bag', 'A'), ('my_bag', 'my_bag'), ('run_1x', 'run_1x')):
         (tmp_path / given).mkdir(parents=True, exist_ok=True)
@@ -346,7 +346,7 @@ def test_runs_are_named_by_their_folders(tmp_path: Path) -> None:
 
 
 def _stretched(result: OfflineResult, times: int) -> TableRun:
-    """Let a run go on and on: the same motion as often, one after the other."""
+    """Repeat the motion of a run so many times, one after the other."""
     record = run_record_of(result)
     log = record.log
     longer = replace(
@@ -359,7 +359,7 @@ def _stretched(result: OfflineResult, times: int) -> TableRun:
 @pytest.mark.exhaustive
 def test_memory_does_not_grow_with_the_run(recorded: Recorded, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a run eight times as long the tables take no more, but for how it was driven."""
+    """The tables of a run eight times as long take no more, but for its driving behaviour."""
     for module, name in ((table_writer, 'PIECE_ROWS'), (states_table, 'PIECE_ROWS'),
                          (pairs_table, '_BUFFERED_ROWS')):
         monkeypatch.setattr(module, name, 200)
@@ -369,7 +369,7 @@ def test_memory_does_not_grow_with_the_run(recorded: Recorded, tmp_path: Path,
         pool = pa.proxy_memory_pool(pa.system_memory_pool())
         usual = pa.default_memory_pool()
         pa.set_memory_pool(pool)
-        # Which is measured over a whole run at once, and kept.
+        # That is measured over a whole run at once, and kept.
         assert len(run.behaviour) == 2
         tracemalloc.start()
         rows = write_tables([run], tmp_path / str(times), 'parquet')
@@ -377,6 +377,6 @@ def test_memory_does_not_grow_with_the_run(recorded: Recorded, tmp_path: Path,
         tracemalloc.stop()
         pa.set_memory_pool(usual)
         assert rows['states'] > 200 * times
-    # The first warms up. What is left to grow is a Parquet file's footer: 10 kB a row group.
+    # The first warms up. Only a Parquet file's footer still grows: 10 kB a row group.
     assert peaks[2][0] < peaks[1][0] + 1_500_000
     assert peaks[2][1] < peaks[1][1] + 3_000_000

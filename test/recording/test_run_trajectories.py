@@ -28,7 +28,7 @@ ROUNDING = 1e-12
 
 
 def assert_same_run(read: RunTrajectories, expected: RunTrajectories) -> None:
-    """Compare what the messages can hold; velocities of driven vehicles are rounded."""
+    """Compare the data that messages can hold; velocities of driven vehicles are rounded."""
     assert read.descriptions == expected.descriptions
     assert read.xml_text == expected.xml_text
     np.testing.assert_array_equal(read.ks, expected.ks)
@@ -72,7 +72,7 @@ def test_recording_holds_the_run(tmp_path: Path, recorder: Any, drive: Drive, ki
 
 def test_joints_are_taken_by_name(tmp_path: Path, recorder: Any, samples: Any,
                                   drive: Drive) -> None:
-    """The order of the joints in a message means nothing."""
+    """The order of the joints in a message has no meaning."""
     result = drive(CUT_IN, duration_s=0.1, avs=(AvSpec('av0', 'constant-velocity'),))
     messages = recorder.messages(result)
     for index, (topic, type_name, log_ns, data) in enumerate(messages):
@@ -124,7 +124,7 @@ def test_simulation_that_was_restarted(tmp_path: Path, recorder: Any, drive: Dri
 
 def test_a_few_cycles_of_the_next_round_are_no_run(tmp_path: Path, recorder: Any,
                                                    drive: Drive) -> None:
-    """Of a recording that was played once more its first cycles came in late."""
+    """When a recording was played once more, its first cycles arrived late."""
     messages = recorder.messages(drive(CUT_IN, duration_s=0.5))
     first = [(*m[:2], m[2] + 1_000_000_000, m[3]) for m in messages if m[0] == '/timing/cycle'][:4]
     folder = recorder.ours(tmp_path / 'bag', [*messages, *first])
@@ -169,7 +169,7 @@ def test_states_between_the_ticks_may_be_lost(tmp_path: Path, recorder: Any, dri
 
 
 def test_recording_that_was_cut_off(tmp_path: Path, recorder: Any, drive: Drive) -> None:
-    """Of a killed recorder's file what is whole reads, and a notice says that it is unfinished."""
+    """The whole part of a killed recorder's file is read, and a notice says it is unfinished."""
     result = drive(TRAFFIC)
     folder = recorder.ours(tmp_path / 'bag', recorder.messages(result))
     (folder / 'metadata.yaml').unlink()
@@ -246,7 +246,7 @@ def test_recorded_human_is_reproduced_to_the_last_bit(tmp_path: Path, recorder: 
 
 def test_lights_that_an_av_shows_by_itself_are_no_input(tmp_path: Path, recorder: Any,
                                                         drive: Drive) -> None:
-    """An AV has commands if somebody drove it, and while somebody did."""
+    """An AV has commands only if and while it was driven by hand."""
     result = drive(CUT_IN, duration_s=0.3, avs=(AvSpec('av0', 'constant-velocity'),))
     result.av_commands[:, 0, 4] = 2.0
     alone = replay_inputs(recorder.ours(tmp_path / 'alone', recorder.messages(result)))

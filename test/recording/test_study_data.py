@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a study has found: its tables hold what people did and wrote, whatever ends the program."""
+"""Data of a study: its tables hold all actions and answers, however the program ends."""
 
 import csv
 import hashlib
@@ -38,7 +38,7 @@ writeBin(c(charToRaw(enc2utf8(text)), charToRaw("|"), charToRaw(sprintf("%d %d %
 
 
 def table(folder: Path, name: str) -> polars.DataFrame:
-    """Read a table as others do."""
+    """Read a table as other programs do."""
     return polars.read_parquet(folder / 'data' / f'{name}.parquet')
 
 
@@ -58,7 +58,7 @@ def test_a_trial_that_counts_is_one_row(studied: Studied) -> None:
     planner = {'idm': 'idm', 'cv': 'constant-velocity'}
     assert trials['av_planner'].to_list() == [planner[name] for name in trials['condition']]
     assert trials['random_seed'].unique().to_list() == [3]
-    # Nobody sat at a page.
+    # There was no driver at a page.
     assert trials['link_delay_s'].null_count() == len(ROWS)
     for row in trials.iter_rows(named=True):
         assert row['run'] in (studied.folder / row['report']).read_text('utf-8')
@@ -117,7 +117,7 @@ def test_what_was_not_counted_is_among_the_events(studied: Studied) -> None:
         mine = everybody.filter(participant=name)
         assert mine['wall_s'].is_sorted() and mine['number'].to_list() == list(
             range(1, mine.height + 1))
-        # Every entry of the journal, and nothing is told twice.
+        # The table has every entry of the journal once.
         journal = lines_of(studied.folder / 'participants' / name / JOURNAL)
         told = mine.filter(polars.col('kind') != 'game_event')
         assert told['wall_s'].to_list() == [entry['at'] for entry in journal]
@@ -138,7 +138,7 @@ def test_texts_come_back_as_they_were(studied: Studied) -> None:
 
 
 def test_pandas_reads_the_same(studied: Studied) -> None:
-    """From the path alone."""
+    """The path alone is enough."""
     data = studied.folder / 'data'
     trials = table(studied.folder, 'trials')
     for frame in (pandas.read_csv(data / 'trials.csv'),
@@ -172,7 +172,7 @@ def test_r_reads_the_same(studied: Studied, tmp_path: Path) -> None:
 
 
 def unescaped(cell: str) -> str:
-    """Undo what the sidecar tells."""
+    """Undo the escapes that the sidecar declares."""
     marks = {'\\': '\\', 't': '\t', 'n': '\n', 'r': '\r', '/': '/'}
     parts = iter(cell)
     return ''.join(marks[next(parts)] if each == '\\' else each for each in parts)
@@ -269,7 +269,7 @@ def test_killed_it_leaves_whole_files(copied: Path) -> None:
     rng = random.Random(5)
     command = [sys.executable, '-m', 'crgame_ros.cli', 'study', 'data', str(copied), '--bids']
     for _ in range(4):
-        # What has been measured is there: it dies while files are written.
+        # The measured data is there: the process dies while files are written.
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         package = copied / 'data' / 'datapackage.json'
         package.touch()
@@ -297,7 +297,7 @@ def test_what_a_killed_recorder_has_left_is_finished(copied: Path) -> None:
     recording = next((run / 'bag').glob('*.mcap'))
     with recording.open('r+b') as stream:
         stream.truncate(recording.stat().st_size * 6 // 10)
-    # Not while the session goes on, whose recorder may be at work.
+    # Not while the session goes on: its recorder may be at work.
     with SessionJournal(copied / 'participants' / 'P02'):
         assert main(['study', 'data', str(copied)]) == 0
     row = table(copied, 'trials').filter(participant='P02', trial=1).row(0, named=True)

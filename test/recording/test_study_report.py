@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a study: one file, with the numbers of the tables, whatever people wrote."""
+"""The report of a study: one file, with the numbers of the tables, for any answers."""
 
 from html import unescape
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_means_and_intervals_are_those_of_the_tables(studied: Studied) -> None:
                           .partition('</figure>')[0])) == 6
 
 
-def test_it_tells_who_took_part_and_what_went_wrong(studied: Studied) -> None:
+def test_it_has_participants_and_problems(studied: Studied) -> None:
     html = report_of(studied.folder)
     people = rows_of(html, 'Participants')
     assert [row[0] for row in people] == ['P01', 'P02', 'P03', 'P04']
@@ -87,7 +87,7 @@ def test_timing_beyond_a_bound_is_marked_and_named(copied: Path) -> None:
     assert set(BOUNDS.as_dict()) <= row.keys()
 
 
-def test_before_anybody_has_begun_there_is_a_report(studied: Studied, tmp_path: Path) -> None:
+def test_before_the_first_session_there_is_a_report(studied: Studied, tmp_path: Path) -> None:
     (tmp_path / 'empty' / 'study').mkdir(parents=True)
     for name in ('study.yaml', 'remarks.yaml', 'consent.md'):
         (tmp_path / 'empty' / 'study' / name).write_bytes(

@@ -12,13 +12,13 @@ from study_maker import DURATION_S, lines_of
 
 
 def answers(folder: Path) -> polars.DataFrame:
-    """Read the table as others do."""
+    """Read the table as other programs do."""
     return polars.read_parquet(folder / 'data' / 'answers.parquet')
 
 
 @pytest.mark.exhaustive
 def test_answers_name_their_run_and_its_end(copied: Path) -> None:
-    """Those after a trial that was driven again are of the run that they came after."""
+    """Answers after a repeated trial belong to the run that they came after."""
     rows = answers(copied).filter(participant='P03', trial=1)
     assert set(rows['recording']) == {'runs/1/run_3'} and set(rows['attempt']) == {3}
     assert set(rows['run_end_s']) == {DURATION_S}

@@ -26,7 +26,7 @@ TABLE_1 = ['final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 't
 
 
 def documents(recorder: Any, result: OfflineResult, **options: Any) -> list[Message]:
-    """Take the documents of a run."""
+    """Return the documents of a run."""
     found: list[Message] = recorder.messages(result, log_ns=START, **options)
     return [m for m in found if m[0].startswith('/scenario/')]
 
@@ -65,7 +65,7 @@ def test_table_1(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     assert report['planners'] == {}
     assert report['drivability'] == {'violations': 0, 'list': []}
     assert report['notices'] == []
-    # These cycles are of a version that did not tell why.
+    # These cycles are of a version without causes.
     assert report['late_steps'] is None
 
 
@@ -111,7 +111,7 @@ def planner_messages(recorder: Any, latencies_ms: dict[int, float]) -> list[Mess
 
 
 def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
-    """Counts are the last that were told; latencies are those of the recording itself."""
+    """Counts are the last reported ones; latencies are those of the recording itself."""
     result = drive(TWO_AVS, duration_s=0.1, avs=tuple(
         AvSpec(f'av{i}', 'constant-velocity') for i in range(2)))
     messages = documents(recorder, result) + cycles(recorder, {}, {}, 20)
@@ -143,7 +143,7 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     # numpy's quantiles of 3, 4, 5, 40: (4 + 5) / 2 and 5 + 0.97 * 35.
     assert av0['latency_ms'] == pytest.approx({'p50': 4.5, 'p99': 38.95, 'max': 40.0})
     assert av0['plan_time_ms'] == pytest.approx({'p50': 3.0, 'p99': 7.9, 'max': 8.0})
-    # The run waits for the first plan: what the planner took to start is told apart.
+    # The run waits for the first plan: the planner's time to start is reported separately.
     assert av0['first_latency_ms'] == pytest.approx(300.0)
     # Numbers differ from fallback to fallback, reasons do not.
     assert av0['fallback_reasons'] == {'# m short': 2}
@@ -172,7 +172,7 @@ def test_violations_begin_once(tmp_path: Path, recorder: Any, drive: Drive) -> N
 
 
 def test_file_and_recording_that_was_cut_off(tmp_path: Path, recorder: Any, drive: Drive) -> None:
-    """The file is the report as JSON, of a killed recorder's bag too, which it says."""
+    """The file is the report as JSON; for a killed recorder's bag it says so."""
     folder = recorder.ours(tmp_path / 'bag', recorder.messages(drive(CUT_IN, duration_s=2.0)))
     written = write_timing_report(folder, tmp_path / 'timing.json')
     assert json.loads((tmp_path / 'timing.json').read_text()) == written
@@ -202,7 +202,7 @@ def test_recordings_without_timing(tmp_path: Path, recorder: Any, drive: Drive) 
 
 
 def test_the_sound_of_seats(tmp_path: Path, recorder: Any, drive: Drive) -> None:
-    """How long it was on, and how loudly then; what cannot be read is passed over."""
+    """It has the time with sound on and the volume then; unreadable values are skipped."""
     messages = documents(recorder, drive(CUT_IN, duration_s=0.1)) + cycles(recorder, {}, {}, 30)
     quiet = timing_report(recorder.ours(tmp_path / 'quiet', messages))
     assert quiet['sound'] == {}
@@ -220,7 +220,7 @@ def test_the_sound_of_seats(tmp_path: Path, recorder: Any, drive: Drive) -> None
 
 
 def test_the_views_of_seats(tmp_path: Path, recorder: Any, drive: Drive) -> None:
-    """A period for each choice, to the next one; what cannot be read is passed over."""
+    """Each choice has a period up to the next one; unreadable values are skipped."""
     messages = documents(recorder, drive(CUT_IN, duration_s=0.1)) + cycles(recorder, {}, {}, 30)
     map_view = {'shown': 'map', 'plans': 'true', 'ratio': '1', 'rate_hz': '', 'width_px': '900'}
     driver = {'shown': 'driver', 'across_deg': '75.0', 'plans': 'false', 'ratio': '0.5',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame validate`: what is wrong with a file is said, and nothing of one that is right."""
+"""`crgame validate`: it reports the faults of a file, and nothing for a correct one."""
 
 import json
 from pathlib import Path
@@ -70,7 +70,7 @@ def test_all_that_is_wrong_with_a_game_is_told(tmp_path: Path,
 
 def test_a_scenario_is_checked_by_the_schema(tmp_path: Path,
                                              capsys: pytest.CaptureFixture[str]) -> None:
-    """An element that the schema does not know, and a document type that nobody reads."""
+    """It reports an element that the schema does not know, and an unread document type."""
     text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
     file = tmp_path / 'changed.xml'
     file.write_text(text.replace('</commonRoad>', '<weather/></commonRoad>'))
@@ -84,7 +84,7 @@ def test_a_scenario_is_checked_by_the_schema(tmp_path: Path,
 
 def test_a_recording_that_was_cut_off_is_none(run: Path, tmp_path: Path,
                                               capsys: pytest.CaptureFixture[str]) -> None:
-    """It says what finishes it."""
+    """The report names the command that finishes it."""
     shutil.copytree(run / 'bag', tmp_path / 'bag')
     (file,) = (tmp_path / 'bag').glob('*.mcap')
     file.write_bytes(file.read_bytes()[:-100])
@@ -95,7 +95,7 @@ def test_a_recording_that_was_cut_off_is_none(run: Path, tmp_path: Path,
 
 def test_a_timing_report_tells_why_steps_were_late(run: Path, tmp_path: Path,
                                                    capsys: pytest.CaptureFixture[str]) -> None:
-    """Whole, of an earlier version, which did not tell, or in parts."""
+    """It may have them, be of an earlier version without them, or have them in part."""
     report = json.loads((run / 'timing.json').read_text())
     assert report['late_steps'] is not None
     file = tmp_path / 'timing.json'
@@ -133,7 +133,7 @@ def test_tables_are_checked_by_their_dictionary(run: Path, tmp_path: Path,
 
 def test_solutions_are_checked_by_their_schema(run: Path, tmp_path: Path,
                                                capsys: pytest.CaptureFixture[str]) -> None:
-    """One that we write, and one with a number that is none."""
+    """One is our own, and one has a bad number."""
     assert main(['score', str(run), '--out', str(tmp_path / 'scores')]) == 0
     capsys.readouterr()
     file = next(iter(sorted((tmp_path / 'scores').glob('solution_*.xml'))))

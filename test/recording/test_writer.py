@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings as other programs see them, on disks that fill up, over a long time."""
+"""Recordings as other programs read them, on full disks, and over a long time."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -199,7 +199,7 @@ def test_closed_writer_and_negative_times_are_refused(tmp_path: Path, samples: A
 
 
 def test_file_instead_of_a_folder(tmp_path: Path) -> None:
-    """What the system refuses is told at once."""
+    """A refusal of the system is reported at once."""
     (tmp_path / 'file').write_text('')
     with pytest.raises(RecordingError, match='cannot record'):
         BagWriter(tmp_path / 'file' / 'run', now_ns=time.monotonic_ns)

@@ -111,7 +111,7 @@ def test_roundabout() -> None:
 
 
 def test_junction() -> None:
-    """On the crossing of two roads a car may turn any way, in the corners between it may not."""
+    """On the crossing of two roads a car may have any heading; in the corners it may not."""
     north = lanelet(2, [(48.0, -50.0), (48.0, 54.0)], [(52.0, -50.0), (52.0, 54.0)])
     road = boundary([straight(1, 0.0, 0.0), north], (50.0, 2.0))
     for yaw in (0.0, math.pi / 2, math.pi):
@@ -230,8 +230,8 @@ def test_recorded_cars_of_a_motorway_ramp_stay_on_the_road() -> None:
     """
     The ramp's recorded cars drive between its markings.
 
-    The checker's own boundary, which takes a section's outermost bounds, calls 10 of 51 poses
-    off the road, although the lanelets contain every one of them.
+    The checker's own boundary uses a section's outermost bounds. It reports 10 of 51 poses off
+    the road, although the lanelets contain every one of them.
     """
     network, polygons = published('ZAM-Ramp-1_1-T-1')
     scenario = CommonRoadFileReader(str(SHARED / 'ZAM-Ramp-1_1-T-1.xml')).open()[0]

@@ -35,7 +35,7 @@ def lanelet(lanelet_id: int, center: NDArray[np.float64], width: float = 4.0, *,
 
 
 def network_of(*lanelets: Lanelet) -> RoadNetwork:
-    """Build a network without tidying up the references."""
+    """Make a network without cleaning up the references."""
     return RoadNetwork(LaneletNetwork.create_from_lanelet_list(list(lanelets), cleanup_ids=False))
 
 
@@ -98,7 +98,7 @@ def test_lanelet_at_agrees_with_commonroad(name: str) -> None:
 
 
 def test_heading_decides_between_overlapping_lanelets() -> None:
-    """In every overlap, the lanelet's own direction finds a lanelet that agrees as well."""
+    """In every overlap, a lanelet's own direction finds a lanelet that agrees as well."""
     road = RoadNetwork(shared('USA_Lanker-1_3_T-1.xml').scenario.lanelet_network)
     crossing = 0
     for lanelet_id in road.lanelet_ids:
@@ -112,7 +112,7 @@ def test_heading_decides_between_overlapping_lanelets() -> None:
 
 
 def test_many_lookups_equal_single_ones() -> None:
-    """The vectorised look-up is the scalar one."""
+    """The vectorised look-up equals the scalar one."""
     road = RoadNetwork(shared('USA_Lanker-1_3_T-1.xml').scenario.lanelet_network)
     rng = np.random.default_rng(3)
     points = np.concatenate([road.line(i).points for i in road.lanelet_ids])
@@ -160,7 +160,7 @@ def test_false_successors_are_not_followed() -> None:
 
 
 def test_lane_path_goes_round_a_ring() -> None:
-    """A ring of two lanelets ends after the length asked for, not never."""
+    """On a ring of two lanelets the path ends after the requested length."""
     half = arc(20.0, math.pi)
     back = (0.0, 40.0) - half
     road = network_of(lanelet(1, half, successor=(2,)), lanelet(2, back, successor=(1,)))

@@ -66,7 +66,7 @@ def test_real_lights_agree_with_commonroad() -> None:
 
 
 def test_unchanged_states_are_the_same_object() -> None:
-    """Until a light changes, `is` tells that nothing did; then the content differs."""
+    """Until a light changes, `is` shows equality; then the content differs."""
     lights = TrafficLights(scenario_with(10, 5))
     first = lights.states_at(0)
     assert all(lights.states_at(k) is first for k in range(10))

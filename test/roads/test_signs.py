@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What signs and lights a lanelet has, of its own and of its stop line."""
+"""The signs and lights of a lanelet, of its own and of its stop line."""
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking, StopLine
 from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
@@ -37,7 +37,7 @@ def road(line: tuple[np.ndarray, np.ndarray] | tuple[None, None] | None,
         TrafficSignIDGermany.MAX_SPEED, ['10'])], {10}, PLACED[0]), set())
     for number, direction in ARROWS.items():
         network.add_traffic_light(TrafficLight(number, PLACED[0], direction=direction), set())
-    # Given last: the network would drop what leads nowhere.
+    # Set last: the network would drop references that lead nowhere.
     lanelet = network.lanelets[0]
     lanelet.traffic_signs, lanelet.traffic_lights = {21, 99}, {4, 2, 98}
     if line is not None:
@@ -46,7 +46,7 @@ def road(line: tuple[np.ndarray, np.ndarray] | tuple[None, None] | None,
 
 
 def test_signs_and_lights_of_the_stop_line_count() -> None:
-    """In the order of their ids; ids that nothing has are left out."""
+    """They are in the order of their ids; ids without an element are left out."""
     lanelet, network = road(PLACED)
     assert sign_names(lanelet, network) == {'STOP', 'MAX_SPEED'}
     own = list(sign_elements(lanelet, network, at_line=False))
@@ -55,7 +55,7 @@ def test_signs_and_lights_of_the_stop_line_count() -> None:
     assert has_stop_sign(lanelet, network)
 
 
-def test_without_a_stop_line_nobody_halts_at_a_sign() -> None:
+def test_without_a_stop_line_a_stop_sign_does_not_count() -> None:
     lanelet, network = road(None)
     lanelet.traffic_signs = {20, 21}
     assert sign_names(lanelet, network) == {'STOP', 'MAX_SPEED'}
@@ -65,7 +65,7 @@ def test_without_a_stop_line_nobody_halts_at_a_sign() -> None:
 
 @pytest.mark.parametrize(('arrow', 'kept'), [
     ('straight', [1, 2, 3]), ('left', [1, 2, 3]), ('right', [1, 2, 4])])
-def test_arrows_are_for_who_goes_there(arrow: str, kept: list[int]) -> None:
+def test_arrows_count_for_their_own_direction(arrow: str, kept: list[int]) -> None:
     lights = lights_of(*road(PLACED))
     assert [light.traffic_light_id for light in lights_for(lights, arrow)] == kept
     assert lights_for(lights[3:], 'left') == lights[3:], 'where none is for it, all are'

@@ -40,7 +40,7 @@ def test_everywhere(street: Scenario) -> None:
 
 
 def test_lanelets_that_shared_a_sign_keep_it(street: Scenario) -> None:
-    """Only 21 is meant, not 11 in front of it."""
+    """The change is for 21 only, not for 11 in front of it."""
     set_speed_limit(street, 5.0, (21,))
     found = limits(street)
     assert found[21] == 5.0
@@ -73,7 +73,7 @@ def test_copy_leaves_the_original(street: Scenario) -> None:
 
 
 def test_unknown_lanelet(street: Scenario) -> None:
-    """Nothing is changed halfway."""
+    """The refused change has no partial effect."""
     with pytest.raises(InputError, match='there is no lanelet 77'):
         set_speed_limit(street, 5.0, (11, 77))
     assert limits(street)[11] == pytest.approx(TOWN, abs=1e-4)

@@ -28,7 +28,7 @@ def _frame(graph: Graph, slot: str) -> list[float]:
 
 
 def test_what_an_av_perceives_is_passed_on_to_its_pages(setup: Setup) -> None:
-    """Pages get estimate, scans at the sensor's pose of their stamp, and seen ids of that AV."""
+    """A page that asks gets the estimate, scans at their sensors' poses, and the seen ids."""
     async def check(graph: Graph) -> None:
         page, other = graph.page(), graph.page()
         page.perceives_as, page.wants_scans = 'av0', True

@@ -142,7 +142,7 @@ def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
 
 
 def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
-    """It is published at each change and once a second, with the run's time, for seats only."""
+    """It is published at each change and each second, with the run's time, for drivers only."""
     def told(graph: Graph, what: str = 'sound') -> list[tuple[int, dict[str, str]]]:
         return [(from_time(message.header.stamp), read_status(status).values)
                 for message in graph.peer.messages['/diagnostics'] for status in message.status

@@ -50,7 +50,7 @@ Endpoint = tuple[str, str, str, str, str]
 @dataclass(frozen=True)
 class Case:
     """
-    A game and what the graph of it must have.
+    A game and the expected endpoints of its graph.
 
     :param humans: ids of the humans' vehicles.
     :param avs: ids of the AVs.

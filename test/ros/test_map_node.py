@@ -47,7 +47,7 @@ def _states(*positions: tuple[float, float]) -> JointTrajectory:
 
 @pytest.mark.exhaustive
 def test_the_tiles_near_the_vehicles_come_when_they_change(tmp_path: Path) -> None:
-    """One grid holds until other tiles are needed, cell for cell as in the map; none without one."""
+    """One grid, as in the map, holds until other tiles are needed; without a map there is none."""
     loaded = load_scenario(CUT_IN.parent / 'ZAM_CutIn-1_1_T-1.xml')
     path = write_map(Raster(loaded, RasterSpec()), tmp_path / 'map', 'cut-in').path
     occupancy = TiledOccupancy(path)

@@ -204,7 +204,7 @@ def test_a_pause_keeps_the_scene(graph: tuple[Launcher, Peer]) -> None:
 
 class Stage:
     """
-    A marker_node in this process, and a node that plays the simulation for it.
+    A marker_node in this process, and a node in the role of the simulation.
 
     :param setup: the game that is played.
     """
@@ -303,7 +303,7 @@ def test_nothing_is_computed_without_a_viewer(
 
 
 def test_documents_that_do_not_fit_are_waited_for(stage: Stage, ros_domain: int) -> None:
-    """A game with another scenario's text draws nothing; malformed text is reported, then fixed."""
+    """A game with another scenario's text draws nothing; malformed text is reported."""
     with Peer(ros_domain, '/markers', '/scenario/game') as viewer:
         seen = viewer.messages['/markers']
         stage.tell(epoch=0)

@@ -57,7 +57,7 @@ class Table(NamedTuple):
         wait_until(lambda: self.seats.apply_orders(now_ns)[0], f'the order {source}')
 
     def drive(self, first_ms: int, last_ms: int) -> DriverCommand | None:
-        """Drive hv0 at 20 m/s, one cycle each 10 ms of the steady clock; return the last command."""
+        """Drive hv0 at 20 m/s, a cycle each 10 ms of the steady clock; return the last command."""
         command = None
         for now_ms in range(first_ms, last_ms, 10):
             command = self.human.command(now_ms * MS, 0.01, 20.0)
@@ -177,7 +177,7 @@ def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
 
 
 def test_what_makes_no_command_is_counted(table: Table) -> None:
-    """A command of an earlier run or no source, without axes or not finite does not drive."""
+    """A command of an earlier run or another source, without axes or not finite does not drive."""
     _heard(table, RELEASED)
     old, empty, stranger = (to_joy(FULL, stamp_ns, source) for stamp_ns, source in (
         (OFFSET_NS - 1, GAME), (OFFSET_NS, GAME), (OFFSET_NS, 'stranger')))

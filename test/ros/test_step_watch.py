@@ -55,7 +55,7 @@ def test_a_stall_is_told_by_its_cause(stalls: dict[str, Any], cause: str) -> Non
 
 
 def test_stolen_time_is_what_one_processor_certainly_lost() -> None:
-    """It is the greatest of all processors in ticks of proc(5), less one; cut lines are skipped."""
+    """It is the greatest of all processors in proc(5)'s ticks, less one; cut lines are skipped."""
     before = (b'cpu  9 9 9 9 9 9 9 50 0 0\ncpu0 1 1 1 1 1 1 1 20 0 0\n'
               b'cpu1 1 1 1 1 1 1 1 30 0 0\nintr 7\n')
     after = before.replace(b' 20 ', b' 21 ').replace(b' 30 ', b' 37 ')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios far from the origin, torn apart or blown up: the same run, or one clear line."""
+"""Scenarios far from the origin, torn apart or enlarged: the same run, or a one-line refusal."""
 
 from pathlib import Path
 import re
@@ -18,8 +18,8 @@ from lxml import etree
 import numpy as np
 import pytest
 
-# Where Munich lies in UTM zone 32 [m]; an occupancy map has its cells where the world's are, so it
-# is the same map only if it is moved by whole tiles.
+# Munich in UTM zone 32 [m]. An occupancy map has a fixed grid of cells, so it is the same map
+# only if it is moved by whole tiles.
 OFFSET = np.array((691_234.37, 5_512_345.68))
 TILES = np.array((691_200.0, 5_512_300.0))
 GAME = """\
@@ -32,7 +32,7 @@ traffic: {{agents: 4, capacity: 4}}
 
 def edited(folder: Path, name: str, scale: float = 1.0, offset: np.ndarray = OFFSET,
            lanelet: int | None = None) -> Path:
-    """Write a scenario of ours with all coordinates changed, or those of one lanelet."""
+    """Write a scenario of the package with all coordinates changed, or those of one lanelet."""
     root = etree.parse(scenarios_directory() / name).getroot()
     scopes = [root] if lanelet is None else [root.findall('lanelet')[lanelet]]
     for scope in scopes:
@@ -53,7 +53,7 @@ def setup_of(scenario: Path, planner: str = 'idm', rest: str = '') -> Setup:
 
 
 def run(scenario: Path, planner: str, with_map: bool) -> OfflineResult:
-    """Drive among agents and over the curb; it is in the occupancy map, if there is one."""
+    """Drive among agents and over the curb, which is in the occupancy map, if there is one."""
     if with_map:
         assert main(['rasterize', str(scenario), str(scenario.parent / 'map')]) == 0
     setup = setup_of(scenario, planner, 'occupancy: map\n' if with_map else '')
@@ -110,7 +110,7 @@ def test_a_lanelet_far_away_is_no_way_to_drive_on(
 
 
 def test_thousands_of_kilometres_of_lanes_have_no_traffic(tmp_path: Path) -> None:
-    """Tables of lanes grow with their length; without traffic there are none."""
+    """Tables of lanes grow with their length; without traffic there are no tables."""
     scenario = edited(tmp_path, 'ZAM_Intersection-1_1_T-1.xml', 300.0, np.zeros(2))
     start_s = time.process_time()
     with pytest.raises(InputError, match='km of lanes are more than 600 km; use a part of'):
@@ -119,7 +119,7 @@ def test_thousands_of_kilometres_of_lanes_have_no_traffic(tmp_path: Path) -> Non
 
 
 def refused(scenario: Path, pattern: str, replacement: str) -> str:
-    """Change a scenario of ours, and give the refusal of the changed one."""
+    """Change one of the package's scenarios, and return its refusal."""
     text = (scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml').read_text()
     changed, count = re.subn(pattern, replacement, text, count=1, flags=re.DOTALL)
     assert count == 1
@@ -135,21 +135,21 @@ def refused(scenario: Path, pattern: str, replacement: str) -> str:
 
 @pytest.mark.parametrize('speed', ['1e6', '1e9', '-1e6', '201'])
 def test_an_initial_speed_of_no_vehicle_is_refused(speed: str, tmp_path: Path) -> None:
-    """At 1e9 m/s places behind the AV were looked for over 2 million kilometres: 149 GiB."""
+    """At 1e9 m/s the search for places behind the AV took 2 million kilometres: 149 GiB."""
     told = refused(tmp_path / 's.xml', r'(<planningProblem.*?<velocity>\s*<exact>)[^<]*',
                    rf'\g<1>{speed}')
     assert 'planningProblem' in told and 'm/s; give one between -200 and 200 m/s' in told
 
 
 def test_time_steps_of_a_millisecond_are_refused(tmp_path: Path) -> None:
-    """Every plan of 3 s would have 3000 states: 0.5 s took 33 s. Published are 0.04 to 0.2 s."""
+    """Every plan of 3 s would have 3000 states: 0.5 s took 33 s. Published ones: 0.04 to 0.2 s."""
     told = refused(tmp_path / 's.xml', 'timeStepSize="[^"]*"', 'timeStepSize="0.001"')
     assert "timeStepSize is '0.001'; give seconds from 0.01 to 10" in told
 
 
 @pytest.mark.slow
 def test_bounds_of_thousands_of_points_that_cross_are_refused(tmp_path: Path) -> None:
-    """To make a surface of 20,000 points in disorder took gigabytes; in order they are a road."""
+    """A surface of 20,000 unordered points took gigabytes; in order they are a road."""
     root = etree.parse(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml').getroot()
     for order, wanted in ((slice(None), ''), (slice(None, None, -1), 'cross themselves')):
         lanelet = root.find('lanelet')
@@ -158,7 +158,7 @@ def test_bounds_of_thousands_of_points_that_cross_are_refused(tmp_path: Path) ->
             ends = np.array([[float(point.find(axis).text) for axis in 'xy']
                              for point in (points[0], points[-1])])
             share = np.linspace(0.0, 1.0, 5000)
-            # In disorder: every second piece of three points is turned round.
+            # Unordered: every second piece of three points is reversed.
             share = np.concatenate([piece[order] if number % 2 else piece
                                     for number, piece in enumerate(np.split(share, 1250))])
             for point in points:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files of CommonRoad 2017a: read as what they would be in 2018b."""
+"""Files of CommonRoad 2017a are read as their equivalents in 2018b."""
 
 from pathlib import Path
 import re
@@ -41,7 +41,7 @@ def as_2017a(text: str, step_s: float | None) -> str:
 
 @pytest.mark.parametrize('seconds', [False, True])
 def test_the_same_scenario_in_both_formats(shared_scenarios: Path, seconds: bool) -> None:
-    """Every pose, start and goal of a published file is the same when it is written as 2017a."""
+    """Every pose, start and goal of a published file is the same if it is written as 2017a."""
     text = (shared_scenarios / 'ZAM_Over-1_1.xml').read_text(encoding='utf-8')
     assert 'commonRoadVersion="2018b"' in text
     step_s = float(re.search('timeStepSize="(.+?)"', text)[1])
@@ -59,7 +59,7 @@ def test_the_same_scenario_in_both_formats(shared_scenarios: Path, seconds: bool
 
 
 def test_times_that_fit_no_step_are_refused(project_root: Path) -> None:
-    """Seconds between two time steps are no older format but a mistake; a goal may have them."""
+    """Seconds between two time steps are an error, not an older format; a goal may have them."""
     text = (project_root / 'test' / 'scenario' / 'older_2017a.xml').read_text(encoding='utf-8')
     assert '<intervalStart>5.03</intervalStart>' in text
     with pytest.raises(InputError, match='no usable whole number'):
@@ -68,10 +68,10 @@ def test_times_that_fit_no_step_are_refused(project_root: Path) -> None:
 
 def test_structure_of_that_time(project_root: Path) -> None:
     """
-    What writers of 2017a had and 2018b has not; every number from the file beside this test.
+    Elements of 2017a that 2018b lacks; every number comes from the file beside this test.
 
-    Static obstacles that are but a shape on the map, one of occupancies alone, seconds with their
-    rounding, goals with exact values, points and fields of their own, `drivingDirection`.
+    Static obstacles that are only a shape on the map, one with only occupancies, seconds with
+    rounding, goals with exact values, points and fields of 2017a's own, `drivingDirection`.
     """
     text = (project_root / 'test' / 'scenario' / 'older_2017a.xml').read_text(encoding='utf-8')
     loaded = parse_scenario(text, 'older.xml')

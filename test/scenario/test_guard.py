@@ -31,7 +31,7 @@ def obstacle(x: str = '10', t: str = '0', shape: str = SHAPE, kind: str = 'car')
 
 
 def with_obstacle(text: str) -> str:
-    """Put an obstacle into the valid scenario."""
+    """Return the valid scenario with an obstacle added."""
     return VALID.replace('</commonRoad>', text + '</commonRoad>')
 
 
@@ -98,14 +98,14 @@ def test_refusal_is_one_line_with_file_and_reason(name: str, tmp_path: Path) -> 
 
 
 def test_the_valid_file_behind_the_malformed_ones_is_read() -> None:
-    """The refusals above are due to the one thing changed in each."""
+    """The refusals above are due to the one change in each."""
     loaded = parse_scenario(with_obstacle(obstacle(t='1')), 'good.xml')
     assert [x.lanelet_id for x in loaded.scenario.lanelet_network.lanelets] == [1]
     assert loaded.scenario.obstacle_by_id(7).state_at_time(1).position.tolist() == [10.0, 0.0]
 
 
 def test_message_names_the_line_of_the_element(tmp_path: Path) -> None:
-    """Line numbers are those of the file, whatever its XML declaration."""
+    """Line numbers are those of the file, for any XML declaration."""
     path = tmp_path / 'lines.xml'
     path.write_text(VALID.replace(RIGHT, '\n\n' + RIGHT.replace('<x>50', '<x>oops')))
     with pytest.raises(InputError, match=r'lines\.xml, line 4, lanelet 1: <x> is .oops.'):
@@ -114,7 +114,7 @@ def test_message_names_the_line_of_the_element(tmp_path: Path) -> None:
 
 def test_200_mib_of_whitespace_is_refused_unread(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The size is looked at first: the file is not even opened."""
+    """The size is checked first: the file is not even opened."""
     path = tmp_path / 'white.xml'
     with path.open('wb') as stream:
         stream.truncate(200 * 2 ** 20)
@@ -161,7 +161,7 @@ def test_encodings_give_the_same_text(encoding: str, declared: str, tmp_path: Pa
 
 
 def test_text_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    """Wrong bytes, unknown encodings and codecs that are none do not escape as errors."""
+    """Wrong bytes, unknown encodings and non-text codecs do not escape as other errors."""
     path = tmp_path / 'bytes.xml'
     for data in (b'\xff\x00\x81', b'<?xml version="1.0" encoding="zlib"?><commonRoad/>',
                  b'<?xml version="1.0" encoding="klingon"?><commonRoad/>'):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Light and air: what a game may say, and what the scenario says where it does not."""
+"""Light and air: values of the game, and of the scenario where the game has none."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ ELEMENT = ('<environment><time>{time}</time><timeOfDay>{time_of_day}</timeOfDay>
 
 
 def scenario_with(time_of_day: str, weather: str) -> str:
-    """Return one of our scenarios with an environment element, as commonroad-io reads it."""
+    """Return one of the package's scenarios with an environment element, read by commonroad-io."""
     text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
     element = ELEMENT.format(time='19:30', time_of_day=time_of_day, weather=weather)
     assert '</location>' in text
@@ -36,7 +36,7 @@ def test_a_scenarios_environment(time_of_day: str, weather: str, light: str,
                                  visibility: float) -> None:
     scenario = parse_scenario(scenario_with(time_of_day, weather), 'test').scenario
     assert environment_of(scenario, None) == EnvironmentSpec(light, visibility)  # type: ignore
-    # Each key of the game goes before the file's, by itself.
+    # Each key of the game separately overrides the file's.
     assert environment_of(scenario, EnvironmentSpec('day')) == EnvironmentSpec('day', visibility)
     assert environment_of(scenario, EnvironmentSpec(None, 60.0)) == EnvironmentSpec(
         light, 60.0)  # type: ignore
@@ -54,7 +54,7 @@ def test_a_run_records_what_was_resolved() -> None:
     game = load_game(scenarios_directory() / 'fog.yaml')
     text = game_document(build_setup(game), epoch=0, clock_offset_ns=0, real_time_factor=1.0)
     assert parse_game_document(text).environment == EnvironmentSpec('day', 80.0)
-    # The file itself leaves open what the game leaves open.
+    # The file itself omits the values that the game omits.
     assert yaml.safe_load(dump_game(game))['environment'] == {'visibility': 80.0}
     old = json.loads(text)
     del old['environment']

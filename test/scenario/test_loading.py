@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Loading: real scenarios, what is mended with a notice, uncertain initial states."""
+"""Loading: real scenarios, faults repaired with a notice, uncertain initial states."""
 
 import hashlib
 import math
@@ -63,7 +63,7 @@ def test_all_real_scenarios_load_as_published() -> None:
 
 
 def test_malformed_benchmark_id_is_renamed_and_said() -> None:
-    """The published ZAM-Ramp-1_1-T-1 becomes the id that was meant."""
+    """The published ZAM-Ramp-1_1-T-1 becomes the intended id."""
     loaded = load_scenario(shared('ZAM-Ramp-1_1-T-1.xml'))
     assert loaded.benchmark_id == 'ZAM_Ramp-1_1_T-1'
     assert len(loaded.notices) == 1 and 'ZAM_Ramp-1_1_T-1' in loaded.notices[0]
@@ -73,7 +73,7 @@ def test_malformed_benchmark_id_is_renamed_and_said() -> None:
     ('C-USA_US101-33_2_T-1', 'C-USA_US101-33_2_T-1'), ('XYZ_Town-1', 'ZAM_XYZTown1-1'),
     ('../../etc/passwd', 'ZAM_etcpasswd-1'), ('', 'ZAM_Unnamed-1'), ('DEU_A-0', 'ZAM_DEUA0-1')])
 def test_benchmark_ids_are_safe_file_names(given: str, valid: str) -> None:
-    """Whatever the file says, the id matches the documented pattern (it names output files)."""
+    """For any file the id matches the documented pattern (it names output files)."""
     assert parse_scenario(write(benchmark=given), 'x').benchmark_id == valid
 
 
@@ -119,7 +119,7 @@ def test_scenario_without_problem_is_said_in_one_line() -> None:
      '</exact></time></initialState><trajectory/></dynamicObstacle>', 'empty trajectory'),
 ])
 def test_mendable_faults_load_with_a_notice(links: str, rest: str, notice: str) -> None:
-    """Each of these stops or traps commonroad-io itself; here it loads and is said."""
+    """Each of these faults stops commonroad-io or traps it; here it loads, with a notice."""
     loaded = parse_scenario(write(links, rest), 'x')
     assert len(loaded.scenario.lanelet_network.lanelets) == 2
     assert loaded.scenario.lanelet_network.find_lanelet_by_id(1).successor == [2]
@@ -133,7 +133,7 @@ def test_a_notice_stays_a_line_that_is_read() -> None:
 
 
 def test_sign_on_a_circle_of_neighbours_ends() -> None:
-    """A sign without a position makes commonroad-io walk along neighbours, for ever if it can."""
+    """A sign without a position makes commonroad-io walk along neighbours, here for ever."""
     loaded = parse_scenario(write(
         '<adjacentRight ref="1" drivingDir="same"/><trafficSignRef ref="5"/>',
         '<trafficSign id="5"><trafficSignElement><trafficSignID>274</trafficSignID>'
@@ -158,7 +158,7 @@ def test_format_2018b_has_its_speed_limit_as_a_sign() -> None:
 
 
 def test_import_leaves_pyplot_and_clcs_alone() -> None:
-    """Start-up must not pay for plotting and curvilinear coordinates."""
+    """Start-up must not spend time on plotting and curvilinear coordinates."""
     code = ('import sys, crgame_ros.scenario.loading; '
             'print([m for m in sys.modules if "pyplot" in m or "clcs" in m])')
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
@@ -175,8 +175,8 @@ def test_missing_orientation_does_not_become_nan() -> None:
     assert math.isfinite(state.orientation)
 
 
-def test_who_loads_a_text_again_has_a_scenario_of_his_own() -> None:
-    """What one changes in it is not seen by the next, whose scenario is as the text has it."""
+def test_each_load_of_a_text_gives_a_scenario_of_its_own() -> None:
+    """Changes to one scenario do not affect the next, which is as in the text."""
     first = parse_scenario(write(), 'a file')
     first.scenario.lanelet_network.find_lanelet_by_id(1).left_vertices[:] += 100.0
     first.scenario.remove_lanelet([first.scenario.lanelet_network.find_lanelet_by_id(2)])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacles whose course events change: held, released, braking, put; and their prediction."""
+"""Obstacles whose motion events change: held, released, braking, put; and their prediction."""
 
 import math
 
@@ -29,7 +29,7 @@ def loaded() -> LoadedScenario:
 
 @pytest.fixture(scope='module')
 def obstacles(loaded: LoadedScenario) -> ScenarioObstacles:
-    """Hold the pedestrian; something may be put."""
+    """Hold the pedestrian; other obstacles may be put."""
     found = ScenarioObstacles(loaded, held=(201,), put=(CONE,))
     assert found.ids == ('o200', 'o201', 'e_cone')
     return found
@@ -50,7 +50,7 @@ def assert_velocities_lead_on(courses: ObstacleMotions, column: int, ks: range) 
 
 def test_held_obstacle_stands_at_its_first_pose(loaded: LoadedScenario,
                                                 obstacles: ScenarioObstacles) -> None:
-    """At any time, also where no recording reaches; the recording itself is kept."""
+    """At any time, also outside the recording; the recording itself is kept."""
     first = ScenarioObstacles(loaded).states_at(0).poses[WALKER]
     for k in (-10, 0, 150, 300, 5000):
         states = obstacles.states_at(k)
@@ -66,7 +66,7 @@ def test_held_obstacle_stands_at_its_first_pose(loaded: LoadedScenario,
 
 def test_released_obstacle_plays_its_recording_shifted(loaded: LoadedScenario,
                                                        obstacles: ScenarioObstacles) -> None:
-    """The same bits, 83 time steps later, and gone after its end; nobody else is changed."""
+    """The same bits, 83 time steps later, and absent after its end; no other obstacle changes."""
     courses, plain = ObstacleMotions(obstacles), ScenarioObstacles(loaded)
     assert courses.is_held(WALKER) and not courses.is_held(LEADER)
     courses.release(WALKER, 83)
@@ -115,7 +115,7 @@ def test_braking_to_a_speed_keeps_it_to_the_end_of_the_path(obstacles: ScenarioO
 
 def test_obstacle_never_speeds_up_and_stops_beyond_its_path(
         obstacles: ScenarioObstacles) -> None:
-    """A final speed above the present one changes nothing; a short path is gone straight on."""
+    """A final speed above the present one has no effect; a short path is continued straight on."""
     courses = ObstacleMotions(obstacles)
     courses.brake(LEADER, 10, 4.0, 30.0)
     np.testing.assert_allclose(poses(courses, LEADER, range(10, 50)),
@@ -129,7 +129,7 @@ def test_obstacle_never_speeds_up_and_stops_beyond_its_path(
 
 
 def test_released_obstacle_brakes_on_its_new_course(obstacles: ScenarioObstacles) -> None:
-    """Two events about one object: the pedestrian walks, then halts on the way, then again."""
+    """Two events about one object: the pedestrian walks, slows down on the way, then halts."""
     courses = ObstacleMotions(obstacles)
     courses.release(WALKER, 50)
     courses.brake(WALKER, 60, 1.4, 0.7)
@@ -163,7 +163,7 @@ def test_prediction_of_changed_obstacles(loaded: LoadedScenario,
     """
     Braking: constant speed along the lane; held and put: standing; walking: straight on.
 
-    Nothing of what the events will still do is known.
+    The prediction has nothing of future events.
     """
     courses = ObstacleMotions(obstacles)
     standing, _ = predicted(loaded, obstacles, courses, 30)
@@ -204,7 +204,7 @@ def test_prediction_on_a_bend_follows_the_lane(loaded: LoadedScenario) -> None:
 
 
 def test_recorded_future_knows_what_has_happened(obstacles: ScenarioObstacles) -> None:
-    """`prediction: recorded` gives the true course as far as events have come."""
+    """`prediction: recorded` gives the true motion with all events so far."""
     courses = ObstacleMotions(obstacles)
     courses.release(WALKER, 20)
     found, _ = recorded_future(courses, 30, 30)

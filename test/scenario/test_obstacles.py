@@ -57,7 +57,7 @@ def obstacles(text: str) -> ScenarioObstacles:
     'DEU_Flensburg-10_1_T-1.xml', 'USA_US101-4_1_T-1.xml', 'ZAM_Tutorial-1_2_T-1.xml',
     'OSC_PedestrianCollision-1_1_T-1.xml', 'ZAM_Over-1_1.xml'])
 def test_poses_are_those_of_commonroad(name: str) -> None:
-    """At each step `state_at_time` gives the same pose, and None where we have NaN."""
+    """At each step `state_at_time` gives the same pose, and None where ours is NaN."""
     loaded = shared(name)
     found = ScenarioObstacles(loaded)
     assert len(found.ids) == len(loaded.scenario.obstacles) > 0

@@ -104,7 +104,7 @@ def test_constant_steering_starts_with_the_state_itself() -> None:
 
 
 def test_recorded_future_is_the_recording() -> None:
-    """Row i of the leak is the state at k + i, and NaN after the last one."""
+    """Row i of the recorded future is the state at k + i, and NaN after the last one."""
     obstacles = ScenarioObstacles(shared('DEU_Flensburg-10_1_T-1.xml'))
     poses, velocities = recorded_future(obstacles, obstacles.last_k - 5, 30)
     for i in range(31):
@@ -139,7 +139,7 @@ def test_lane_prediction_goes_straight_on_where_the_map_ends() -> None:
     ('pedestrian', 0.0, 0.0), ('bicycle', 1.4, 0.0), ('car', 1.0, 0.0), ('car', math.pi, 0.0),
     ('car', 0.0, -5.0)])
 def test_others_go_straight_on(kind: str, yaw: float, offset: float) -> None:
-    """Pedestrians, who crosses the lane, wrong-way drivers, and who is off the road."""
+    """Pedestrians, vehicles that cross the lane, wrong-way drivers, and vehicles off the road."""
     _, prediction = lane_world(kind, yaw, offset)
     poses, _ = prediction.predict(0, 30)
     time = 0.1 * np.arange(31)
@@ -158,10 +158,10 @@ def test_bicycle_along_the_lane_follows_it() -> None:
 @pytest.mark.parametrize('name', [*BUSY, 'ZAM_Tutorial-1_2_T-1.xml', 'ZAM-Ramp-1_1-T-1.xml'])
 def test_rows_are_consistent(name: str) -> None:
     """
-    Row 0 is the state itself, absent stays absent, static stays, later velocities lead on.
+    Row 0 is the state itself, absent and static objects stay so, later velocities lead on.
 
     From row 0 to row 1 an obstacle moves by its speed along the lane within the rounding of the
-    tabulated line; what it has of lateral speed is not continued.
+    tabulated line; its lateral speed is not continued.
     """
     loaded = shared(name)
     obstacles = ScenarioObstacles(loaded)

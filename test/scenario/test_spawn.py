@@ -45,7 +45,7 @@ def avs_of(loaded: LoadedScenario) -> list[VehicleState]:
 
 
 def box(state: VehicleState) -> pycrcc.RectOBB:
-    """Return the car's footprint to the drivability checker's collision test."""
+    """Return the car's footprint for the drivability checker's collision test."""
     x, y = state.center(CAR.rear_to_center)
     return pycrcc.RectOBB(CAR.length / 2, CAR.width / 2, state.yaw, x, y)
 
@@ -99,13 +99,13 @@ def test_human_stands_beside_and_slightly_behind() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(('name', 'ahead', 'aside'), [
-    # Dense traffic that does not react: the nearest place behind that nobody runs into.
+    # Dense traffic that does not react: the nearest place behind that no vehicle runs into.
     ('USA_US101-4_1_T-1', (-50.0, -40.0), (-2.0, 2.0)),
     # Their roads begin 29 m and 14 m behind the AV, less than 2 s.
     ('ZAM_Over-1_1', (-29.0, -20.0), (-2.0, 2.0)),
     ('ZAM_Tutorial-1_2_T-1', (-14.0, -6.7), (-0.1, 0.1)),
     ('more/DEU_AAH1-2_76900_T-7049', (-27.0, -20.0), (-2.0, 2.0)),
-    # Here it begins at the AV: level with it on the other lane.
+    # This road begins at the AV: the human is level with it on the other lane.
     ('ZAM-Ramp-1_1-T-1', (-1.0, 4.5), (3.0, 4.0)),
     ('more/OSC_Overtake-1_1_T-1', (-1.0, 4.5), (3.0, 4.0))])
 def test_human_is_not_ahead_where_there_is_room_behind(
@@ -172,7 +172,7 @@ def test_impossible_spawns_are_refused(spawn: LaneletSpawn, reason: str) -> None
 
 
 def test_no_free_place_is_refused() -> None:
-    """An obstacle over the whole map leaves none."""
+    """An obstacle over the whole map leaves no free place."""
     road = RoadNetwork(shared('ZAM_Tutorial-1_2_T-1.xml').scenario.lanelet_network)
     flood = ObjectDescription('o1', 'unknown', Role.STATIC, Shape.circle(2000.0))
     for avs in ([], [VehicleState(*road.pose_on(1, 50.0), 10.0)]):

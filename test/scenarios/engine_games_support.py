@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Playing the games with objects, traffic and perception, changed or not, and measuring them."""
+"""Play the games with objects, traffic and perception, changed or not, and measure the runs."""
 
 from collections.abc import Callable
 import functools
@@ -24,7 +24,7 @@ TICK_S = 0.1
 
 
 class ListeningIdm(IdmPlanner):
-    """The planner idm, which also keeps every request that it is asked with."""
+    """The planner idm, which also keeps every request that it gets."""
 
     requests: list[PlanRequest] = []
 
@@ -35,7 +35,7 @@ class ListeningIdm(IdmPlanner):
 
 
 def play(name: str, *changes: Change) -> OfflineResult:
-    """Run a game of the folder `scenarios`, after changes to what its file says."""
+    """Run a game of the folder `scenarios`, after changes to the values of its file."""
     path = scenarios_directory() / f'{name}.yaml'
     values = yaml.safe_load(path.read_text(encoding='utf-8'))
     for change in changes:
@@ -50,7 +50,7 @@ def played(name: str) -> OfflineResult:
 
 
 def without_human(values: dict[str, Any]) -> None:
-    """Leave the human out."""
+    """Remove the human from a game."""
     values['humans'] = []
 
 
@@ -78,7 +78,7 @@ def agents(result: OfflineResult) -> tuple[Array, Array]:
 
 
 def bodies(result: OfflineResult, id_: str) -> Array:
-    """Return the body of anything as shapes (ticks,); empty where it is absent."""
+    """Return the body of any object as shapes (ticks,); empty where it is absent."""
     descriptions = {item.id: item for item in result.setup.descriptions}
     shape = descriptions[id_].shape
     if id_ in result.setup.vehicle_ids:
@@ -108,7 +108,7 @@ def distances(result: OfflineResult, one: str, other: str) -> Array:
 
 
 def touching(result: OfflineResult) -> list[tuple[str, str]]:
-    """List the pairs that ever touch, of everything that is there."""
+    """List the pairs of objects that ever touch."""
     ids = [item.id for item in result.setup.descriptions]
     all_bodies = np.stack([bodies(result, id_) for id_ in ids], axis=1)
     found = set()

@@ -27,7 +27,7 @@ def game(project_root: Path) -> Game:
 
 
 def perturbed(game: Game, ahead: float, speed: float) -> Game:
-    """Let the human start elsewhere, at another speed."""
+    """Return the game with another start and speed of the human."""
     human = game.humans[0]
     assert isinstance(human.spawn, LaneletSpawn)
     spawn = replace(human.spawn, s=human.spawn.s + ahead, speed=speed)
@@ -35,7 +35,7 @@ def perturbed(game: Game, ahead: float, speed: float) -> Game:
 
 
 def run(game: Game, planner: str, latency: int) -> OfflineResult:
-    """Run the game, and check that the AV touches nobody and stays on the road."""
+    """Run the game, and check that the AV touches no vehicle and stays on the road."""
     result = run_offline(with_planners(build_setup(game), (planner,)), latency_steps=latency,
                          duration_s=DURATION_S)
     assert [item for item in result.violations if not item.is_valid] == []
@@ -54,7 +54,7 @@ def check_passed(result: OfflineResult) -> None:
     beside = np.argmin(np.abs(av[:, 0] - human[:, 0]) + 1e3 * (np.abs(av[:, 1]) < 1.0))
     assert abs(av[beside, 1] - human[beside, 1]) == pytest.approx(LANE_WIDTH, abs=1.0)
     record = result.planners['av0']
-    # All answers are the package's: none a fallback, none refused.
+    # All answers come from the package: none is a fallback, and none is refused.
     assert record.accepted_ratio == 1.0
     assert record.statistics.fallbacks == record.counters.refused == 0
 
@@ -89,10 +89,10 @@ def test_both_do_so_in_other_games(game: Game, ahead: float, speed: float) -> No
 @pytest.mark.slow
 def test_exported_cut_in_stays_on_the_road_driven_again(game: Game, tmp_path: Path) -> None:
     """
-    Also as the human's planning problem has it, whose route changes lanes to the right.
+    Also with the human's planning problem, whose route changes lanes to the right.
 
-    The lanelets of that lane change had common parts of the path, so that the bounds of the one
-    were taken for those of the other, and the AV left the road for 1.8 s.
+    The lanelets of that lane change once shared parts of the path. The bounds of one were used
+    for the other, and the AV left the road for 1.8 s.
     """
     first = run(game, 'reactive', 0)
     path = tmp_path / 'driven.xml'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cyclists who cross, who ride ahead slowly, and who come towards an AV: it runs into none."""
+"""Cyclists that cross, ride ahead slowly, or are oncoming: the AV runs into none."""
 
 import math
 from pathlib import Path
@@ -26,7 +26,7 @@ import pytest
 DT, TICKS = 0.1, 60
 WIDTH = 3.5
 BIKE = (1.8, 0.6)
-# The slower of two who touch so slowly has done what it could [m/s].
+# Up to this speed at a contact the slower one of the two has done all it could [m/s].
 STOPPED = 0.3
 
 
@@ -41,7 +41,7 @@ def lane(number: int, y: float, back: bool) -> Lanelet:
 
 def write(path: Path, speed: float, start: tuple[float, float], yaw: float,
           ride: float) -> Path:
-    """Write a scenario of one AV at x = 0 and one cyclist who keeps speed and heading."""
+    """Write a scenario of one AV at x = 0 and one cyclist that keeps speed and heading."""
     scenario = Scenario(DT, ScenarioID.from_benchmark_id('ZAM_Cyclist-1_1_T-1', '2020a'))
     scenario.add_objects([lane(1, 0.0, False), lane(2, WIDTH, True)])
     way = ride * DT * np.arange(TICKS + 1)
@@ -75,7 +75,7 @@ def run_into(path: Path, planner: str) -> list[tuple[float, float]]:
         cyclist = result.object_poses[item.n // 10, 0]
         x, y, yaw, speed = states[item.n, :4]
         ahead = (cyclist[0] - x) * math.cos(yaw) + (cyclist[1] - y) * math.sin(yaw)
-        # Who rides into the AV's side or rear is not run into.
+        # A cyclist that rides into the AV's side or rear does not count.
         if speed > STOPPED and ahead > 1.4227 + 0.5 * 4.508 - 0.3:
             hits.append((0.01 * item.n, float(speed)))
     return hits
@@ -86,7 +86,7 @@ def run_into(path: Path, planner: str) -> list[tuple[float, float]]:
 @pytest.mark.parametrize(('speed', 'ride'), [(8.0, 3.0), (14.0, 5.0)])
 def test_idm_runs_into_no_crossing_cyclist(angle: int, speed: float, ride: float,
                                            tmp_path: Path) -> None:
-    """They get to the middle of the lane 25 m ahead before, with, and after the AV."""
+    """They reach the middle of the lane 25 m ahead before, with, and after the AV."""
     yaw = math.radians(angle)
     for late in (-0.5, 0.2, 0.8):
         time = 25.0 / speed + late
@@ -100,7 +100,7 @@ def test_idm_runs_into_no_crossing_cyclist(angle: int, speed: float, ride: float
 @pytest.mark.parametrize('ride', [0.0, 3.0, -4.0])
 def test_idm_runs_into_no_cyclist_in_its_lane(offset: float, ride: float,
                                               tmp_path: Path) -> None:
-    """Standing, slower and coming towards it, in the middle and at either edge of the lane."""
+    """Standing, slower and oncoming cyclists, in the middle and at either edge of the lane."""
     yaw = 0.0 if ride >= 0.0 else math.pi
     start = 40.0 if ride >= 0.0 else 70.0
     path = write(tmp_path / 'lane.xml', 12.0, (start, offset), yaw, abs(ride))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cyclists faster than the AV who ride into its lane from behind, at shallow angles."""
+"""Cyclists faster than the AV that ride into its lane from behind, at shallow angles."""
 
 import math
 from pathlib import Path
@@ -22,10 +22,10 @@ MEETING_S = 3.0
 
 def ride_beside(path: Path, speed: float, ride: float, angle: float, ahead: float) -> Path:
     """
-    Write a scenario whose cyclist would touch the AV's side after 3 s, did it keep its speed.
+    Write a scenario whose cyclist would touch the side of an AV at constant speed after 3 s.
 
-    :param angle: at which it rides into the lane, from the right if positive [deg]
-    :param ahead: of the AV's centre, at which it would be then [m]
+    :param angle: of the cyclist into the lane, from the right if positive [deg]
+    :param ahead: distance ahead of the AV's centre at that time [m]
     """
     yaw, side = math.radians(angle), -math.copysign(1.0, angle)
     x = speed * MEETING_S + REAR_TO_CENTER + ahead - MEETING_S * ride * math.cos(yaw)
@@ -34,7 +34,7 @@ def ride_beside(path: Path, speed: float, ride: float, angle: float, ahead: floa
 
 
 def drive(path: Path) -> tuple[OfflineResult, list[Contact]]:
-    """Drive with `idm`; give the AV's contacts with the cyclist."""
+    """Drive with `idm`; return the AV's contacts with the cyclist."""
     game = effective_game(RunRequest(scenario=path, duration_s=DT * TICKS))
     result = run_offline(with_planners(build_setup(game), ('idm',)))
     return result, [item for item in contacts_of(result)
@@ -44,25 +44,25 @@ def drive(path: Path) -> tuple[OfflineResult, list[Contact]]:
 @pytest.mark.matrix
 @pytest.mark.parametrize('angle', [5.0, -10.0, 20.0])
 @pytest.mark.parametrize(('speed', 'ride'), [(5.0, 10.0), (8.0, 10.0)])
-def test_it_lets_who_comes_from_behind_in_ahead(speed: float, ride: float, angle: float,
-                                                tmp_path: Path) -> None:
+def test_it_makes_room_for_a_cyclist_from_behind(speed: float, ride: float, angle: float,
+                                                 tmp_path: Path) -> None:
     """
-    Beside its rear, its middle and its front it brakes in time; before it drove on at 5 to 8 m/s.
+    It brakes in time for one beside its rear, middle or front; it once drove on at 5 to 8 m/s.
 
-    Letting somebody in who would be beside its middle takes some 5 m in 3 s, 1.1 m/s^2. What is
-    left is a cyclist who rides into the AV's rear in its own lane, which only he can avoid.
+    To let in a cyclist beside its middle takes some 5 m in 3 s, 1.1 m/s^2. The remaining contact
+    is a cyclist that rides into the AV's rear in its own lane, which only the cyclist can avoid.
     """
     for ahead in (-1.8, 0.0, 1.5):
         path = ride_beside(tmp_path / f'{ahead}.xml', speed, ride, angle, ahead)
         result, contacts = drive(path)
         assert [item for item in contacts if item.side != 'rear'] == [], ahead
         assert all(item.avoidable_by == ('o50',) for item in contacts)
-        # It shifts for nobody: its own lane is where others expect it.
+        # It never shifts sideways: others expect it in its own lane.
         assert abs(result.states_of('av0')[:, 1]).max() < 0.05
 
 
-def test_a_contact_that_nobody_at_the_wheel_could_avoid(tmp_path: Path) -> None:
-    """One who is already beside and turns in at 20 degrees: it holds its lane, and is told so."""
+def test_a_contact_that_no_driver_could_avoid(tmp_path: Path) -> None:
+    """A cyclist beside it turns in at 20 degrees: the AV holds its lane; the verdict says so."""
     yaw = math.radians(20.0)
     start = REAR_TO_CENTER - 0.5, -(HALF_WIDTH + HALF_BIKE) - 1.5
     path = write(tmp_path / 'beside.xml', 8.0, start, yaw, 8.6)

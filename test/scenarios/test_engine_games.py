@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The games with objects, traffic and perception: nobody comes to harm, and the human matters."""
+"""The games with objects, traffic and perception: no contacts, and the human has an effect."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,14 +29,14 @@ pytestmark = pytest.mark.xdist_group('scenarios/games')
 
 NAMES = ('occluded_pedestrian', 'dense_merge', 'blocked_lane', 'fog')
 GAMES = [pytest.param(name, id=name) for name in NAMES]
-# Least loss of speed that the human brings about [m/s], and bounds of the distance to him [m].
+# Least loss of speed that the human causes [m/s], and bounds of the distance to the human [m].
 HUMAN_MATTERS = {'occluded_pedestrian': (2.0, 10.0, 30.0), 'dense_merge': (2.0, 5.0, 50.0),
                  'blocked_lane': (8.0, 0.8, 2.5), 'fog': (3.0, 1.9, 8.0)}
 
 
 @pytest.fixture(autouse=True)
 def _packages(request: pytest.FixtureRequest) -> None:
-    """Skip what needs the reactive planner where its package is not installed."""
+    """Skip games of the reactive planner if its package is not installed."""
     if 'fog' in request.node.nodeid:
         pytest.importorskip('commonroad_rp')
 
@@ -46,7 +46,7 @@ def _invalid(result: OfflineResult) -> list[VehicleDrivability]:
 
 
 def test_every_game_with_engines_is_here() -> None:
-    """No game with objects, traffic or perception is left out below."""
+    """The tests below leave out no game with objects, traffic or perception."""
     games = {path.stem: load_game(path) for path in scenarios_directory().glob('*.yaml')
              if path.suffixes == ['.yaml']}
     assert set(NAMES) == {name for name, game in games.items() if game.objects or game.traffic
@@ -56,8 +56,8 @@ def test_every_game_with_engines_is_here() -> None:
 @pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
-def test_nobody_touches_anybody(name: str) -> None:
-    """Neither the driven vehicles nor agents nor objects, by exact geometry at every tick."""
+def test_no_bodies_touch(name: str) -> None:
+    """No driven vehicle, agent or object touches another, by exact geometry at every tick."""
     result = played(name)
     assert _invalid(result) == []
     assert touching(result) == []
@@ -82,9 +82,9 @@ def test_runs_repeat_bit_for_bit(name: str) -> None:
 @pytest.mark.parametrize('name', GAMES)
 def test_export_is_read_back(name: str, tmp_path: Path) -> None:
     """
-    Writing checks CommonRoad's schema; commonroad-io finds everybody, to the last tick.
+    Writing checks CommonRoad's schema; commonroad-io finds all obstacles, to the last tick.
 
-    A slot of traffic that is used again is another obstacle each time.
+    A reused slot of traffic is another obstacle each time.
     """
     result = played(name)
     exported = write_scenario(trajectories_of(result), tmp_path)
@@ -100,7 +100,7 @@ def test_export_is_read_back(name: str, tmp_path: Path) -> None:
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', GAMES)
 def test_human_makes_the_av_slow_down(name: str) -> None:
-    """Against the same game without the human, by as much as the story wants."""
+    """Compared with the same game without the human, by the amount that the game intends."""
     slower, least, most = HUMAN_MATTERS[name]
     result, alone = played(name), play(name, without_human)
     assert (speeds(alone, 'av0') - speeds(result, 'av0')).max() > slower
@@ -110,7 +110,7 @@ def test_human_makes_the_av_slow_down(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('name', GAMES)
 def test_script_survives_an_uneven_clock(name: str) -> None:
-    """As `test_scripts_survive_an_uneven_clock` of the other games; the objects stay."""
+    """Like `test_scripts_survive_an_uneven_clock` of the other games; the objects stay."""
     game = load_game(scenarios_directory() / f'{name}.yaml')
     setup = build_setup(replace(game, avs=(), traffic=None))
     steps = setup.scheduler.steps_for(game.duration)

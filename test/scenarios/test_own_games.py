@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The package's own games: the scripted human makes the AV react, and nobody comes to harm.
+The package's own games: the scripted human makes the AV react, and there are no contacts.
 
 Those with objects, traffic or perception of their own are in test_engine_games.py.
 """
@@ -25,7 +25,7 @@ import shapely
 
 
 def _is_plain(path: Path) -> bool:
-    """Return whether a game has only a scenario, humans, AVs that know everything, events."""
+    """Return whether a game has only a scenario, humans, AVs without perception, and events."""
     game = load_game(path)
     return (game.traffic is None and not game.objects
             and all(av.perception is None for av in game.avs or ()))
@@ -38,7 +38,7 @@ GAMES = sorted(path for path in scenarios_directory().glob('*.yaml')
 @dataclass(frozen=True)
 class Reaction:
     """
-    What the human is to bring about.
+    Expected effects of the human.
 
     :param slower: by which the AV falls below its speed without the human, at least [m/s].
     :param from_s: time before which the AV drives as without the human [s].
@@ -51,8 +51,8 @@ class Reaction:
 
 
 # Nothing happens before the human is predicted (3 s ahead) to be in the AV's way; the least gap
-# is the model's standstill gap of 2 m where both stop, and that beside each other where one
-# overtakes; upper bounds keep the encounter a close one.
+# is the model's standstill gap of 2 m where both stop, and the gap side by side where one
+# overtakes; upper bounds ensure a close encounter.
 REACTIONS = {
     ('cut_in', 'av0'): Reaction(20.0, 4.0, (1.9, 3.0)),
     ('lane_change', 'av0'): Reaction(8.0, 0.0, (10.0, 20.0)),
@@ -98,7 +98,7 @@ def _invalid(violations: Sequence[VehicleDrivability]) -> list[VehicleDrivabilit
 
 
 def test_every_av_has_an_expected_reaction() -> None:
-    """No game is left out below."""
+    """The tests below leave out no game."""
     avs = {(path.stem, av.id) for path in GAMES for av in load_game(path).avs or ()}
     assert avs == REACTIONS.keys()
 
@@ -119,8 +119,8 @@ def test_human_makes_the_av_react(name: str, av_id: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', sorted({name for name, _ in REACTIONS}))
-def test_nobody_collides_or_leaves_the_road(name: str) -> None:
-    """Neither the scripted human nor an AV behind idm, and every plan is accepted."""
+def test_no_vehicle_collides_or_leaves_the_road(name: str) -> None:
+    """Neither the scripted human nor an AV with idm does, and every plan is accepted."""
     for with_human in (True, False):
         result = _play(name, with_human)
         assert not _invalid(result.violations)
@@ -149,7 +149,7 @@ def test_scripts_survive_an_uneven_clock(path: Path) -> None:
     """
     Intervals disturbed by stalls of up to 50 ms keep the human in the lane.
 
-    The intervals still add up to n dt, as the time controller's carry has it. In the middle of
+    The intervals still add up to n dt, by the time controller's carry. In the middle of
     the narrowest lane the vehicle has (3.5 m - 1.61 m) / 2 = 0.94 m to either side.
     """
     setup = build_setup(replace(load_game(path), avs=(), events=()))

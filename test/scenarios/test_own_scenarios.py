@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The package's own scenarios: files that keep to the standard, roads that can be driven."""
+"""The package's own scenarios: files that follow the standard, roads that can be driven."""
 
 import os
 from pathlib import Path
@@ -26,7 +26,7 @@ GAMES = sorted(path for path in scenarios_directory().glob('*.yaml')
                if path.suffixes == ['.yaml'])
 SCHEMA = Path(commonroad.__file__).parent.joinpath(
     'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
-# What the AV drives in 20 s in the town scenarios, at 12.5 m/s, is the least length wanted.
+# The least length is the AV's way in 20 s in the town scenarios, at 12.5 m/s.
 LENGTH_AHEAD = 250.0
 
 Opened = tuple[Scenario, PlanningProblemSet]
@@ -129,7 +129,7 @@ def test_neighbours_share_a_bound(opened: Opened) -> None:
 
 
 def test_every_lane_has_a_speed_limit(opened: Opened) -> None:
-    """Limits are in m/s, as CommonRoad has it: 30 to 100 km/h; turns and crosswalks have none."""
+    """Limits are in m/s, as in CommonRoad: 30 to 100 km/h; turns and crosswalks have none."""
     network = opened[0].lanelet_network
     for lanelet in network.lanelets:
         limits = [float(element.additional_values[0]) for id_ in lanelet.traffic_signs

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The games with perception: what an AV sees late it brakes for late."""
+"""The games with perception: an AV brakes late for objects that it sees late."""
 
 from typing import Any
 
@@ -65,27 +65,27 @@ def _line_of_sight(result: OfflineResult) -> list[int]:
 @pytest.mark.slow
 def test_pedestrian_is_known_from_the_first_line_of_sight_on() -> None:
     """
-    Never before; and at most two scans later, when a ray of the fan meets what shows.
+    Never before, and at most two scans later, when a ray of the fan meets the visible part.
 
     The rays are 120 degrees / 360 apart, 0.12 m at 20 m: less than the pedestrian comes forward
-    in a scan and a half at 1.5 m/s. Without perception he is in the very first request.
+    in a scan and a half at 1.5 m/s. Without perception the very first request has the pedestrian.
     """
     ListeningIdm.requests.clear()
     result = play('occluded_pedestrian', _listening)
     known, visible = _ticks_with_walker(), _line_of_sight(result)
     assert visible[0] <= known[0] <= visible[0] + 2
-    # He walks into the open when the AV is 20 m away: 2 s at its speed.
+    # The pedestrian becomes visible when the AV is 20 m away: 2 s at its speed.
     assert 6.0 < known[0] * TICK_S < 8.0
     play('occluded_pedestrian', _listening, _perfect)
     assert _ticks_with_walker()[0] == 0
 
 
-def test_who_sees_late_brakes_late() -> None:
+def test_an_av_that_sees_late_brakes_late() -> None:
     """
-    Without perception the AV reacts to a pedestrian who walks up behind the vans, gently.
+    Without perception the AV reacts gently to a pedestrian that walks up behind the vans.
 
-    With it, it knows of him only when he shows, has to brake more than twice as hard, and still
-    keeps its standstill gap of 2 m.
+    With it, the AV knows of the pedestrian only once visible, has to brake more than twice as
+    hard, and still keeps its standstill gap of 2 m.
     """
     seeing, knowing = played('occluded_pedestrian'), play('occluded_pedestrian', _perfect)
     starts = []
@@ -108,7 +108,7 @@ def _fast(values: dict[str, Any]) -> None:
 
 
 def _gap_when_braking_begins(result: OfflineResult) -> float:
-    """Return the distance to the human when the AV is fastest, before it brakes for him [m]."""
+    """Return the distance to the human when the AV is fastest, before it brakes [m]."""
     return float(distances(result, 'av0', 'hv0')[int(np.argmax(speeds(result, 'av0')))])
 
 
@@ -117,14 +117,14 @@ def test_av_in_fog_stops_within_its_sight() -> None:
     pytest.importorskip('commonroad_rp')
     result = played('fog')
     assert strongest_braking(result, 'av0') < 4.0
-    # It closes up to the van that the human has gone around, and stands behind it.
+    # It closes up to the van that the human has passed, and stands behind it.
     assert speeds(result, 'av0')[-1] < 1.0
     assert 1.5 < distances(result, 'av0', 'van')[-1] < 6.0
 
 
 @pytest.mark.exhaustive
 def test_too_fast_in_fog_brakes_late_and_hard() -> None:
-    """At 22 m/s the horizon of 30 m is where it begins; with clear sight twice as far away."""
+    """At 22 m/s braking begins at the horizon of 30 m; with clear sight twice as far away."""
     pytest.importorskip('commonroad_rp')
     fog, clear = play('fog', _fast), play('fog', _fast, _clear)
     assert _gap_when_braking_begins(fog) < 31.0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every published scenario runs ten seconds with our planner and with the reactive one."""
+"""Every published scenario runs ten seconds with the package's planner and the reactive one."""
 
 import functools
 from pathlib import Path
@@ -17,8 +17,8 @@ NAMES = (
     'OSC_PedestrianCollision-1_1_T-1', 'USA_Lanker-1_3_T-1', 'USA_US101-4_1_T-1',
     'ZAM-Ramp-1_1-T-1', 'ZAM_Over-1_1', 'ZAM_Tjunction-1_42_T-1', 'ZAM_Tutorial-1_2_T-1')
 DURATION_S = 10.0
-# Below these shares of real plans a planner could not be said to drive the scenario. The measured
-# shares stand in docs/scenarios.md.
+# Below these shares of real plans a planner does not count as driving the scenario.
+# docs/scenarios.md has the measured shares.
 WANTED = {'idm': 0.95, 'reactive': 0.8}
 
 

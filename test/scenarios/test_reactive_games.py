@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The reactive planner in our own games: it answers, and it hits nobody; see also test_cut_in."""
+"""The reactive planner in the package's games: it answers without contacts; see test_cut_in."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ WANTED = 0.8
 @pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', ['parked_cars', 'roundabout'])
-def test_reactive_planner_answers_and_hits_nobody(name: str, project_root: Path) -> None:
+def test_reactive_planner_answers_and_hits_no_vehicle(name: str, project_root: Path) -> None:
     request = RunRequest(game=project_root / 'scenarios' / f'{name}.yaml')
     setup = with_planners(build_setup(effective_game(request)), ('reactive',))
     result = run_offline(setup)

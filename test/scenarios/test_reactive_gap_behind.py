@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The reactive planner before a parked car, beside somebody who looks at nothing."""
+"""The reactive planner before a parked car, beside a human that reacts to nothing."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 # The lanes' centre lines are at y = 2 and 6 m, the AV starts at x = 15.6 m with 20 m/s, and the
-# parked car's rear is 28.5 m ahead: what 20 m/s need at 7 m/s^2.
+# parked car's rear is 28.5 m ahead: the braking distance from 20 m/s at 7 m/s^2.
 BESIDE = 6.0
 
 
@@ -33,10 +33,10 @@ def drive(shared_scenarios: Path, spawn: PoseSpawn | None, duration_s: float) ->
 def test_stops_where_there_is_no_room_beside(spawn: PoseSpawn | None,
                                              shared_scenarios: Path) -> None:
     """
-    Nobody is cut off, and the parked car is not touched.
+    The AV cuts off no vehicle, and does not touch the parked car.
 
     0.6 s of headway are 12 and 14.4 m, and 4 m/s more take 0.7 s and 2.5 m/s^2: 6 m. None of the
-    three has that much behind the AV, which reached the lane's edge at y = 4 - 0.8 m before.
+    three has that much room behind the AV, which once reached the lane's edge at y = 4 - 0.8 m.
     """
     result = drive(shared_scenarios, spawn, 4.0)
     av = result.states_of('av0')
@@ -46,10 +46,10 @@ def test_stops_where_there_is_no_room_beside(spawn: PoseSpawn | None,
 
 
 def test_passes_where_there_is_room(shared_scenarios: Path) -> None:
-    """From 19 m behind at the same speed it goes round the parked car in front of the human."""
+    """With the human 19 m behind at its speed the AV passes the parked car ahead of the human."""
     result = drive(shared_scenarios, PoseSpawn(-8.0, BESIDE, 0.0, 20.0), 4.0)
     av, human = result.states_of('av0'), result.states_of('hv0')
     assert av[:, 1].max() > 5.0
     changing = np.flatnonzero(av[:, 1] > 3.2)[0]
-    # Whole headway when it comes into the lane: from rear axle to rear axle a car's length more.
+    # The whole headway when it enters the lane: between rear axles it is a car's length more.
     assert av[changing, 0] - human[changing, 0] - 4.508 > 0.6 * human[changing, 3]

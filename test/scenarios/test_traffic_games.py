@@ -27,7 +27,7 @@ import shapely
 # They share the games that are played as they are.
 pytestmark = pytest.mark.xdist_group('scenarios/games')
 
-# When the human, who has merged, brakes in a test [s].
+# The time at which the human brakes after merging in a test [s].
 BRAKES_S = 15.0
 
 
@@ -40,15 +40,15 @@ def _no_changes(values: dict[str, Any]) -> None:
 
 
 def _crawling_s(result: OfflineResult) -> float:
-    """Add up the time that agents spend on the acceleration lane below 5 m/s [s]."""
+    """Return the total time of agents on the acceleration lane below 5 m/s [s]."""
     poses, speed = agents(result)
     lane = (poses[..., 1] < -3.75) & (poses[..., 0] > 0.0) & (poses[..., 0] < 300.0)
     return float((lane & (speed < 5.0)).sum()) * TICK_S
 
 
 @pytest.mark.exhaustive
-def test_who_makes_room_keeps_the_acceleration_lane_moving() -> None:
-    """Without courtesy some crawl to its end, without lane changes all wait there for good."""
+def test_courtesy_keeps_the_acceleration_lane_moving() -> None:
+    """Without courtesy some crawl to its end; without lane changes all wait there for good."""
     waiting = [_crawling_s(played('dense_merge')), _crawling_s(play('dense_merge', _selfish)),
                _crawling_s(play('dense_merge', _no_changes))]
     assert waiting[0] < 2.0
@@ -59,9 +59,9 @@ def test_who_makes_room_keeps_the_acceleration_lane_moving() -> None:
 @pytest.mark.exhaustive
 def test_agents_react_to_how_the_human_drives(tmp_path: Path) -> None:
     """
-    The human brakes to a stop after merging: those behind brake harder, those ahead don't care.
+    The human brakes to a stop after merging: followers brake harder, leaders are unaffected.
 
-    Until then everybody drives as in the game, to the last bit.
+    Until then all drive as in the game, to the last bit.
     """
     lines = (scenarios_directory() / 'dense_merge.joy.yaml').read_text('utf-8').splitlines()
     points = [line for line in lines if line.startswith('    - ')
@@ -121,7 +121,7 @@ def _passing(result: OfflineResult) -> list[str]:
     for agent, description in enumerate(result.setup.traffic.descriptions):
         before = np.flatnonzero(own[:, agent] & (s[:, agent] < at - 20.0))
         behind = np.flatnonzero(own[:, agent] & (s[:, agent] > at + 20.0))
-        # A slot that left the map is used again by somebody who comes in at its other end.
+        # A slot that left the map is reused by an agent that enters at its other end.
         if len(before) and len(behind) and before[0] < behind[-1]:
             passing.append(description.id)
     return passing
@@ -133,7 +133,7 @@ def test_agents_swerve_around_the_skip_with_the_stated_clearance() -> None:
     The band keeps 0.5 m between the skip and a vehicle 2 m wide (1.8 m: 0.1 m more).
 
     It bends about the middle of the lane, so the corner of a turned vehicle takes a little back.
-    The room left in the lane is 3.75 m - 1.2 m, so that nobody crosses the middle of the road.
+    The room left in the lane is 3.75 m - 1.2 m, so no agent crosses the middle of the road.
     """
     result = played('blocked_lane')
     passing = _passing(result)
@@ -146,14 +146,14 @@ def test_agents_swerve_around_the_skip_with_the_stated_clearance() -> None:
         s, d = _along(result, poses)
         assert 0.6 < d.max() < 0.5 * (3.75 - 1.8)
         assert np.abs(d[(s < at - 100.0) | (s > at + 100.0)]).max() < 0.05
-    # The human takes more room: his left side is beyond the middle of the road.
+    # The human takes more room: the vehicle's left side is beyond the middle of the road.
     _, d = _along(result, result.states_of('hv0'))
     assert d.max() + 0.5 * 1.61 > 0.5 * 3.75 + 0.5
 
 
 @pytest.mark.exhaustive
 def test_agents_that_do_not_swerve_queue_behind_the_skip() -> None:
-    """Nobody passes; the first stands behind it, the others behind him."""
+    """No agent passes; the first stands behind the skip, the others behind the first."""
     result = play('blocked_lane', _no_swerve, without_human)
     assert _passing(result) == []
     poses, speed = agents(result)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The JSON Schema says what the reader says: own files fit, and what one refuses both do."""
+"""The JSON Schema and the reader agree: own files fit, and both refuse the same files."""
 
 from collections.abc import Iterator
 import copy
@@ -67,18 +67,18 @@ tasks:
   - {name: radio, secondary_task: {show: true}, when: {event: slow}, until: {step: 90}}
 language: de
 """
-# What compares values with each other, or looks beyond the file.
+# Checks that compare values with each other or use other files.
 NO_SCHEMA = ('is there already', 'is larger than "dt_max"', 'the same place', 'km long',
              'size and', '"speed" and "speeds"', 'one for each way-point', 'the last may be 0',
              'vanishes', 'changes nothing', 'has both', 'name two ids', 'the trajectory',
              'comes after', 'it moves by', 'is no row', 'is no number that')
-# A whole number with a point is one to JSON Schema, and none to the reader: there is none here.
+# JSON Schema takes 1.0 as an integer and the reader does not: no such value occurs here.
 VALUES: list[Any] = [None, True, 0, -1, 0.5, 7, 1e9 + 0.5, 'x', '', 'reactive', 'lanelet', [],
                      [1], [0, 1], {}, {'x': 1}]
 
 
 def validator(kind: str) -> Draft202012Validator:
-    """Make one that checks by the schema alone."""
+    """Make a validator that uses the schema alone."""
     schema = FILE_KINDS[kind].schema()
     Draft202012Validator.check_schema(schema)
     return Draft202012Validator(schema)
@@ -93,7 +93,7 @@ def test_own_files_fit_their_schema(kind: str) -> None:
 
 
 def test_written_files_fit_their_schema() -> None:
-    """What a run's folder holds, and a map that we have drawn, can be edited as well."""
+    """Files of a run's folder and of our own map fit too, as users may edit them."""
     validator('occupancy').validate(yaml.safe_load(map_text('map.pgm', 0.1, (0.0, 1.0))))
     found = validator('game')
     for path in GAMES:
@@ -101,7 +101,7 @@ def test_written_files_fit_their_schema() -> None:
 
 
 def places(value: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield every mapping and list inside of a value with each of its keys."""
+    """Yield every mapping and list inside a value with each of its keys."""
     items = value.items() if isinstance(value, dict) else enumerate(value) \
         if isinstance(value, list) else ()
     for key, inner in list(items):
@@ -110,7 +110,7 @@ def places(value: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def mutated(values: Any, luck: random.Random) -> Any:
-    """Change one place: another value, no value, or a key that is no key."""
+    """Change one place: another value, no value, or an unknown key."""
     changed = copy.deepcopy(values)
     holder, key = luck.choice(list(places(changed)))
     way = luck.randrange(4)
@@ -126,7 +126,7 @@ def mutated(values: Any, luck: random.Random) -> Any:
 
 @pytest.mark.slow
 def test_reader_and_schema_refuse_the_same() -> None:
-    """Of hundreds of games with one mistake each; both outcomes are common."""
+    """They agree on hundreds of games with one mistake each; both outcomes are common."""
     luck, found = random.Random(4), validator('game')
     sound = yaml.safe_load(WHOLE)
     found.validate(sound)
@@ -149,7 +149,7 @@ def test_reader_and_schema_refuse_the_same() -> None:
 
 
 def test_every_key_is_described() -> None:
-    """By its sentence in the docstring, which the tables of the documentation have too."""
+    """Each key has the sentence of its docstring, as in the documentation's tables."""
     for kind in FILE_KINDS:
         schema = FILE_KINDS[kind].schema()
         for name, part in {'': schema, **schema['$defs']}.items():
@@ -160,7 +160,7 @@ def test_every_key_is_described() -> None:
 
 
 def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """To standard output or into a file; a folder that is none is told in one line."""
+    """It writes to standard output or a file; a missing folder gives one line."""
     assert main(['schema']) == 0
     assert json.loads(capsys.readouterr().out) == FILE_KINDS['game'].schema()
     assert main(['schema', 'vehicle', '--out', str(tmp_path / 'v.json')]) == 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of keys in the documentation are those of the declarations."""
+"""The documentation's tables of keys agree with the declarations."""
 
 from pathlib import Path
 import subprocess

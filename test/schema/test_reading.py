@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading what anybody may have written, and writing it again, by declaration alone."""
+"""Reading arbitrary input, and writing it again, by declaration alone."""
 
 from dataclasses import dataclass, field, replace
 import math
@@ -86,7 +86,7 @@ def test_a_refusal_says_what_is_wrong_where_and_what_to_do(changes: dict[Any, An
 
 
 def nested(depth: int) -> Any:
-    """Nest lists, deeper than Python's own functions go."""
+    """Nest lists deeper than Python's recursion limit."""
     value: Any = 1
     for _ in range(depth):
         value = [value]
@@ -102,7 +102,7 @@ WILD = [nested(5000), {1: {2: 3}}, {None: None}, {True: 1}, 10**400, -10**400, m
 @pytest.mark.parametrize('kind', [Game, PerceptionSpec, TrafficSpec, EventList, Cart],
                          ids=['game', 'perception', 'traffic', 'events', 'cart'])
 def test_wild_values_are_refused_shortly_wherever_they_stand(kind: Any) -> None:
-    """As documents of other processes may hold them, which no reader of YAML has seen."""
+    """Such values come in other processes' documents, which no YAML reader has checked."""
     keys = ('scenario', 'title', 'humans', 'avs', 'duration', 'seed', 'timing', 'events',
             'objects', 'traffic', 'localisation', 'sensors', 'memory', 'recorded', 'agents',
             'wheels', 'from', 'manual', 'load', 'name', 'id', 'perception', 'tracker', 'dynamics')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Objects of a game in a run: how they move, and who minds whom."""
+"""Objects of a game in a run: their motion, and which ones react to which."""
 
 from collections.abc import Callable
 import math
@@ -27,7 +27,7 @@ DT = 0.1
 
 
 class Others(NamedTuple):
-    """What `advance` is given of everything else."""
+    """The arguments of `advance` for all other objects."""
 
     poses: Array
     velocities: Array
@@ -47,7 +47,7 @@ def cars(*rows: tuple[float, ...]) -> Others:
 
 
 def make(entries: Any, network: RoadNetwork | None = None, k0: int = 0) -> ScriptedObjects:
-    """Build objects of entries of a game file."""
+    """Make objects from entries of a game file."""
     return ScriptedObjects(read(ObjectList, entries, 'game.yaml: objects'), network, DT, k0,
                            'game.yaml: objects')
 
@@ -64,7 +64,7 @@ def drive(objects: ScriptedObjects, steps: int,
 
 
 def road(name: str) -> RoadNetwork:
-    """Load the roads of one of our scenarios."""
+    """Load the roads of one of the package's scenarios."""
     return RoadNetwork(load_scenario(scenarios_directory() / name).scenario.lanelet_network)
 
 
@@ -135,8 +135,8 @@ def test_bicycle_does_not_slip() -> None:
     """
     The rear axle moves along the heading only, and the steering stays within its limit.
 
-    The way through the car's way-points is compared with the states: the pose of the rear axle,
-    and the curvature that its heading and its way imply.
+    The path through the car's way-points is compared with the states: the pose of the rear axle,
+    and the curvature from its heading and distance.
     """
     car = MOVER_TYPES['car']
     path = [[0, 0], [15, 0], [25, 4], [30, 14], [30, 40]]
@@ -203,10 +203,10 @@ def test_predetermined_trajectory_is_kept_exactly() -> None:
 
 def test_pedestrian_waits_for_a_gap_and_then_walks() -> None:
     """
-    Cars 2.5 s apart pass first; he goes when the next one is at least 3 s away.
+    Cars 2.5 s apart pass first; the pedestrian goes when the next is at least 3 s away.
 
-    The accepted gap is checked where he enters the way of the cars: 0.9 m (half a car), 0.35 m
-    (himself) and 0.5 m (the distance kept) before the middle of the lane.
+    The accepted gap is checked where the pedestrian enters the way of the cars: 0.9 m (half a
+    car), 0.35 m (the pedestrian) and 0.5 m (the distance kept) before the middle of the lane.
     """
     entry = {'kind': 'particle', 'path': [[0, -6], [0, 6]]}
     starts = [-40.0, -65.0, -90.0, -150.0]
@@ -223,7 +223,7 @@ def test_pedestrian_waits_for_a_gap_and_then_walks() -> None:
     waited = poses[standing[:100].nonzero()[0], 0, 1]
     assert len(waited) > 20 and waited == pytest.approx(-1.75, abs=0.1)
     assert poses[-1, 0, 1] == pytest.approx(6.0, abs=0.05)
-    # The scripted one takes no notice: he is where he would be without cars.
+    # The scripted pedestrian does not react: its position is the one without cars.
     alone, _ = drive(make([entry]), 250)
     assert np.array_equal(poses[:, 1], alone[:, 0])
     assert clearance(poses[:, 0], stream) > 0.4 > 0.0 == clearance(poses[:, 1], stream)
@@ -245,7 +245,7 @@ def clearance(walk: Array, others: Callable[[float], Others], radius: float = 0.
 
 @pytest.mark.parametrize('headway', [3.0, 6.0])
 def test_accepted_gap_is_the_headway(headway: float) -> None:
-    """A car 5 s away is let pass by who wants 6 s, and not by who is content with 3 s."""
+    """A pedestrian with a gap of 6 s waits for a car 5 s away; one with 3 s does not."""
     def car(time_s: float) -> Others:
         return cars((-50.0 - 2.6 + 10.0 * time_s, 0.0, 0.0, 10.0))
 
@@ -256,7 +256,7 @@ def test_accepted_gap_is_the_headway(headway: float) -> None:
 
 
 def test_pedestrian_does_not_stop_in_the_way_of_another() -> None:
-    """Where the second lane is busy he waits before the first, not between the two."""
+    """If the second lane is busy, the pedestrian waits before the first, not between the two."""
     def lanes(time_s: float) -> Others:
         return cars((-75.0 + 10.0 * time_s, 0.0, 0.0, 10.0),
                     (45.0 - 8.0 * time_s, 2.2, math.pi, 8.0))
@@ -271,8 +271,8 @@ def test_pedestrian_does_not_stop_in_the_way_of_another() -> None:
     assert poses[-1, 0, 1] == pytest.approx(8.0, abs=0.05)
 
 
-def test_pedestrian_stops_for_who_enters_his_path() -> None:
-    """A car that stood beside the road and drives off in front of him makes him stop."""
+def test_pedestrian_stops_for_a_car_that_enters_its_path() -> None:
+    """The pedestrian stops for a car that stood beside the road and drives off ahead."""
     def car(time_s: float) -> Others:
         moving = max(time_s - 3.0, 0.0)
         return cars((-9.0 + 3.0 * moving, 0.0, 0.0, 3.0 if moving else 0.0))
@@ -287,7 +287,7 @@ def test_pedestrian_stops_for_who_enters_his_path() -> None:
 
 
 def test_pedestrian_does_not_walk_into_a_standing_car() -> None:
-    """He stops 0.5 m in front of it, and goes on once it is gone; the scripted one goes on."""
+    """It stops 0.5 m in front of the car until the car is gone; a scripted one goes on."""
     def car(time_s: float) -> Others:
         return cars((0.0 if time_s < 15.0 else 200.0, 0.0, 1.1, 0.0))
 
@@ -300,7 +300,7 @@ def test_pedestrian_does_not_walk_into_a_standing_car() -> None:
 
 
 def test_cyclist_keeps_its_distance_to_what_stands() -> None:
-    """A reactive one stops s0 = 1 m behind, within 5 cm; the scripted one rides through."""
+    """A reactive cyclist stops s0 = 1 m behind, within 5 cm; a scripted one rides through."""
     car = cars((40.0, 0.3, 0.2, 0.0))
     entry = {'kind': 'bicycle', 'path': [[0, 0], [80, 0]]}
     rear = 40.0 - 2.25 * math.cos(0.2) - 0.9 * math.sin(0.2)
@@ -352,7 +352,7 @@ def test_follower_brakes_as_idm_of_traffic_to_the_last_bit() -> None:
 
 
 def test_lane_follower_keeps_to_lane_and_limit() -> None:
-    """On the roundabout: the rear axle on the lane, 30 km/h, slower in the bends, then gone."""
+    """On the roundabout: rear axle on the lane, 30 km/h, slower in bends, absent at the end."""
     network = road('ZAM_Roundabout-1_1_T-1.xml')
     first = next(i for i in network.lanelet_ids if network.straightest_predecessor(i) is None)
     objects = make([{'kind': 'bicycle', 'type': 'car', 'lanelet': first, 's': 5.0, 'speed': 20.0}],
@@ -373,7 +373,7 @@ def test_lane_follower_keeps_to_lane_and_limit() -> None:
 
 
 def test_objects_mind_each_other() -> None:
-    """A reactive car stops for a scripted bin and follows a scripted car; order is no matter."""
+    """A reactive car stops for a scripted bin and follows a scripted car, in any order."""
     network = road('ZAM_CutIn-1_1_T-1.xml')
     lanelet = network.lanelet_ids[0]
     x, y, yaw = network.pose_on(lanelet, 70.0)
@@ -391,7 +391,7 @@ def test_objects_mind_each_other() -> None:
 
 
 def test_pedestrian_beside_a_parked_car_walks_away() -> None:
-    """Who begins nearer than he would come goes away or past it, but not into it."""
+    """A pedestrian that begins nearer than its distance walks away or past, not into the car."""
     car = cars((0.0, 0.0, 0.0, 0.0))
     poses, _ = drive(make([
         {'kind': 'particle', 'path': [[0, 1.4], [0, 6]], 'reactive': True},
@@ -436,7 +436,7 @@ def test_random_crossings_end_without_collision() -> None:
 
 
 def test_people_do_not_block_each_other() -> None:
-    """Two reactive pedestrians who meet pass, and one recorded person who walks is no vehicle."""
+    """Two reactive pedestrians that meet pass each other; a recorded walker is no vehicle."""
     def person(time_s: float) -> Others:
         return Others(np.array([[-4.0 + 1.3 * time_s, 0.1, 0.0]]), np.array([[1.3, 0.0, 0.0]]),
                       np.array([0.7]), np.array([0.7]))
@@ -448,7 +448,7 @@ def test_people_do_not_block_each_other() -> None:
 
 
 def test_same_inputs_give_the_same_bits() -> None:
-    """Whatever k0; absent others (NaN) are as if they were not given; states are read-only."""
+    """For any k0; absent others (NaN) have no effect; states are read-only."""
     entries = [{'kind': 'particle', 'path': [[0, -6], [1, 6]], 'reactive': True, 'start': 0.3},
                {'kind': 'bicycle', 'path': [[-20, 0], [20, 1]], 'reactive': True}]
 

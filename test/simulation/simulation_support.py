@@ -38,7 +38,7 @@ def setup_of(loaded: LoadedScenario, humans: Sequence[HumanSpec] = (), **fields:
 
 def moved(loaded: LoadedScenario, speed: float, shift: tuple[float, float] = (0.0, 0.0),
           turn: float = 0.0) -> LoadedScenario:
-    """Change the initial speed and pose of the first planning problem."""
+    """Return the scenario with another initial speed and pose in its first planning problem."""
     problems = list(copy.deepcopy(loaded.planning_problems))
     state = problems[0].initial_state
     state.velocity, state.orientation = speed, state.orientation + turn
@@ -80,7 +80,7 @@ def answer(request: JointSeries, av_id: str = 'av0', **course: Any) -> JointSeri
 
 
 class HandDriven:
-    """A simulation that a test steps itself, planning with `arc` where it says so."""
+    """A simulation that a test steps itself. AVs plan with `arc` where the test asks for it."""
 
     def __init__(self, setup: Setup) -> None:
         self.simulation = Simulation(setup)

@@ -68,7 +68,7 @@ def test_a_vehicle_is_driven_against_another(cut_in: LoadedScenario, contact: st
 
 
 def test_a_standing_vehicle_that_is_run_into_may_leave(cut_in: LoadedScenario) -> None:
-    """An AV that drives on by its plan is not stopped: it is over the standing vehicle."""
+    """A contact does not stop an AV that follows its plan: it drives over the standing one."""
     av = support.setup_of(cut_in).avs[0].state
     ahead = HumanSpec('hv0', 'idle', spawn=PoseSpawn(av.x + 12.0, av.y, av.yaw, 0.0))
     setup = setup_of(cut_in, (ahead,), 'stop')

@@ -52,7 +52,7 @@ def test_ends_where_the_human_first_violates(name: str, steps: int,
 
 
 def test_a_game_that_stops_is_checked_in_any_case(shared_scenarios: Path) -> None:
-    """Whoever saves the checks of a run doesn't change its end."""
+    """Without the drivability checks the run ends at the same step."""
     ended = run(shared_scenarios / 'USA_US101-4_1_T-1.xml', stop=True, check_drivability=False)
     assert ended.stop is not None and ended.stop.n == 55
 

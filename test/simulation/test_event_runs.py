@@ -138,7 +138,7 @@ def test_planner_is_replaced_in_the_run(game: Game, planner: str) -> None:
 
 
 def test_hidden_plan_changes_no_motion(game: Game) -> None:
-    """It is the cockpit's to hide; the run is told."""
+    """The cockpit hides the plan; the run only records the event."""
     hidden = play(game, (100, 'hide-plan'), duration_s=3.0)
     assert [event.name for event in hidden.fired] == ['hide-plan']
     assert hidden.state_hash == play(game, duration_s=3.0).state_hash

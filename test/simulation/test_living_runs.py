@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whole offline runs with objects of the game's own and agents, beside events and recordings."""
+"""Whole offline runs with the game's own objects and agents, beside events and recordings."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ def speeds(result: OfflineResult) -> NDArray[np.float64]:
 
 @pytest.mark.slow
 def test_agents_obey_the_speed_limit_of_an_event() -> None:
-    """After it they slow down to it, up to what drivers take liberties with; without it not."""
+    """After it agents slow down to the limit, within drivers' tolerance; without it they don't."""
     event = {'name': 'slow', 'speed_limit': {'speed': 8.0}, 'when': {'time': 2.0}}
     traffic = {'agents': 8, 'speed_spread': 0.0}
     limited = speeds(run_offline(living('cut_in', traffic=traffic, events=[event])))
@@ -42,7 +42,7 @@ def test_agents_obey_the_speed_limit_of_an_event() -> None:
 
 
 def test_recorded_vehicles_react_but_those_of_events() -> None:
-    """With `reactive` recorded cars become agents under their ids; an event's stays recorded."""
+    """With `reactive` recorded cars become agents with their ids; cars of events stay recorded."""
     event = {'name': 'stop', 'brake': {'object': 200, 'deceleration': 4.0}, 'when': {'time': 1.0}}
     recorded = {item.id: item.role for item in living('traffic').descriptions}
     cars = [name for name, role in recorded.items() if role is Role.RECORDED]
@@ -59,7 +59,7 @@ def test_recorded_vehicles_react_but_those_of_events() -> None:
 
 
 def test_agents_stop_behind_an_object_of_the_game() -> None:
-    """A skip across a single lane: whoever comes up to it stands behind it, short of touching."""
+    """A skip across a single lane: agents that reach it stand behind it without contact."""
     skip = {'id': 'skip', 'kind': 'static', 'at': [560.0, -1.75, 0.0], 'size': [3.0, 3.2]}
     setup = living('crossing', humans=[], objects=[skip], events=[],
                    traffic={'agents': 10, 'seed': 4})
@@ -67,14 +67,14 @@ def test_agents_stop_behind_an_object_of_the_game() -> None:
     poses = result.object_poses[-1, setup.agent_columns]
     behind = (np.abs(poses[:, 1] + 1.75) < 1.0) & (poses[:, 0] < 560.0) & (poses[:, 0] > 530.0)
     assert behind.any()
-    # The first one stands; whoever comes after it rolls up.
+    # The first agent stands; the agents after it roll up.
     assert speeds(result)[-1, behind][np.argmax(poses[behind, 0])] < 0.1
     front = poses[behind, 0].max() + 0.5 * 4.5
     assert 555.0 < front < 558.5
 
 
 def test_ids_of_objects_are_their_own() -> None:
-    """An id that a vehicle or an obstacle has already is refused with its name."""
+    """An id that a vehicle or an obstacle already has is refused with its name."""
     for name in ('hv0', 'av1', 'o200', 't3', 'e_stop'):
         with pytest.raises(InputError, match=f"objects.0.: \"id\" is '{name}'"):
             living('cut_in', objects=[{'id': name, 'kind': 'static', 'at': [0.0, 0.0, 0.0]}])
@@ -87,7 +87,7 @@ def test_a_map_that_is_not_there_is_refused() -> None:
 
 
 def test_the_written_game_has_objects_traffic_and_map() -> None:
-    """What a run writes beside its recording gives the same run."""
+    """The game that a run writes beside its recording gives the same run."""
     setup = living('blocked_lane')
     values = yaml.safe_load(dump_game(setup.game))
     again = build_setup(parse_game(values, 'written', scenarios_directory()))
@@ -98,7 +98,7 @@ def test_the_written_game_has_objects_traffic_and_map() -> None:
 
 def test_agents_drive_otherwise_by_an_event() -> None:
     """
-    One hurries, then all crawl; until each of both everything is as without it, to the last bit.
+    One hurries, then all crawl; until each event all is as without it, to the last bit.
 
     The run repeats, and again with the recorded events as conditions.
     """
@@ -127,7 +127,7 @@ def test_agents_drive_otherwise_by_an_event() -> None:
 
 
 def test_an_event_waits_for_its_agent() -> None:
-    """It is due from the start, and takes effect when the first arrival comes."""
+    """It is due from the start, and takes effect when the first agent arrives."""
     setup = living('cut_in', humans=[], avs=[], traffic={'flow': 600.0, 'capacity': 3}, events=[
         {'name': 'stop', 'traffic': {'agent': 't0', 'desired_speed': 1.0}, 'when': {'time': 0.0}}])
     result = run_offline(setup, duration_s=8.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Observers get what a live run publishes, and change nothing."""
+"""Observers get all that a live run publishes, and change nothing."""
 
 from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectStates
@@ -16,7 +16,7 @@ DURATION_S = 3.0
 
 
 class Notebook:
-    """Writes everything down."""
+    """An observer that records every call."""
 
     def __init__(self) -> None:
         self.steps: list[int] = []
@@ -43,7 +43,7 @@ def setup() -> Setup:
 
 
 def test_every_state_and_every_tick_is_seen(setup: Setup) -> None:
-    """In order, with objects at ticks alone; the run is the same as without anybody."""
+    """In order, with objects at ticks alone; the run is the same as without observers."""
     notebook = Notebook()
     result = run_offline(setup, duration_s=DURATION_S, observers=[notebook])
     count = len(result.vehicle_states)
@@ -57,7 +57,7 @@ def test_every_state_and_every_tick_is_seen(setup: Setup) -> None:
 
 
 def test_the_monitor_is_one_of_them(setup: Setup) -> None:
-    """Given by hand it reports what the run does."""
+    """As an explicit observer it reports the same as the run."""
     monitor = drivability_monitor(observed_run(setup))
     result = run_offline(setup, duration_s=DURATION_S, observers=[monitor])
     assert monitor.report() == result.violations != ()

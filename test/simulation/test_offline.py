@@ -26,7 +26,7 @@ from simulation_support import Array
 
 class IdealPlanner(Planner):
     """
-    Goes on from the request without any error.
+    A planner that continues from the request without any error.
 
     :param acceleration: held, when negative down to a stop [m/s^2]
     :param curvature: of the circle that it drives on [1/m]
@@ -39,7 +39,7 @@ class IdealPlanner(Planner):
         self._curvature = curvature
 
     def setup(self, context: PlannerContext) -> None:
-        """Need nothing."""
+        """Do nothing."""
 
     def plan(self, request: PlanRequest) -> Plan:
         """Continue for 4 s."""
@@ -54,7 +54,7 @@ COURSES = {
 
 
 class Weaving(DriverSource):
-    """Drives with commands that change at every cycle and are no float32 numbers."""
+    """A driver whose commands change at every cycle and are no float32 numbers."""
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
         """Return the command of cycle n."""
@@ -65,12 +65,12 @@ def ideal_setup(loaded: LoadedScenario, course: str, **timing: object) -> Setup:
     """Make a run of one AV that starts at 10 m/s behind the ideal planner."""
     return support.setup_of(support.moved(loaded, 10.0),
                             avs=support.av_of(IDEAL, options=COURSES[course]),
-                            # The circle leaves the road, and is not to be refused for that.
+                            # The circle leaves the road, which must not be a reason to refuse it.
                             drivability=DrivabilitySpec(road=False), **timing)
 
 
 def ways(result: OfflineResult) -> Array:
-    """Measure the way of each step along the heading, negative backwards [m]."""
+    """Return the distance of each step along the heading, negative backwards [m]."""
     states = result.states_of('av0')
     moves = np.diff(states[:, :2], axis=0)
     heading = np.stack((np.cos(states[:-1, 2]), np.sin(states[:-1, 2])), axis=1)
@@ -86,7 +86,7 @@ def test_av_covers_the_right_distance(cut_in: LoadedScenario, course: str, dista
     """
     In 20 s from 10 m/s within 1 % of v t + a t^2 / 2, without a backward step.
 
-    While braking the last request before the stop is answered late, which is allowed for too.
+    While braking, the last request before the stop is answered late; the bound allows for it.
     """
     result = run_offline(ideal_setup(cut_in, course), duration_s=20.0, latency_steps=latency,
                          check_drivability=False)
@@ -97,7 +97,7 @@ def test_av_covers_the_right_distance(cut_in: LoadedScenario, course: str, dista
     counters = result.planners['av0'].counters
     assert counters.refused == 0
     assert counters.steps_without_plan == 0
-    # No step is longer than the speed allows: nothing is made up for by jumps.
+    # No step is longer than the speed allows: no jump makes up for lost distance.
     assert steps.max() <= result.states_of('av0')[:, 3].max() * support.DT * 1.001
 
 
@@ -125,7 +125,7 @@ def test_latency_skips_the_ticks_in_between(cut_in: LoadedScenario) -> None:
     """
     An answer 12 steps late leaves the planner busy at every second tick.
 
-    One that comes with the next tick comes after that tick has decided, too.
+    An answer at the next tick also comes after that tick's decision.
     """
     for latency, asked in ((0, 101), (9, 101), (10, 51), (12, 51), (19, 51), (25, 34)):
         result = run_offline(ideal_setup(cut_in, 'constant'), duration_s=10.0,
@@ -147,7 +147,7 @@ def test_equal_inputs_give_equal_states() -> None:
 
 
 def test_hash_tells_any_difference(cut_in: LoadedScenario) -> None:
-    """One command that differs by a float32 rounding step, in one cycle."""
+    """One command differs by a float32 rounding step, in one cycle."""
     setup = support.setup_of(cut_in, [support.BESIDE], avs=())
     commands = np.zeros((100, 4))
     commands[:, 0] = 0.5
@@ -231,7 +231,7 @@ def test_driver_that_needs_a_person_is_refused(cut_in: LoadedScenario, driver: s
 
 @pytest.mark.parametrize('duration', [0.0, -1.0, math.nan])
 def test_duration_must_be_positive(cut_in: LoadedScenario, duration: float) -> None:
-    """Neither empty runs nor endless ones."""
+    """Empty and endless runs are refused."""
     with pytest.raises(InputError, match='duration'):
         run_offline(support.setup_of(cut_in, [support.BESIDE], avs=()), duration_s=duration)
 
@@ -240,9 +240,9 @@ def test_an_av_put_on_its_lane_drives_where_its_planner_believes(cut_in: LoadedS
     """
     Declared 1.5 m to the left of the lane that the simulator puts it on (CRG 6-10 and 28).
 
-    Its planner leads it to the middle of the lane, so that in the coordinates that all share it
-    is 1.5 m to the right, with its wheels off the road; in the planner's it is not, nor is it by
-    CRG 28. In these coordinates both spawns are one drive.
+    Its planner leads it to the middle of the lane. In the shared coordinates it is then 1.5 m to
+    the right, with its wheels off the road. In the planner's coordinates, and by CRG 28, it is on
+    the road. In these coordinates both spawns give the same drive.
     """
     declared = support.moved(cut_in, 15.0, (0.0, 1.5))
     runs = {spawn: run_offline(support.setup_of(declared, avs=(

@@ -54,7 +54,7 @@ def test_same_seed_same_bits() -> None:
 
 @pytest.mark.slow
 def test_wrong_poses_do_not_make_the_car_jump() -> None:
-    """Plans start where the AV believes to be, a metre off; it drives on from where it is."""
+    """Plans start at the AV's estimated pose, a metre off; it drives on from its true pose."""
     setup = perceiving('parked_cars', NOISY)
     result = run_offline(setup)
     counters = result.planners['av0'].counters
@@ -64,7 +64,7 @@ def test_wrong_poses_do_not_make_the_car_jump() -> None:
     states = result.states_of('av0')
     fastest = np.maximum(states[1:, StateColumn.SPEED], states[:-1, StateColumn.SPEED])
     assert (moved(result) - 0.01 * fastest).max() < 0.02
-    # It believed wrong things: the run is another one than with the truth.
+    # Its estimates were wrong: the run differs from the one with the truth.
     assert result.state_hash != run_offline(perceiving('parked_cars', None)).state_hash
 
 
@@ -115,7 +115,7 @@ def perceived(setup: Setup) -> tuple[Simulation, JointSeries, JointSeries]:
 
 
 def test_a_plan_may_come_before_the_perceived_request() -> None:
-    """Over DDS the engine can hear of the answer first: it waits for what was asked."""
+    """Over DDS the engine can receive the answer first: it waits for the perceived request."""
     setup = perceiving('cut_in', NOISY)
     simulation, true, told = perceived(setup)
     assert not np.array_equal(true.positions[0, :3], told.positions[0, :3])
@@ -131,7 +131,7 @@ def test_a_plan_may_come_before_the_perceived_request() -> None:
 
 
 def test_an_answer_is_dropped_whose_perceived_request_was_never_heard() -> None:
-    """A restarted perception may be discovered by the planner before the engine: no refusal."""
+    """The planner may discover a restarted perception before the engine: no refusal."""
     setup = perceiving('cut_in', NOISY)
     simulation, _, told = perceived(setup)
     av = simulation.avs[0]
@@ -146,7 +146,7 @@ def test_an_answer_is_dropped_whose_perceived_request_was_never_heard() -> None:
     assert av.counters.accepted == 0
 
 
-def test_nobody_follows_a_plan_for_a_request_that_was_never_perceived() -> None:
+def test_no_av_follows_a_plan_for_a_request_that_was_never_perceived() -> None:
     """Without perception's answer the AV brakes, as without a planner."""
     simulation, true, told = perceived(perceiving('cut_in', NOISY))
     for _ in range(100):

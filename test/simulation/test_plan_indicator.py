@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What AVs indicate: on made plans, on published maps, and in runs."""
+"""Indicators of AVs: on made plans, on published maps, and in runs."""
 
 from pathlib import Path
 
@@ -31,18 +31,18 @@ def read(path: Path) -> tuple[RoadNetwork, PlanIndicator]:
 
 
 def own(name: str) -> tuple[RoadNetwork, PlanIndicator]:
-    """Read one of our maps."""
+    """Read one of the package's maps."""
     return read(scenarios_directory() / f'{name}.xml')
 
 
 def planned(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Make poses of a plan of the points that it passes, 0.1 s apart."""
+    """Make poses of a plan from the points that it passes, 0.1 s apart."""
     step = np.gradient(points, axis=0)
     return np.column_stack((points, np.arctan2(step[:, 1], step[:, 0])))
 
 
 def along(roads: RoadNetwork, before: int, way: int) -> NDArray[np.float64]:
-    """Plan to drive in 5 s from 20 m before the end of a lanelet up to the end of the next one."""
+    """Make a 5 s plan from 20 m before the end of a lanelet up to the end of the next one."""
     points = np.concatenate([from_end(roads.line(before).points, 20.0), roads.line(way).points])
     points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-6)]
     s = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
@@ -59,7 +59,7 @@ def from_end(points: NDArray[np.float64], length: float) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize('side', [Light.LEFT, Light.RIGHT])
 def test_lane_change_is_shown_up_to_the_middle_of_the_new_lane(side: Light) -> None:
-    """A plan of 5 s to the lane beside, then plans from further and further on the same way."""
+    """A plan of 5 s to the lane beside, then plans from ever later points of the same path."""
     roads, indicator = own('ZAM_Traffic-1_1_T-1')
     beside_of = RoadNetwork.left_of if side is Light.LEFT else RoadNetwork.right_of
     lane, beside = next((lane, beside) for lane in roads.lanelet_ids
@@ -76,12 +76,12 @@ def test_lane_change_is_shown_up_to_the_middle_of_the_new_lane(side: Light) -> N
         shown.append((aside, indicator.shown))
     assert {bits for aside, bits in shown if 0.5 < aside < abs(across) - 0.01} == {side}
     assert shown[-1][1] == 0 and shown[-1][0] < 0.1
-    # To stay in a lane, though not in its middle, is no change.
+    # A plan that stays in a lane, but not in its middle, is no change.
     indicator.update(planned(roads.line(lane).poses(s[:51], np.sin(s[:51] / 4.0))[:, :2])[::5])
     assert indicator.shown == 0
 
 
-def test_who_leaves_a_roundabout_indicates_and_who_goes_round_does_not() -> None:
+def test_a_vehicle_leaving_a_roundabout_indicates_and_one_going_round_does_not() -> None:
     """Right-hand traffic: to the right, whichever way the exit bends."""
     roads, indicator = own('ZAM_Roundabout-1_1_T-1')
     ring = {lanelet for lanelet in roads.lanelet_ids if comes_round(roads, lanelet)}
@@ -98,7 +98,7 @@ def test_who_leaves_a_roundabout_indicates_and_who_goes_round_does_not() -> None
 
 
 def comes_round(roads: RoadNetwork, lanelet: int) -> bool:
-    """Return whether one may drive from a lanelet over others back to it."""
+    """Return whether a lanelet leads over others back to itself."""
     reached, left = {lanelet}, [lanelet]
     while left:
         for following in roads.successors(left.pop()):
@@ -112,7 +112,7 @@ def comes_round(roads: RoadNetwork, lanelet: int) -> bool:
 
 @pytest.mark.exhaustive
 def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> None:
-    """Intersections name what leads to the left, to the right, and straight on."""
+    """Intersections name the ways to the left, to the right, and straight on."""
     wrong, count = [], 0
     for path in sorted(shared_scenarios.rglob('*.xml')):
         if '<planningProblem' not in path.read_text():
@@ -126,7 +126,7 @@ def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> Non
                     for before, way in ((lane, way) for lane in incoming.incoming_lanelets
                                         for way in ways & {*roads.successors(lane)}):
                         bend = np.degrees(np.ptp(roads.line(way).heading[[0, -1]]))
-                        # Some call straight on what bends by 90 degrees, or left what does not.
+                        # Some name a bend of 90 degrees straight on, or a straight way left.
                         if bend > 45.0 if light else bend < 15.0:
                             indicator.forget()
                             indicator.update(along(roads, before, way)[::5])
@@ -139,7 +139,7 @@ def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> Non
 
 @pytest.mark.slow
 def test_run_shows_records_and_exports_it(tmp_path: Path) -> None:
-    """The AV leaves the roundabout at the end of its game: from its plan into the file."""
+    """The AV leaves the roundabout at the end of its game: the indicator gets into the file."""
     result = drive('roundabout', 20.0)
     assert np.isnan(result.av_commands[:, 0, [0, 1, 2, 3, 5]]).all()
     lights = result.av_commands[:, 0, 4]
@@ -157,6 +157,6 @@ def test_run_shows_records_and_exports_it(tmp_path: Path) -> None:
 
 
 def drive(name: str, duration_s: float) -> OfflineResult:
-    """Drive one of our games."""
+    """Drive one of the package's games."""
     return run_offline(build_setup(load_game(scenarios_directory() / f'{name}.yaml')),
                        duration_s=duration_s)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""When plans are looked at for indicators in runs, and when what they said is forgotten."""
+"""When a run checks plans for indicators, and when it drops the result."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -38,7 +38,7 @@ def change_lanes(run: HandDriven, duration_s: float) -> None:
 
 
 def lights(run: HandDriven, steps: int, **course: Any) -> list[int]:
-    """Go on without plans; give what the AV indicates at each step."""
+    """Go on without plans; return the AV's indicator at each step."""
     shown = []
     for _ in range(steps):
         run.drive(1, plans=False, **course)
@@ -48,7 +48,7 @@ def lights(run: HandDriven, steps: int, **course: Any) -> list[int]:
 
 def test_a_plan_that_goes_on_is_looked_at_from_where_the_vehicle_is(
         cut_in: LoadedScenario) -> None:
-    """The planner is silent, and half a second after the change nothing is shown any more."""
+    """The planner is silent; half a second after the change the indicator is off."""
     run = HandDriven(support.setup_of(cut_in))
     change_lanes(run, 8.0)
     shown = lights(run, 700)
@@ -67,14 +67,14 @@ def test_a_plan_that_is_used_up_says_nothing(cut_in: LoadedScenario) -> None:
     assert used_up <= 251 and run.simulation.avs[0].uses_no_plan
 
 
-def test_what_was_planned_while_somebody_drove_is_not_shown_when_given_back(
+def test_a_plan_from_a_take_over_is_not_shown_after_the_give_back(
         cut_in: LoadedScenario) -> None:
-    """It begins elsewhere. A planner that is silent is asked again after 1 s, and that counts."""
+    """The plan begins elsewhere. A silent planner is asked again after 1 s; that plan counts."""
     run = HandDriven(support.setup_of(cut_in))
     for _ in range(6):
         change_lanes(run, 8.0)
         assert set(lights(run, 10, commands=lambda n: [DriverCommand()])) == {0}
-    # The one that has come in the meantime was asked for while somebody drove.
+    # The plan that has come in the meantime was requested while a person drove.
     change_lanes(run, 8.0)
     run.drive(5, plans=False, commands=lambda n: [DriverCommand()])
     follows: dict[str, Any] = {'commands': lambda n: [None]}
@@ -88,7 +88,7 @@ def test_what_was_planned_while_somebody_drove_is_not_shown_when_given_back(
 def test_avs_are_looked_at_one_by_one_each_half_second(
         two_avs: LoadedScenario, monkeypatch: pytest.MonkeyPatch, time_step_s: float,
         rate_hz: float, count: int) -> None:
-    """Whatever a tick lasts; and never in a step in which requests are made, if others are."""
+    """For any length of a tick; not in steps that make requests, if there are other steps."""
     setup = support.setup_of(two_avs)
     scheduler = ScenarioScheduler.from_rate(time_step_s, rate_hz)
     setup = replace(setup, scheduler=scheduler, avs=(setup.avs * 5)[:count])

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a planner is told of the others' future, in each of the three modes (CRG III-A1c)."""
+"""The others' future in plan requests, in each of the three modes (CRG III-A1c)."""
 
 import copy
 from dataclasses import replace
@@ -29,7 +29,7 @@ def test_human_is_predicted_at_constant_speed_and_steering(cut_in: LoadedScenari
     """
     On the circle of its present steering angle (KS without inputs), over 3 s.
 
-    Its throttle is down and its wheel is turning: nobody's future is known.
+    Its throttle is down and its wheel is turning: the future of no vehicle is known.
     """
     run = HandDriven(support.setup_of(cut_in, [HUMAN]))
     run.drive(40, commands=lambda n: [DriverCommand(0.5, 0.0, 0.4)])
@@ -49,7 +49,7 @@ def test_human_is_predicted_at_constant_speed_and_steering(cut_in: LoadedScenari
 
 
 def test_other_av_is_predicted_like_a_human_by_default(two_avs: LoadedScenario) -> None:
-    """Its plan accelerates; its peer is told constant speed."""
+    """Its plan accelerates; the other AV's request has constant speed."""
     run = HandDriven(support.setup_of(two_avs))
     run.drive(20, acceleration=1.5)
     first = run.simulation.avs[0].state
@@ -72,12 +72,12 @@ def test_plans_mode_tells_the_other_avs_plan(two_avs: LoadedScenario) -> None:
     np.testing.assert_allclose(speed[:15], plan.states[1:16, 3], atol=1e-9)
     assert speed[14] - speed[0] == pytest.approx(1.5 * 1.4)
     np.testing.assert_allclose(speed[15:], run.simulation.avs[0].state.speed)
-    # Its own plan an AV is not told.
+    # The request has no plan of the AV's own.
     assert np.isnan(columns_of(request, 'av1', request.positions)[1:]).all()
 
 
 def braking_later(loaded: LoadedScenario, k: int) -> LoadedScenario:
-    """Let every recorded vehicle, which all drive along x, brake at 4 m/s^2 from step k on."""
+    """Make all recorded vehicles, which drive along x, brake at 4 m/s^2 from step k on."""
     scenario = copy.deepcopy(loaded.scenario)
     for obstacle in scenario.dynamic_obstacles:
         for state in obstacle.prediction.trajectory.state_list:
@@ -109,7 +109,7 @@ def test_recorded_mode_tells_the_true_future(traffic: LoadedScenario) -> None:
 
 
 def test_constant_mode_does_not_look_ahead(traffic: LoadedScenario) -> None:
-    """Change the future of every recorded car: the request at k stays bit for bit the same."""
+    """With another future of every recorded car the request at k stays the same, bit for bit."""
     request = HandDriven(support.setup_of(traffic)).result.requests['av0']
     # Velocities lead to the next pose, so the next one is known; nothing after it.
     other = HandDriven(support.setup_of(braking_later(traffic, 1)))
@@ -128,7 +128,7 @@ def test_horizon(cut_in: LoadedScenario, horizon: float, points: int) -> None:
     assert request.positions.shape == (points, 8)
 
 
-def test_absent_objects_are_left_out_and_nobody_else_is(traffic: LoadedScenario) -> None:
+def test_only_absent_objects_are_left_out(traffic: LoadedScenario) -> None:
     """After its last recorded state an obstacle has no joints."""
     setup = support.setup_of(traffic, [HUMAN])
     run = HandDriven(setup)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""After a contact a person's vehicle is put back on its lane, where the driver asks for it."""
+"""After a contact a person's vehicle is put back on its lane if the driver asks for it."""
 
 from collections.abc import Sequence
 import math
@@ -41,7 +41,7 @@ COMES = HumanSpec('hv0', 'idle', spawn=PoseSpawn(-90.0, 0.0, 0.0, 10.0))
 
 def setup_of(loaded: LoadedScenario, humans: Sequence[HumanSpec] = (COMES, STANDS),
              contact: str = 'stop') -> Setup:
-    """Make a run with what a contact does."""
+    """Make a run with the given effect of a contact."""
     return support.setup_of(loaded, humans, drivability=DrivabilitySpec(contact=contact))
 
 
@@ -54,7 +54,7 @@ def crashed(setup: Setup) -> HandDriven:
 
 
 def put_back(run: HandDriven) -> VehicleState:
-    """Let the first driver ask, and give where the vehicle is then."""
+    """Ask as the first driver, and return the vehicle's state after that."""
     run.drive(1, commands=lambda n: [BACK, IDLE])
     return run.simulation.states[0]
 
@@ -95,7 +95,7 @@ def test_nothing_happens_without_a_contact_twice_or_elsewhere(cut_in: LoadedScen
     assert not through.simulation.fired
 
 
-def test_who_has_driven_on_is_not_put_back(cut_in: LoadedScenario) -> None:
+def test_a_vehicle_that_has_driven_on_is_not_put_back(cut_in: LoadedScenario) -> None:
     run = crashed(setup_of(cut_in))
     backwards = DriverCommand(throttle=1.0, reverse=True)
     start = run.simulation.states[0]
@@ -105,8 +105,8 @@ def test_who_has_driven_on_is_not_put_back(cut_in: LoadedScenario) -> None:
     assert [event.by for event in run.simulation.fired] == ['contact']
 
 
-def test_a_place_is_passed_over_where_somebody_is(cut_in: LoadedScenario) -> None:
-    """A third one stands beside where the vehicle would be put."""
+def test_a_place_is_passed_over_where_another_vehicle_is(cut_in: LoadedScenario) -> None:
+    """A third vehicle stands beside the place where the vehicle would be put."""
     free = put_back(crashed(setup_of(cut_in)))
     alongside = HumanSpec('hv2', 'idle', spawn=PoseSpawn(free.x - 1.0, free.y + 2.0, 0.0, 0.0))
     run = crashed(setup_of(cut_in, (COMES, STANDS, alongside)))
@@ -119,8 +119,8 @@ def test_a_place_is_passed_over_where_somebody_is(cut_in: LoadedScenario) -> Non
             footprint(run.simulation.setup, other, run.simulation.states[other])) >= 0.5
 
 
-def test_a_place_is_passed_over_where_somebody_comes(cut_in: LoadedScenario) -> None:
-    """An AV at 14 m/s, 20 m behind the place, is there within two seconds."""
+def test_a_place_is_passed_over_where_another_vehicle_comes(cut_in: LoadedScenario) -> None:
+    """An AV at 14 m/s, 20 m behind the place, reaches it within two seconds."""
     run = crashed(setup_of(cut_in))
     setup, states = run.simulation.setup, list(run.simulation.states)
     places = PutBack(setup)
@@ -177,7 +177,7 @@ def test_the_same_commands_lead_to_the_same_states(cut_in: LoadedScenario) -> No
 
 
 def test_the_contact_is_named_once_with_the_speed_before_it(cut_in: LoadedScenario) -> None:
-    """No verdict tells of it: it overlaps nobody; braking in time would have avoided it."""
+    """No verdict has it, because there is no overlap; braking in time would have avoided it."""
     result = run_with_put_back(cut_in)
     event = next(item for item in result.fired if item.touching == ('hv0', 'hv1'))
     (contact,) = contacts_of(result)
@@ -188,7 +188,7 @@ def test_the_contact_is_named_once_with_the_speed_before_it(cut_in: LoadedScenar
 
 
 def test_the_jump_is_no_change_of_lane(cut_in: LoadedScenario) -> None:
-    """Where the vehicle was moved to a neighbouring lane, it has come to that anew."""
+    """A vehicle moved to a neighbouring lane counts as newly on that lane."""
     record = run_record_of(run_with_put_back(cut_in))
     (row,) = record.jumps(0)
     states = record.log.vehicle_states[:, 0].copy()

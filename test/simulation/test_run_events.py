@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Events in the engine: triggers and conditions, once each, at ticks, seen by everybody."""
+"""Events in the engine: triggers and conditions, once each, at ticks, visible to all."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -35,7 +35,7 @@ def street() -> LoadedScenario:
 
 
 def events_of(*entries: dict[str, Any]) -> tuple[EventSpec, ...]:
-    """Read events as a game file gives them."""
+    """Read events as a game file has them."""
     return read(EventList, list(entries), 'events')
 
 
@@ -109,7 +109,7 @@ def test_put_object_is_announced_and_absent_until_then(street: LoadedScenario) -
 
 
 def test_leader_brakes_for_everybody(street: LoadedScenario) -> None:
-    """From 12.5 m/s at 4 m/s^2 it stands after 3.1 s, 19.5 m on, and is predicted to stand."""
+    """From 12.5 m/s at 4 m/s^2 it stands after 3.1 s and 19.5 m, and is predicted to stand."""
     run = HandDriven(setup_of(street, BRAKE))
     run.drive(10)
     run.simulation.trigger('brake')
@@ -139,7 +139,7 @@ def test_leader_brakes_for_everybody(street: LoadedScenario) -> None:
 ], ids=['time', 'step', 'vehicle', 'object', 'human-object', 'av-human'])
 def test_conditions(street: LoadedScenario, when: dict[str, Any],
                     holds: Callable[[int, float, float, float], bool]) -> None:
-    """Fires at the first tick at which it holds; vehicles count by their centres."""
+    """A condition fires at the first tick at which it holds; vehicles count by their centres."""
     setup = setup_of(street, CONE | {'when': when})
     run = HandDriven(setup)
     offset = setup.humans[0].vehicle.rear_to_center
@@ -159,7 +159,7 @@ def test_conditions(street: LoadedScenario, when: dict[str, Any],
 
 def test_absent_objects_hold_no_condition_and_brake_when_they_come(
         street: LoadedScenario) -> None:
-    """The cone is nowhere before it is put; the leader is gone after 30 s."""
+    """The cone is absent before it is put; the leader is absent after 30 s."""
     run = HandDriven(setup_of(
         street, CONE, BRAKE,
         {'name': 'late', 'plan_display': {'av': 'av0', 'show': False},
@@ -174,7 +174,7 @@ def test_absent_objects_hold_no_condition_and_brake_when_they_come(
 
 
 def test_events_of_one_tick_act_in_the_order_of_the_game(street: LoadedScenario) -> None:
-    """Whatever the order of the triggers; of two that release one object only the first acts."""
+    """In any order of the triggers; of two that release one object only the first acts."""
     run = HandDriven(setup_of(street, CONE, RELEASE, RELEASE | {'name': 'again'}))
     for name in ('again', 'walk', 'cone'):
         assert run.simulation.trigger(name) is None
@@ -184,7 +184,7 @@ def test_events_of_one_tick_act_in_the_order_of_the_game(street: LoadedScenario)
 
 
 def test_stopped_planner_is_asked_for_nothing(street: LoadedScenario) -> None:
-    """The AV follows its last plan of 4 s, then brakes; let go, it is asked again."""
+    """The AV follows its last plan of 4 s, then brakes; after the stop ends it is asked again."""
     run = HandDriven(setup_of(
         street, {'name': 'stop', 'planner_run': {'av': 'av0', 'run': False},
                  'when': {'time': 1.0}},
@@ -225,15 +225,15 @@ def test_a_game_without_events_pays_nothing(street: LoadedScenario) -> None:
      'no vehicle or object "hv3"; there is hv0, av0, o200, o201'),
     (RELEASE | {'when': {'between': ['hv0', 'o5'], 'distance': 1}}, '"o5"'),
 ], ids=range(8))
-def test_events_about_nobody_are_refused(street: LoadedScenario, entry: dict[str, Any],
-                                         message: str) -> None:
-    """At setup, with what there is instead."""
+def test_events_about_unknown_objects_are_refused(street: LoadedScenario, entry: dict[str, Any],
+                                                  message: str) -> None:
+    """At setup, with a list of the known names."""
     with pytest.raises(InputError, match=message):
         setup_of(street, entry)
 
 
 def test_refusal_lists_no_more_than_a_dozen() -> None:
-    """A motorway of 30 lanelets and more is not recited."""
+    """The message does not list all of a motorway's 30 lanelets and more."""
     game = load_game(scenarios_directory() / 'parked_cars.yaml')
     game = replace(game, events=events_of(
         {'name': 'a', 'plan_display': {'av': 'av0', 'show': True},
@@ -243,14 +243,14 @@ def test_refusal_lists_no_more_than_a_dozen() -> None:
 
 
 def test_external_planner_stays(street: LoadedScenario) -> None:
-    """An event cannot replace a process that is not ours."""
+    """An event cannot replace an external process."""
     with pytest.raises(InputError, match='av0 has an external planner'):
         setup_of(street, {'name': 'a', 'planner': {'av': 'av0', 'planner': 'idm'}},
                  avs=(AvSpec('av0', 'external'),))
 
 
 def test_documents_round_trip(street: LoadedScenario) -> None:
-    """`/scenario/game` carries the events, `/scenario/events` what has fired."""
+    """`/scenario/game` carries the events, `/scenario/events` those that have fired."""
     setup = setup_of(street, RELEASE, CONE | {'when': {'time': 1.0}})
     text = game_document(setup, epoch=3, clock_offset_ns=5, real_time_factor=1.0)
     assert parse_game_document(text).events == setup.game.events
@@ -262,6 +262,6 @@ def test_documents_round_trip(street: LoadedScenario) -> None:
 @pytest.mark.parametrize('text', ['', '7', '{}', '{"epoch": 1}', '{"epoch": 1, "fired": [7]}',
                                   '{"epoch": "x", "fired": []}'], ids=range(6))
 def test_spoilt_list_of_events_is_refused(text: str) -> None:
-    """One error that names the topic."""
+    """It raises one error that names the topic."""
     with pytest.raises(InputError, match='/scenario/events: is no list of events'):
         parse_events_document(text)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks of a run: when stimuli and requests come, what answers them, and what lasts."""
+"""Tasks of a run: onsets of stimuli and requests, answers, and durations."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -60,7 +60,7 @@ def setup_of(street: LoadedScenario, *tasks: dict[str, Any], events: tuple[Any, 
 
 
 class Course:
-    """A run that is advanced by hand, with what has happened in its tasks."""
+    """A run that a test advances by hand, with a log of its tasks."""
 
     def __init__(self, setup: Setup) -> None:
         self.simulation = Simulation(setup)
@@ -83,7 +83,7 @@ class Course:
         return found[0]
 
     def answer(self, number: int, response_ms: float | None, *, seen: bool = True) -> None:
-        """Let the page show a stimulus, and its driver answer."""
+        """Report as the page that a stimulus is shown, and answer as its driver."""
         if seen:
             self.simulation.report_task(TaskReport('hv0', 'light', number, 'shown'))
         assert self.simulation.report_task(TaskReport(
@@ -91,7 +91,7 @@ class Course:
         self.to(self.simulation.n + 1)
 
     def told(self) -> Iterator[tuple[str, int, str]]:
-        """Return what has happened, without times."""
+        """Return the log, without times."""
         return ((entry.what, entry.number, entry.by) for entry in self.entries)
 
 
@@ -114,7 +114,7 @@ def test_onsets_are_uniform_between_the_two_times_and_never_outside(
 
 
 def test_the_first_onsets_of_a_seed_are_the_same_everywhere(street: LoadedScenario) -> None:
-    """Written down once: another machine, process or version of ours gives these too."""
+    """The fixed values hold on every machine, in every process and version."""
     scheduler = setup_of(street).scheduler
 
     def first(name: str, seed: int) -> list[int]:
@@ -130,7 +130,7 @@ def test_the_first_onsets_of_a_seed_are_the_same_everywhere(street: LoadedScenar
 
 
 def test_what_drivers_do_changes_no_onset(street: LoadedScenario) -> None:
-    """Answers end stimuli, and nothing else."""
+    """Answers only end stimuli."""
     setup = setup_of(street, LIGHT)
     idle, busy = Course(setup), Course(setup)
     for number in (1, 2, 3):
@@ -142,12 +142,12 @@ def test_what_drivers_do_changes_no_onset(street: LoadedScenario) -> None:
 
 
 def test_answers_by_their_times(street: LoadedScenario) -> None:
-    """From 100 to 2500 ms is a hit, earlier premature, later or a second one unrequested."""
+    """From 100 to 2500 ms is a hit, earlier is premature, later or a second one unrequested."""
     course = Course(setup_of(street, LIGHT))
     for number, response_ms in enumerate((99.9, 100.0, 2500.0), 1):
         course.to_stimulus(number)
         course.answer(number, response_ms)
-    course.answer(3, 400.0)  # Once more: it is answered already.
+    course.answer(3, 400.0)  # A second answer: the stimulus has its answer already.
     course.answer(0, None)
     course.to_stimulus(4)
     course.answer(4, 2500.1)
@@ -162,7 +162,7 @@ def test_answers_by_their_times(street: LoadedScenario) -> None:
 
 
 def test_reports_of_others_and_floods_are_refused(street: LoadedScenario) -> None:
-    """Of another seat, another task, and more than a person can give in a second."""
+    """From another seat, of another task, and more than a person can give in a second."""
     course = Course(setup_of(street, LIGHT))
     for seat, task in (('av0', 'light'), ('hv0', 'none')):
         reason = course.simulation.report_task(TaskReport(seat, task, 1, 'answer'))
@@ -171,7 +171,7 @@ def test_reports_of_others_and_floods_are_refused(street: LoadedScenario) -> Non
              for _ in range(100)]
     assert taken.count(None) == 20
     course.to(2)
-    # One a step at most is kept.
+    # At most one a step is kept.
     assert [what for what, _, _ in course.told()].count('unrequested') == 1
     assert 'no tasks' in str(Course(setup_of(street)).simulation.report_task(
         TaskReport('hv0', 'light', 1, 'answer')))
@@ -188,7 +188,7 @@ def test_a_request_comes_the_lead_before_the_time_of_its_event(street: LoadedSce
 
 def test_a_request_triggers_an_event_without_a_time_its_lead_later(
         street: LoadedScenario) -> None:
-    """Asked for by button at 1 s, the event at 3 s; while it is shown there is no second one."""
+    """The button at 1 s gives the event at 3 s; while the request is shown there is no second."""
     course = Course(setup_of(street, CALL, events=(SLOW,))).to(95)
     assert course.simulation.trigger('call') is None
     course.to(150)
@@ -199,7 +199,7 @@ def test_a_request_triggers_an_event_without_a_time_its_lead_later(
         ('slow', 300, 'trigger')]
 
 
-def test_a_request_ends_when_somebody_drives_the_av(street: LoadedScenario) -> None:
+def test_a_request_ends_when_a_person_drives_the_av(street: LoadedScenario) -> None:
     """At the step at which the AV obeys a command instead of its plan."""
     course = Course(setup_of(street, {'name': 'call', 'take_over': {}, 'seat': 'av0',
                                       'when': {'time': 0.5}})).to(80)
@@ -211,7 +211,7 @@ def test_a_request_ends_when_somebody_drives_the_av(street: LoadedScenario) -> N
 
 def test_a_secondary_task_begins_with_an_event_and_ends_by_its_condition(
         street: LoadedScenario) -> None:
-    """The button begins it anew; a condition that held then already does not end it again."""
+    """The button restarts it; a condition that already held at that time does not end it again."""
     course = Course(setup_of(
         street, {'name': 'radio', 'secondary_task': {}, 'when': {'event': 'slow'},
                  'until': {'time': 4.0}}, events=({**SLOW, 'when': {'time': 1.0}},))).to(395)
@@ -227,7 +227,7 @@ def test_a_secondary_task_begins_with_an_event_and_ends_by_its_condition(
 
 
 def test_a_stimulus_that_the_end_of_its_task_cuts_off_is_no_miss(street: LoadedScenario) -> None:
-    """It was not there for as long as others."""
+    """It was visible for less time than others."""
     course = Course(setup_of(street, LIGHT))
     course.to_stimulus(1)
     course.simulation.trigger('light')
@@ -246,7 +246,7 @@ def test_a_stimulus_that_the_end_of_its_task_cuts_off_is_no_miss(street: LoadedS
 def test_what_does_not_fit_the_game_is_refused(
         street: LoadedScenario, task: dict[str, Any], events: tuple[Any, ...],
         part: str) -> None:
-    """Naming the task."""
+    """The message names the task."""
     with pytest.raises(InputError) as refusal:
         setup_of(street, task, events=events)
     assert part in str(refusal.value) and f'task {task["name"]}' in str(refusal.value)
@@ -258,13 +258,13 @@ def test_what_does_not_fit_the_game_is_refused(
     ({'earliest': 2.6}, 'not before "latest"')])
 def test_times_that_contradict_each_other_are_refused(
         detection: dict[str, Any], part: str) -> None:
-    """In one line."""
+    """The message has one line."""
     with pytest.raises(InputError, match=part):
         read(TaskList, [{'name': 'light', 'detection_response': detection}], 'tasks')
 
 
 def test_the_documents_say_the_tasks(street: LoadedScenario) -> None:
-    """In the game file and in the game document, where the seat is named."""
+    """The game file and the game document have them; the document names the seat."""
     setup = setup_of(street, LIGHT, {**CALL, 'seat': 'av0', 'label': 'Baustelle'},
                      events=(SLOW,), language='de')
     again = parse_game(yaml.safe_load(dump_game(setup.game)), 'game', setup.game.base)
@@ -275,12 +275,12 @@ def test_the_documents_say_the_tasks(street: LoadedScenario) -> None:
     assert document.tasks[1] == setup.game.tasks[1] and document.language == 'de'
     old = json.loads(game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
     del old['tasks'], old['language']
-    # Recordings of before know nothing of tasks.
+    # Older recordings have no tasks.
     assert parse_game_document(json.dumps(old)).tasks == ()
 
 
 def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenario) -> None:
-    """And nothing else: anybody may publish."""
+    """All others are refused, because any publisher may write to the topic."""
     course = Course(setup_of(street, LIGHT))
     course.to_stimulus(1)
     course.answer(1, 250.5)
@@ -304,7 +304,7 @@ def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenar
 
 
 def test_an_offline_run_has_the_same_stimuli(street: LoadedScenario) -> None:
-    """As one that is advanced step by step."""
+    """The same as a run that is advanced step by step."""
     setup = setup_of(street, LIGHT)
     result = run_offline(replace(setup), duration_s=12.0)
     course = Course(setup).to(1200)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs one after the other in a process share what was read, and never see each other."""
+"""Successive runs in a process share what was read, and do not affect each other."""
 
 from dataclasses import replace
 from typing import ClassVar
@@ -18,12 +18,12 @@ DURATION_S = 1.0
 
 
 class WreckingPlanner(IdmPlanner):
-    """Drives as `idm` does, and tears up the scenario that it was given."""
+    """A planner that drives as `idm` does, and destroys the scenario that it was given."""
 
     name: ClassVar[str] = 'wrecking'
 
     def setup(self, context: PlannerContext) -> None:
-        """Leave nothing of the map where it was."""
+        """Move every part of the map."""
         super().setup(context)
         network = context.scenario.lanelet_network
         for lanelet in list(network.lanelets):
@@ -42,7 +42,7 @@ def _run(name: str, planner: str = 'idm') -> OfflineResult:
 
 
 def test_a_run_is_the_same_whatever_ran_before_it() -> None:
-    """Other roads, and the same ones torn up by a planner, in between."""
+    """Runs in between have other roads, and the same roads destroyed by a planner."""
     first = _run('cut_in.yaml')
     other = _run('merge.yaml')
     wrecked = _run('cut_in.yaml', f'{__file__}:WreckingPlanner')
@@ -55,7 +55,7 @@ def test_a_run_is_the_same_whatever_ran_before_it() -> None:
 
 
 def test_a_check_of_the_road_knows_nothing_of_other_runs() -> None:
-    """Tiles that others have prepared elsewhere are not used, however near they are."""
+    """It does not use tiles that other runs have prepared elsewhere, however near they are."""
     setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
     network = setup.loaded.scenario.lanelet_network
     elsewhere, here = RoadBoundary(network), RoadBoundary(network)

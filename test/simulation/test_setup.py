@@ -32,16 +32,16 @@ def test_av_starts_at_its_planning_problem(cut_in: LoadedScenario) -> None:
 
 
 def test_every_planning_problem_becomes_an_av(two_avs: LoadedScenario) -> None:
-    """Without a list of AVs, in the order of the file, with the default planner."""
+    """Without a list of AVs: in the order of the file, with the default planner."""
     setup = support.setup_of(two_avs)
     assert [(av.id, av.planning_problem.planning_problem_id, av.spec.planner)
             for av in setup.avs] == [('av0', 100, 'idm'), ('av1', 101, 'idm')]
-    # What was found is written down.
+    # The setup records the AVs it has found.
     assert [av.spec.planning_problem for av in setup.avs] == [100, 101]
 
 
 def test_unnamed_problem_is_the_next_free_one(two_avs: LoadedScenario) -> None:
-    """An AV that names its problem takes it away from the others."""
+    """A problem that one AV names is not free for the others."""
     setup = support.setup_of(two_avs, avs=(AvSpec('av0'), AvSpec('av1', planning_problem=100)))
     assert [av.planning_problem.planning_problem_id for av in setup.avs] == [101, 100]
 
@@ -53,14 +53,14 @@ def test_unnamed_problem_is_the_next_free_one(two_avs: LoadedScenario) -> None:
      'av1: planning problem 100 has an AV already')])
 def test_bad_planning_problem_is_refused(two_avs: LoadedScenario, avs: tuple[AvSpec, ...],
                                          named: str) -> None:
-    """The message names the scenario, the AV and what there is."""
+    """The message names the scenario, the AV and the problems there are."""
     with pytest.raises(InputError, match=named) as caught:
         support.setup_of(two_avs, avs=avs)
     assert Path(two_avs.source).name in str(caught.value)
 
 
 def test_lanelet_spawn_aligns_both_references(cut_in: LoadedScenario) -> None:
-    """CRG 6-8: the simulator's pose is on the lane, the transform maps it on the declared one."""
+    """CRG 6-8: the simulator's pose is on the lane, the transform maps it to the declared one."""
     declared = support.moved(cut_in, 10.0, (0.0, -0.6), -0.1)
     av = support.setup_of(declared, avs=(AvSpec('av0', spawn='lanelet'),)).avs[0]
     target = support.setup_of(declared).avs[0].state
@@ -85,7 +85,7 @@ def test_a_large_discrepancy_is_told(cut_in: LoadedScenario, shift: float, turn:
 
 
 def test_the_recording_of_an_av_is_known_wherever_it_starts(traffic: LoadedScenario) -> None:
-    """It stands where the problem is declared, 1.5 m beside the lane that the AV is put on."""
+    """It begins at the declared pose, 1.5 m beside the lane on which the AV is put."""
     declared = support.moved(traffic, 10.0, (0.0, 1.5))
     declared = replace(declared, scenario=copy.deepcopy(declared.scenario))
     problem = declared.planning_problems[0].initial_state
@@ -100,7 +100,7 @@ def test_the_recording_of_an_av_is_known_wherever_it_starts(traffic: LoadedScena
 
 
 def test_human_starts_where_the_game_says(cut_in: LoadedScenario) -> None:
-    """A pose as it stands; a lanelet by way along it and offset to its left."""
+    """A pose as given; a lanelet by arc length along it and offset to its left."""
     humans = [HumanSpec('hv0', 'idle', spawn=PoseSpawn(3.0, 4.0, 0.5, 6.0)),
               HumanSpec('hv1', 'idle', spawn=LaneletSpawn(13, 234.0, 0.5, 26.0))]
     setup = support.setup_of(cut_in, humans)
@@ -134,14 +134,14 @@ def test_step_of_the_run_divides_the_scenarios(cut_in: LoadedScenario) -> None:
     assert support.setup_of(cut_in, rate=30.0).scheduler.steps_per_tick == 3
 
 
-def test_run_without_anybody_is_refused(cut_in: LoadedScenario) -> None:
+def test_run_without_any_vehicle_is_refused(cut_in: LoadedScenario) -> None:
     """No human, no planning problem, no traffic, no obstacle: nothing would move."""
     with pytest.raises(InputError, match='the game is empty'):
         support.setup_of(replace(cut_in, planning_problems=()))
 
 
 def test_timeline_is_read_beside_the_game() -> None:
-    """A scripted driver's file is found from anywhere; its text is kept."""
+    """A scripted driver's file is found from any directory; its text is kept."""
     setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
     assert setup.humans[0].driver == 'keys:cut_in.keys.yaml'
     assert 'throttle' in setup.humans[0].timeline
@@ -152,7 +152,7 @@ def test_timeline_is_read_beside_the_game() -> None:
 
 
 def test_unknown_driver_is_refused(cut_in: LoadedScenario) -> None:
-    """The message lists the forms."""
+    """The message lists the possible forms."""
     with pytest.raises(InputError, match='no driver source .telepathy.*keys:FILE'):
         support.setup_of(cut_in, [HumanSpec('hv0', 'telepathy', spawn=support.BESIDE.spawn)])
 

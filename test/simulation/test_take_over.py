@@ -19,7 +19,7 @@ GAS_LEFT = DriverCommand(throttle=0.6, steering=0.05).rounded()
 
 
 def test_taken_over_an_av_moves_as_a_human_vehicle(cut_in: LoadedScenario) -> None:
-    """From the state that the plan had led to: the same commands on a bare vehicle, same bits."""
+    """From the state reached by the plan, the commands give the bits of a bare vehicle."""
     run = HandDriven(support.setup_of(cut_in))
     run.drive(37)
     av = run.simulation.avs[0]
@@ -32,7 +32,7 @@ def test_taken_over_an_av_moves_as_a_human_vehicle(cut_in: LoadedScenario) -> No
 
 
 def test_the_planner_goes_on_while_a_person_drives(cut_in: LoadedScenario) -> None:
-    """Requests start from where the person is, so that a plan is there at the give-back."""
+    """Requests start at the vehicle's state, so that there is a plan at the give-back."""
     run = HandDriven(support.setup_of(cut_in))
     run.drive(20)
     accepted = run.simulation.avs[0].counters.accepted
@@ -95,12 +95,12 @@ def test_recorded_take_over_is_repeated_offline(cut_in: LoadedScenario) -> None:
     taken, planned = first.states_of('av0'), alone.states_of('av0')
     assert np.array_equal(taken[:81], planned[:81])
     assert taken[200, 3] < planned[200, 3] - 2.0
-    # A planner of constant velocity keeps what the person left it with.
+    # A planner of constant velocity keeps the speed at the give-back.
     assert np.allclose(taken[220:, 3], taken[200, 3], atol=0.1)
 
 
 def test_stopped_planner_is_asked_nothing(cut_in: LoadedScenario) -> None:
-    """The AV follows its last plan to its end and brakes; asked again, it recovers."""
+    """The AV follows its last plan to its end and brakes; asked again, the planner recovers."""
     run = HandDriven(support.setup_of(cut_in))
     run.drive(20)
     run.simulation.set_planner_running('av0', False)

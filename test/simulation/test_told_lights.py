@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Planners that ask for it are told of others' indicators and horn; requests of others stay."""
+"""Requests hold others' indicators and horn only for planners that ask for them."""
 
 import importlib.util
 from pathlib import Path
@@ -58,7 +58,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def game(planner: str, events: Any = (), **av: Any) -> Setup:
-    """Put an AV in front of a human."""
+    """Make a game of an AV and an idle human."""
     values = yaml.safe_load((scenarios_directory() / 'cut_in.yaml').read_text())
     values['humans'][0]['driver'] = 'idle'
     values['events'] = list(events)
@@ -67,7 +67,7 @@ def game(planner: str, events: Any = (), **av: Any) -> Setup:
 
 
 class Indicating:
-    """A driver who touches nothing but the lever, from 1 s on."""
+    """A driver that only moves the lever, from 1 s on."""
 
     def __init__(self, lights: int) -> None:
         self._lights = lights
@@ -76,7 +76,7 @@ class Indicating:
         return DriverCommand(lights=self._lights if n >= 100 else 0)
 
     def see(self, n: int, states: Any, objects: Any) -> None:
-        """Look at nothing."""
+        """Ignore the observation."""
 
 
 def driven(setup: Setup, lights: int) -> OfflineResult:
@@ -84,7 +84,7 @@ def driven(setup: Setup, lights: int) -> OfflineResult:
 
 
 def first_request(setup: Setup, lights: int) -> tuple[Simulation, StepResult]:
-    """Step to the first tick at which the human shows something; the AV is asked at it."""
+    """Step to the first tick at which the human's lights are on; it has a request to the AV."""
     simulation = Simulation(setup)
     simulation.begin()
     result = None
@@ -100,7 +100,7 @@ def told(setup: Setup, request: JointSeries, simulation: Simulation) -> dict[str
 
 
 def test_a_planner_that_asks_reacts_to_an_indicator(file: Path) -> None:
-    """It brakes at 2 m/s^2 from the first plan after 1 s on; not for the right, nor untold."""
+    """It brakes at 2 m/s^2 from the first plan after 1 s on; not for the right, or uninformed."""
     speeds = {
         (name, lights): driven(game(f'{file}:{name}', **av), lights).states_of('av0')[
             :, StateColumn.SPEED]
@@ -115,7 +115,7 @@ def test_a_planner_that_asks_reacts_to_an_indicator(file: Path) -> None:
 
 
 def test_the_game_may_say_otherwise(file: Path) -> None:
-    """In both directions; written out, the game says the same again."""
+    """In both directions; the written game has the same setting."""
     untold = game(f'{file}:Courteous', lights=False)
     assert np.ptp(driven(untold, HAZARD).states_of('av0')[:, StateColumn.SPEED]) < 1e-9
     setup = game('external', lights=True)
@@ -134,14 +134,14 @@ def test_a_planner_that_an_event_brings_in_is_told(file: Path) -> None:
 
 
 def test_all_else_of_a_request_stays_as_it_is() -> None:
-    """To the bit, and the light's joint stands last: who asks for nothing gets nothing more."""
+    """To the bit; the light's joint is last, and absent for planners that do not ask for it."""
     plain, lit = (first_request(game('idm', **av), HAZARD)[1].requests['av0']
                   for av in ({}, {'lights': True}))
     assert lit.names == (*plain.names, 'hv0/lights')
     for name in ('positions', 'velocities', 'accelerations'):
         before, after = getattr(plain, name), getattr(lit, name)
         assert np.ascontiguousarray(after[:, :-1]).tobytes() == before.tobytes()
-    # Nobody's future lights are known.
+    # The future lights of no vehicle are known.
     assert lit.positions[0, -1] == HAZARD and np.isnan(lit.positions[1:, -1]).all()
     hashes = {driven(game('idm', **av), bits).state_hash
               for av, bits in (({}, HAZARD), ({}, 0), ({'lights': True}, HAZARD))}
@@ -149,7 +149,7 @@ def test_all_else_of_a_request_stays_as_it_is() -> None:
 
 
 def test_only_lights_of_vehicles_in_view_are_told() -> None:
-    """Of one that is out of sight, or remembered only, nothing is known."""
+    """The lights of a vehicle that is out of sight, or only remembered, are unknown."""
     found = {}
     for name, perception in (('seen', ALL_ROUND), ('unseen', SHORT),
                              ('all', {'localisation': {}, 'sensors': []})):
@@ -168,7 +168,7 @@ def test_only_lights_of_vehicles_in_view_are_told() -> None:
         assert request.names[-1] == 'hv0/lights'
         found[name] = told(setup, request, simulation)
         if name == 'seen':
-            # It drives off beyond the horizon: remembered for a second, its lights at once not.
+            # It drives beyond the horizon: it is remembered for a second, its lights not at all.
             states = published_states(simulation.states)
             states[0, 0] += 1000.0
             for n in range(101, 121):
@@ -182,10 +182,10 @@ def test_only_lights_of_vehicles_in_view_are_told() -> None:
 
 
 def test_no_planner_of_ours_asks_for_lights() -> None:
-    """So that the simulation need not import them to know."""
+    """So the simulation need not import them to find out."""
     for target in {*BUILT_IN.values(), 'crgame_ros.policy.planner:PolicyPlanner'}:
         spec = importlib.util.find_spec(target.partition(':')[0])
         assert spec is not None and spec.origin is not None
-        # Read, not imported: some need packages that are not everywhere.
+        # Read, not imported: some need packages that are not installed everywhere.
         assert 'wants_lights' not in Path(spec.origin).read_text(encoding='utf-8')
     assert not planner_class('idm').wants_lights

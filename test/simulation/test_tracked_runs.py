@@ -31,7 +31,7 @@ BIAS = 0.4
 
 
 def tracked(name: str, **changes: Any) -> Setup:
-    """Load a game and change what its AV is like."""
+    """Load a game and change settings of its AV."""
     values = yaml.safe_load((scenarios_directory() / f'{name}.yaml').read_text())
     values['avs'][0].update({'execution': 'tracked'} | changes)
     return build_setup(parse_game(values, name, scenarios_directory()))
@@ -46,7 +46,7 @@ def errors_to(truth: OfflineResult, other: OfflineResult) -> NDArray[np.float64]
 
 @pytest.fixture(scope='module')
 def perfect() -> OfflineResult:
-    """Run the winding street with an AV that is where its plans have it."""
+    """Run the winding street with an AV that follows its plans exactly."""
     return run_offline(tracked('parked_cars', execution='perfect'))
 
 
@@ -65,7 +65,7 @@ def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
     assert driven > 60.0
     assert errors_to(result, perfect).max() < 0.2
     assert [item for item in result.violations if not item.is_valid] == []
-    # It is no perfect execution: the model's lags show.
+    # The execution is not perfect: the model's lags are visible.
     assert result.state_hash != perfect.state_hash
 
 
@@ -75,11 +75,11 @@ def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
 def test_an_av_far_off_its_path_says_so(name: str, metres: float,
                                         shared_scenarios: Path) -> None:
     """
-    With G_s = 0.5 it turns half as much as its tracker believes: metres off in a turn.
+    With G_s = 0.5 it turns half as much as its tracker assumes: metres off in a turn.
 
-    Its newest plan, which begins where it is ten times a second, is never more than 10 cm away.
-    The plan of a second ago and, above all, the lane tell. Plans that leave the road are taken
-    here: else it would brake before it is far off.
+    Its newest plan begins at its pose ten times a second, and is never more than 10 cm away.
+    The plan of a second ago and, above all, the lane show the error. Plans that leave the road
+    are accepted here; otherwise it would brake before it is far off.
     """
     game = Game(shared_scenarios / f'{name}.xml', humans=(),
                 drivability=DrivabilitySpec(road=False))
@@ -93,14 +93,14 @@ def test_an_av_far_off_its_path_says_so(name: str, metres: float,
     assert away > metres
     assert slipping.lane_error == pytest.approx(away, abs=0.4)
     assert slipping.tracking is not None and slipping.tracking.lateral > 0.6
-    # One that does what its tracker believes is near its path, and says that too.
+    # A vehicle that moves as its tracker assumes is near its path, and reports that.
     assert errors_to(runs[1], runs[0]).max() < 0.4
     assert faithful.lane_error is not None and faithful.lane_error < 0.4
     assert faithful.tracking is not None and faithful.tracking.lateral < 0.3
 
 
 def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
-    """Before the change, after it and on the way between: never half a lane away from both."""
+    """Before, during and after the change the AV is never half a lane away from both."""
     setup = tracked('cut_in')
     roads, av = setup.network, setup.avs[0]
     lane, _ = start_lanelet(roads, *av.state[:3])
@@ -122,7 +122,7 @@ def test_the_lane_is_either_of_a_route_that_changes_lanes() -> None:
 
 @pytest.mark.slow
 def test_same_inputs_same_bits() -> None:
-    """Tracker and model hold nothing that a second run would find."""
+    """Tracker and model keep no state that a second run would find."""
     setup = tracked('cut_in')
     assert run_offline(setup).state_hash == run_offline(setup).state_hash
 
@@ -148,7 +148,7 @@ def test_yaw_rate_follows_the_slip() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('pose', ['true', 'estimated'])
 def test_a_biased_estimate_puts_the_car_beside_the_lane(pose: str) -> None:
-    """Its planner believes to be in the middle of the lane: the car is beside it by the bias."""
+    """Its planner assumes the middle of the lane: the car is beside it by the bias."""
     perception = {'localisation': {
         'position_noise': 0.001, 'yaw_noise': 1e-4, 'speed_noise': 1e-3,
         'position_bias': [0.0, BIAS]}, 'sensors': []}
@@ -165,7 +165,7 @@ def test_a_biased_estimate_puts_the_car_beside_the_lane(pose: str) -> None:
 
 
 def test_estimated_pose_needs_an_estimate() -> None:
-    """Nothing estimates the pose of an AV without localisation."""
+    """An AV without localisation has no estimated pose."""
     for perception in (None, {'localisation': None}):
         with pytest.raises(InputError, match='av0: tracker: "pose" is estimated, but nothing'):
             tracked('cut_in', tracker={'name': 'lqr', 'pose': 'estimated'},
@@ -177,11 +177,11 @@ class Hands(DriverSource):
 
     @property
     def finished(self) -> bool:
-        """Never let go for good."""
+        """Return False: the person stays until the end."""
         return False
 
     def drives(self, n: int) -> bool:
-        """Hold the wheel from 2 s to 4 s."""
+        """Return whether the person drives: from 2 s to 4 s."""
         return 200 <= n < 400
 
     def command(self, n: int, dt_s: float) -> DriverCommand:
@@ -190,7 +190,7 @@ class Hands(DriverSource):
 
 
 def test_a_person_takes_over_and_gives_back() -> None:
-    """Without a jump at either moment, and the controller drives on from where it was left."""
+    """There is no jump at either moment; the controller drives on from the person's last state."""
     result = run_offline(tracked('cut_in'), drivers={'av0': Hands()}, duration_s=8.0)
     states = result.states_of('av0')
     moved = np.hypot(*np.diff(states[:, :2], axis=0).T)
@@ -221,20 +221,20 @@ def test_the_human_can_have_lags_too() -> None:
     ({'tracker': {'pose': 'guessed'}}, '"pose" is \'guessed\'.*true, estimated'),
 ], ids=['tracker', 'option', 'value', 'execution', 'pose'])
 def test_wrong_models_are_refused(changes: dict[str, Any], message: str) -> None:
-    """In one line that says what there is."""
+    """The message has one line that lists the models there are."""
     with pytest.raises(InputError, match=message):
         tracked('cut_in', **changes)
 
 
 @pytest.fixture(scope='module')
 def everything() -> Iterator[Setup]:
-    """Load a game that says everything about its AV."""
+    """Load a game that sets everything about its AV."""
     yield tracked('cut_in', tracker={'name': 'pure-pursuit', 'pose': 'estimated'},
                   dynamics={'name': 'dynamic-bicycle', 'slip': 0.9}, perception={})
 
 
 def test_the_written_game_is_the_same(everything: Setup) -> None:
-    """What a run writes beside its recording reads back as the same AV."""
+    """The game that a run writes beside its recording reads back as the same AV."""
     game = everything.game
     written = parse_game(yaml.safe_load(dump_game(game)), 'written', scenarios_directory())
     assert game.avs is not None and written.avs is not None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Offline runs in which nobody drives."""
+"""Offline runs without humans and AVs."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ DURATION_S = 6.0
 
 
 def alone(scenario: Path, seed: int = 0) -> OfflineResult:
-    """Let the recorded vehicles and 20 more drive."""
+    """Run the recorded vehicles and 20 more."""
     game = Game(scenario, humans=(), avs=(), seed=seed,
                 traffic=TrafficSpec(recorded='reactive', agents=20))
     return run_offline(build_setup(game), duration_s=DURATION_S)
@@ -26,16 +26,16 @@ def alone(scenario: Path, seed: int = 0) -> OfflineResult:
 @pytest.mark.slow
 def test_traffic_runs_alone(shared_scenarios: Path, tmp_path: Path) -> None:
     """
-    Agents drive over a real junction by themselves; the hash tells one run from another.
+    Agents alone drive over a real junction; the hashes of different runs differ.
 
-    The run is written, with the scenario's own problem, for the schema asks for one.
+    The written run has the scenario's own problem, because the schema requires one.
     """
     scenario = shared_scenarios / 'USA_Lanker-1_3_T-1.xml'
     result = alone(scenario)
     agents = result.setup.agent_columns
     assert result.setup.vehicle_ids == () and len(agents) > 20
     way = np.diff(result.object_poses[:, agents, :2], axis=0)
-    # On green some go at least 20 of the 80 m that 6 s at 13 m/s are.
+    # On green some drive at least 20 m of the 80 m that 6 s at 13 m/s give.
     assert np.nanmax(np.nansum(np.hypot(way[..., 0], way[..., 1]), axis=0)) > 20.0
     exported = write_scenario(trajectories_of(result), tmp_path)
     written = load_scenario(tmp_path / f'{exported.benchmark_id}.xml')

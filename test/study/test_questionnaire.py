@@ -62,7 +62,7 @@ def test_simulator_sickness() -> None:
 
 
 def test_acceptance() -> None:
-    """Van der Laan et al. 1997: five items are usefulness, four satisfaction; three are turned."""
+    """Van der Laan et al. 1997: five items of usefulness, four of satisfaction; three reversed."""
     scale = load_questionnaire('van_der_laan')
     names = [question.name for question in scale.questions]
     best = {name: 5 if name in ('good', 'likeable', 'desirable') else 1 for name in names}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of /timing/cycle: filled, taken, read again."""
+"""The rows of /timing/cycle: filled, taken and read back."""
 
 from crgame_ros.errors import InputError
 from crgame_ros.timing.cycle_rows import CycleRows, CycleTable, TIMING_COLUMNS
@@ -50,7 +50,7 @@ def test_commands_keep_their_bits() -> None:
 
 
 def test_an_av_that_follows_its_plan_has_no_command() -> None:
-    """It is NaN in its five columns; the command of whoever takes it over otherwise."""
+    """Its five columns are NaN, or the command of the driver that takes it over."""
     rows = CycleRows(('hv0', 'av0'), 2)
     rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT, None))
     rows.add(0, 1, SECOND, 0.0, 0.0, (LEFT, BACK))
@@ -61,7 +61,7 @@ def test_an_av_that_follows_its_plan_has_no_command() -> None:
 
 @pytest.mark.parametrize('without', [('/put_back',), ('/lights', '/put_back')])
 def test_rows_of_earlier_versions_have_no_switches(without: tuple[str, ...]) -> None:
-    """They had four or five columns; the rest was off, and who did not drive stays NaN."""
+    """They had four or five columns; the rest was off, and undriven vehicles stay NaN."""
     rows = CycleRows(('hv0', 'av0'), 2)
     rows.add(0, 1, FIRST, 0.0, 0.0, (LEFT._replace(lights=3), None))
     table = CycleTable.from_message(','.join(rows.columns), rows.taken())
@@ -81,7 +81,7 @@ def test_rows_for_the_metrics() -> None:
 
 
 def test_taking_empties_the_buffer() -> None:
-    """The buffer is used again, and what was taken stays as it was."""
+    """The buffer is used again, and rows that were taken are unchanged."""
     rows = filled()
     assert not rows.full
     rows.add(4, 13, FIRST, 0.0, 0.0, (LEFT, BACK))

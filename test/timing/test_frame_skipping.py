@@ -11,7 +11,7 @@ SPEC = TimingSpec(skip_threshold=0.02)
 
 
 def orders(lags: list[float], spec: TimingSpec = SPEC) -> tuple[list[bool], FrameSkipping]:
-    """Feed a lag every 0.1 s; give the order in force after each."""
+    """Feed a lag every 0.1 s; return the order in force after each."""
     skipping = FrameSkipping(spec)
     active = []
     for index, lag in enumerate(lags):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The split of a late step: what counts as what, and that everything adds up to its lateness."""
+"""The split of a late step: its causes, and that they add up to its lateness."""
 
 from crgame_ros.timing.cycle_rows import CycleRows, CycleTable, LATE_COLUMNS
 from crgame_ros.timing.late_step import (
@@ -39,7 +39,7 @@ USUAL = (use(Phase.INPUTS, 0.25, 0.25), use(Phase.STEP, 1.0, 1.0), use(Phase.PUB
 
 def test_each_kind_of_time_has_its_name() -> None:
     """
-    2 ms of usual work, then something of 20 ms: it is 12 ms late, all by that something.
+    After 2 ms of usual work and a cause of 20 ms a step is 12 ms late, all by that cause.
 
     The step has time for its own work of 2 ms and for 8 ms of the rest.
     """
@@ -60,7 +60,7 @@ def test_each_kind_of_time_has_its_name() -> None:
 
 
 def test_a_wait_counts_from_the_time_at_which_it_should_have_ended() -> None:
-    """Overslept by 3 ms: what the run queue took of it, and a timer that came late."""
+    """A wait is 3 ms too long: a part by the run queue, and a part by a late timer."""
     overslept = use(Phase.WAIT, 3.0, 0.1, 2.0)
     assert split(*USUAL, overslept, late_ms=3.0) == pytest.approx(
         Causes(processor=2.0, host=1.0))
@@ -72,7 +72,7 @@ def test_a_wait_counts_from_the_time_at_which_it_should_have_ended() -> None:
 
 
 def test_what_the_kernel_does_not_tell_stays_unexplained() -> None:
-    """Without run delays nobody knows why a thread did not run; its computing is known."""
+    """Without run delays the cause of a waiting thread is unknown; its computing is known."""
     found = split(use(Phase.STEP, 20.0, 14.0, None), use(Phase.WAIT, 0.0, 0.1, None),
                   late_ms=10.0)
     assert found == pytest.approx(Causes(work=4.0 + 6.0))
@@ -81,7 +81,7 @@ def test_what_the_kernel_does_not_tell_stays_unexplained() -> None:
 
 
 def test_the_phase_that_took_longest() -> None:
-    """A wait counts for what it went on too long."""
+    """A wait counts only with its excess time."""
     assert longest_phase((*USUAL, use(Phase.WAIT, 0.1, 0.1))) is Phase.STEP
     assert longest_phase((*USUAL, use(Phase.WAIT, 1.1, 0.1))) is Phase.WAIT
 
@@ -126,7 +126,7 @@ def test_late_steps_are_told_with_their_causes() -> None:
 
 
 def test_only_the_worst_are_kept() -> None:
-    """However long a run, those of the greatest lateness."""
+    """For any length of a run they are those of the greatest lateness."""
     late = LateSteps()
     late.add_table(rows_of({n: (0.001 * (1 + n * 7 % 50), NO_CAUSES, Phase.STEP)
                             for n in range(1, 51)}, 50))
@@ -135,7 +135,7 @@ def test_only_the_worst_are_kept() -> None:
 
 
 def test_recordings_of_earlier_versions_do_not_tell() -> None:
-    """Without the columns there is nothing; numbers that are none cost their row."""
+    """Without the columns there is nothing; bad numbers cost their row."""
     table = rows_of({3: (0.010, Causes(work=0.010), Phase.STEP)}, 5)
     kept = [i for i, name in enumerate(table.columns) if name not in LATE_COLUMNS]
     before = LateSteps()

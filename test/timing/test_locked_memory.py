@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the loop's process asks for its memory, against what the kernel says of it."""
+"""Memory settings of the loop's process, against the kernel's report."""
 
 import subprocess
 import sys
@@ -21,6 +21,6 @@ def _said(program: str) -> list[str]:
 
 
 def test_memory_is_locked_where_the_system_allows_it() -> None:
-    """What is told is what the kernel has done, with the privilege or without it."""
+    """The report agrees with the kernel, with the privilege or without it."""
     given, locked = _said(LOCKED)
     assert given == locked

@@ -113,7 +113,7 @@ def test_states_between_plan_states_are_interpolated() -> None:
 
 
 def test_plan_ends_at_its_last_state() -> None:
-    """40 states reach to step 390; there is nothing to follow beyond, nor without a plan."""
+    """40 states reach to step 390; after it, or without a plan, there is nothing to follow."""
     tracker = ProgressTracker(N)
     assert tracker.sample(5) is None
     start = VehicleState(0.0, 0.0, 0.0, SPEED)

@@ -76,7 +76,7 @@ def test_step_and_cumulative_errors() -> None:
 
 
 def test_stall_is_caught_up() -> None:
-    """After 50 ms nothing is waited for until the schedule is met again: 1 ms of work a cycle."""
+    """After 50 ms the loop does not wait until it is on schedule: 1 ms of work a cycle."""
     cycles = busy_loop(started(), lambda n: 60 * MS if n == 100 else MS, 200)
     errors = np.array([cycle.cumulative_error_s for cycle in cycles])
     assert errors[100] == pytest.approx(0.05)
@@ -120,7 +120,7 @@ def test_shortest_interval_while_catching_up() -> None:
 
 
 def test_dropped_clip_loses_the_stall() -> None:
-    """As printed (CRG 13) what the clip cuts off is gone: 150 of 200 ms."""
+    """As printed (CRG 13) the clipped time is lost: 150 of 200 ms."""
     effective = stall_intervals(replace(SPEC, clip='drop'), 200)
     assert effective.max() == SPEC.dt_max
     assert effective.sum() == pytest.approx(400 * DT - 0.15, abs=1e-8)
@@ -130,7 +130,7 @@ def test_carry_holds_under_random_load() -> None:
     """
     The sum follows the wall clock: ahead of n dt by the lag at most, and back after every stall.
 
-    Cycles shorter than dt_min, here of almost no work, run ahead by that until they are paid back.
+    Cycles shorter than dt_min, here of almost no work, run ahead until later ones compensate.
     """
     random = np.random.default_rng(41)
     busy = (random.exponential(3 * MS, 3000) + 80 * MS * (random.random(3000) < 0.01)).astype(int)
@@ -158,7 +158,7 @@ def test_nominal_interval_where_measuring_is_off() -> None:
 
 
 def test_reset_re_anchors_and_counts() -> None:
-    """A stall of 400 ms exceeds the 250 ms: t0 moves by 390 ms, E_n is 0, and on it goes."""
+    """A stall of 400 ms exceeds the 250 ms: t0 moves by 390 ms, E_n is 0, the run goes on."""
     controller = TimeController(SPEC, DT)
     cycles = busy_loop(controller, lambda n: 400 * MS if n == 100 else MS, 200)
     assert [cycle.resets for cycle in cycles[98:103]] == [0, 0, 1, 1, 1]
@@ -173,7 +173,7 @@ def test_reset_re_anchors_and_counts() -> None:
     assert at_reset.actual_s == pytest.approx(at_reset.ideal_s)
     np.testing.assert_allclose(
         [cycle.cumulative_error_s for cycle in cycles[101:]], 0.0, atol=1e-8)
-    # The dropped time isn't integrated either: the human is where n dt says.
+    # The dropped time isn't integrated either: the human's time is n dt.
     assert sum(cycle.dt_eff_s for cycle in cycles) == pytest.approx(200 * DT, abs=1e-8)
 
 
@@ -188,7 +188,7 @@ def test_no_reset_below_the_threshold_or_when_off() -> None:
 
 
 def test_warm_up_suppresses_the_reset() -> None:
-    """A stall at the start is caught up; what is left of one after step 50 is a reset there."""
+    """A stall at the start is caught up; its rest after step 50 causes a reset there."""
     for step, reset_at in ((10, None), (45, 51), (60, 61)):
         controller = TimeController(SPEC, DT)
         cycles = busy_loop(controller, lambda n, step=step: 400 * MS if n == step else MS, 200)
@@ -250,7 +250,7 @@ def test_given_intervals_are_taken_as_they_are() -> None:
         if n <= 50:
             assert cycle.dt_eff_s == given_s
         assert cycle.step_error_s == pytest.approx(0.04, abs=1e-7) or n != 30
-    # 50 * 9 ms were given: the 50 ms that lack come at once, with the first measured interval.
+    # 50 * 9 ms were given: the missing 50 ms come at once, with the first measured interval.
     assert total_s == pytest.approx(100 * DT, abs=1e-7)
 
 

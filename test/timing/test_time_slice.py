@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The time slice that the loop asks for, against what the kernel says."""
+"""The time slice that the loop asks for, against the kernel's report."""
 
 import os
 import platform
@@ -15,7 +15,7 @@ KERNEL = tuple(int(part) for part in platform.release().split('.')[:2])
 
 
 def in_a_thread(work: list[object]) -> None:
-    """Shorten the slice of a thread that ends, for it is the thread's own."""
+    """Shorten the slice of a thread that ends, because it is the thread's own."""
     before = os.getpriority(os.PRIO_PROCESS, 0)
     work.append(shorten_time_slice())
     work.append(time_slice_ns())

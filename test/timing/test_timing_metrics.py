@@ -124,7 +124,7 @@ def test_reset_is_added_back() -> None:
     count, stall = 201, 0.3
     dropped = np.where(np.arange(count) >= 100, stall, 0.0)
     rows = rows_of(np.arange(count) * DT + dropped, dropped=dropped)
-    assert (rows[:, 0] == rows[:, 1]).all()  # behind the present schedule nothing is to be seen
+    assert (rows[:, 0] == rows[:, 1]).all()  # nothing shows in the lag behind the present schedule
     summary = summarise(rows)
     assert summary.final_error_ms == pytest.approx(300.0)
     assert summary.max_cumulative_error_ms == pytest.approx(300.0)

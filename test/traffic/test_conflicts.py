@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where lanes cross and who has the right of way, on maps with signs and without."""
+"""Where lanes cross and which has the right of way, on maps with signs and without."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where drivers sit in vehicles whose files do not say so."""
+"""Drivers' places in vehicles whose files do not have them."""
 
 from dataclasses import replace
 
@@ -34,6 +34,6 @@ def test_in_a_truck_people_sit_high_above_the_front_axle() -> None:
 
 
 def test_the_right_hand_drive_is_one_key() -> None:
-    """What a file says goes before what is usual."""
+    """A file's value overrides the default."""
     place = driver_place(replace(load_vehicle_parameters(), eye_left=-0.4, eye_height=1.3))
     assert place.eye == (1.25, -0.4, 1.3)

@@ -29,7 +29,7 @@ def run(model: DynamicBicycle, state: VehicleState, angle: float, acceleration: 
 
 @pytest.mark.parametrize('dt_s', [0.001, 0.01, 0.05])
 def test_step_response_of_steering(dt_s: float) -> None:
-    """63.2 % at T_delta and the exponential everywhere, whatever the step: it is exact."""
+    """63.2 % at T_delta and the exponential everywhere, for any step: it is exact."""
     model, state = DynamicBicycle(FREE, **OPTIONS), VehicleState(0.0, 0.0, 0.0, 5.0)
     for n in range(1, round(1.0 / dt_s) + 1):
         state = model.step(state, 0.1, 0.0, dt_s)
@@ -68,7 +68,7 @@ def test_radius_of_a_steady_circle() -> None:
 
 
 def derivative(model: DynamicBicycle, angle: float, command: float):  # noqa: ANN201
-    """Write FS 2 down once more, as printed, with the rate limit."""
+    """Return the derivative of FS 2 as printed, with the rate limit."""
     def change(_: float, z: np.ndarray) -> list[float]:
         _, _, theta, delta, v, a = z
         limit = model.vehicle.max_steering_rate
@@ -108,7 +108,7 @@ def test_steering_rate_limit_then_exponential() -> None:
 
 
 def test_stop_is_where_the_closed_form_has_it() -> None:
-    """v(t) = 0 within a step: the way until then, and rest after it; x by the exact integral."""
+    """v(t) = 0 within a step: x moves up to then by the exact integral, and rests after it."""
     model = DynamicBicycle(VEHICLE, **OPTIONS)
     state = run(model, VehicleState(0.0, 0.0, 0.0, 3.0), 0.0, -5.0, 3.0, 0.01)
     low, high = 0.5, 3.0

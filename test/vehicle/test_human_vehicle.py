@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 VEHICLE = load_vehicle_parameters()
-# Without drivetrain lag, where a closed form is compared with.
+# Without drivetrain lag, for comparison with a closed form.
 DIRECT = replace(VEHICLE, longitudinal_lag=1e-9)
 RELEASED, THROTTLE = DriverCommand(), DriverCommand(throttle=1.0)
 BRAKE, BACK = DriverCommand(brake=1.0), DriverCommand(throttle=0.5, reverse=True)
@@ -24,12 +24,12 @@ DRAG = 0.5 * 1.225 * 0.29 * 2.11
 
 
 def at_speed(speed: float, **others: float) -> VehicleState:
-    """Put a car at the origin."""
+    """Make a car at the origin."""
     return VehicleState(0.0, 0.0, 0.0, speed, **others)
 
 
 def test_coasting_conserves_energy() -> None:
-    """The work of drag and rolling resistance is what kinetic energy is lost, within 0.1 %."""
+    """The work of drag and rolling resistance equals the lost kinetic energy within 0.1 %."""
     car = HumanVehicle(DIRECT, at_speed(35.0))
     work, dt = 0.0, 0.01
     for _ in range(3000):
@@ -43,7 +43,7 @@ def test_coasting_conserves_energy() -> None:
 
 
 def test_coasting_follows_its_closed_form() -> None:
-    """Solve m v' = -(c + k v^2): v = sqrt(c/k) tan(atan(v0 sqrt(k/c)) - sqrt(k c) t / m)."""
+    """For m v' = -(c + k v^2), v = sqrt(c/k) tan(atan(v0 sqrt(k/c)) - sqrt(k c) t / m)."""
     car = HumanVehicle(DIRECT, at_speed(35.0))
     shape = math.sqrt(ROLLING_FORCE / DRAG)
     for n in range(1, 6001):
@@ -70,7 +70,7 @@ def test_acceleration_lags_the_pedal() -> None:
 @pytest.mark.parametrize('command', [
     RELEASED, BRAKE, DriverCommand(brake=1.0, reverse=True), DriverCommand(steering=0.7)])
 def test_standing_car_does_not_move(command: DriverCommand) -> None:
-    """Neither rolling resistance nor brakes start a motion, however long."""
+    """Rolling resistance and brakes never start a motion."""
     car = HumanVehicle(VEHICLE, at_speed(0.0))
     for _ in range(500):
         state = car.step(command, 0.01)
@@ -78,14 +78,14 @@ def test_standing_car_does_not_move(command: DriverCommand) -> None:
 
 
 def test_acceleration_does_not_linger_at_rest() -> None:
-    """A car placed at rest with a lagged acceleration: static friction holds it all the same."""
+    """Static friction holds a car that starts at rest with a lagged acceleration."""
     for command in (RELEASED, BRAKE):
         state = HumanVehicle(VEHICLE, at_speed(0.0, acceleration=2.0)).step(command, 0.01)
         assert (state.x, state.speed, state.acceleration) == (0.0, 0.0, 0.0)
 
 
 def test_wheels_turn_for_the_whole_step_in_which_the_car_stops() -> None:
-    """0.02 m/s are braked away in 2 ms of 10; the wheels turn at 0.4 rad/s for all of them."""
+    """Braking from 0.02 m/s takes 2 ms of 10; the wheels turn at 0.4 rad/s for all 10 ms."""
     car = HumanVehicle(DIRECT, at_speed(0.02))
     state = car.step(DriverCommand(brake=1.0, steering=1.0), 0.01)
     assert state.speed == 0.0
@@ -93,7 +93,7 @@ def test_wheels_turn_for_the_whole_step_in_which_the_car_stops() -> None:
 
 
 def test_braking_stops_within_the_step_and_holds() -> None:
-    """The distance is v^2 / 2 a to a millimetre whatever the step, and the car stays there."""
+    """The distance is v^2 / 2 a to a millimetre for any step, and the car stays there."""
     for dt in (0.001, 0.01, 0.05):
         car = HumanVehicle(replace(DIRECT, drag_coefficient=0.0), at_speed(10.0))
         while car.state.speed > 0.0:
@@ -108,7 +108,7 @@ def test_braking_stops_within_the_step_and_holds() -> None:
 
 
 def test_stop_at_the_end_of_a_step_leaves_no_negative_speed() -> None:
-    """Speeds that a step's braking takes to zero within rounding: 0, never -1e-18."""
+    """If a step's braking takes the speed to zero within rounding, it is 0, never -1e-18."""
     commanded = -((1.0 - math.exp(-3.0)) * 11250.0 + ROLLING_FORCE) / VEHICLE.mass
     car = replace(DIRECT, drag_coefficient=0.0)
     random = np.random.default_rng(31)
@@ -139,7 +139,7 @@ def test_reverse_is_a_gear_that_engages_at_rest() -> None:
 
 
 def test_brake_stops_a_car_in_reverse() -> None:
-    """It opposes the motion, never reverses it, and forward gear engages at rest."""
+    """The brake opposes the motion, never reverses it, and forward gear engages at rest."""
     car = HumanVehicle(VEHICLE, at_speed(-5.0))
     assert car.gear == -1
     for _ in range(200):
@@ -174,7 +174,7 @@ def test_speed_reaches_its_limit_and_stays(start: float, command: DriverCommand,
 
 
 def test_steering_angle_runs_at_the_rate_limit_to_its_target() -> None:
-    """At rest the full wheel asks for 7.85 / 13 rad; 0.4 rad/s get there in 1.51 s."""
+    """At rest the full wheel's target is 7.85 / 13 rad; 0.4 rad/s reach it in 1.51 s."""
     car = HumanVehicle(VEHICLE, at_speed(0.0))
     for n in range(1, 201):
         state = car.step(DriverCommand(steering=1.0), 0.01)
@@ -185,7 +185,7 @@ def test_steering_angle_runs_at_the_rate_limit_to_its_target() -> None:
 
 @pytest.mark.parametrize('seed', range(4))
 def test_limits_hold_under_any_command(seed: int) -> None:
-    """Whatever the driver does: speed in the gear's direction, angle, rate and yaw in bounds."""
+    """For any command: speed in the gear's direction, angle, rate and yaw in bounds."""
     random = np.random.default_rng(seed)
     car = HumanVehicle(VEHICLE, at_speed(random.uniform(0.0, 50.0)))
     for _ in range(60):
@@ -206,8 +206,8 @@ def test_limits_hold_under_any_command(seed: int) -> None:
             assert moved <= max(abs(before.speed), abs(state.speed)) * dt + 1e-9
 
 
-# A drive of 16 s recorded with the model of the paper built into the vehicle, before there was
-# another one: throttle, a turn, a stop, reverse.
+# A drive of 16 s recorded when the paper's model was built into the vehicle, before there were
+# others: throttle, a turn, a stop, reverse.
 RECORDED = (
     (DriverCommand(0.6, 0.0, 0.2),
      (71.16189173677351, 57.34910564924894, 0.816549336462861, 31.330158304366456,
@@ -226,7 +226,7 @@ RECORDED = (
 
 @pytest.mark.parametrize('named', [False, True], ids=['no model', 'ks with the powertrain lag'])
 def test_without_a_model_the_car_is_that_of_the_paper(named: bool) -> None:
-    """A recorded drive comes out again, to the rounding of another machine's tangent."""
+    """It reproduces a recorded drive, to the rounding of another machine's tangent."""
     model = KinematicSingleTrack(VEHICLE, powertrain_lag=True) if named else None
     car = HumanVehicle(VEHICLE, VehicleState(1.0, -2.0, 0.5, 12.0), model)
     for command, state, gear in RECORDED:

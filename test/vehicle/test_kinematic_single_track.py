@@ -17,14 +17,14 @@ State = tuple[float, float, float, float, float]
 
 
 def slope(state: NDArray[np.float64], acceleration: float, rate: float) -> NDArray[np.float64]:
-    """Write CRG 2-4 down as printed."""
+    """Return the derivative of CRG 2-4 as printed."""
     _, _, yaw, speed, steering = state
     return np.array([speed * math.cos(yaw), speed * math.sin(yaw),
                      speed * math.tan(steering) / L, acceleration, rate])
 
 
 def textbook_step(state: State, acceleration: float, rate: float, dt: float) -> State:
-    """Do a classical Runge-Kutta step with its four slopes."""
+    """Return a classical Runge-Kutta step with its four slopes."""
     start = np.array(state)
     first = slope(start, acceleration, rate)
     second = slope(start + 0.5 * dt * first, acceleration, rate)
@@ -61,7 +61,7 @@ def test_constant_speed_and_steering_is_a_circle(speed: float, steering: float) 
 
 
 def test_full_circle_returns_to_its_start() -> None:
-    """After 2 pi R / v the car is where it was."""
+    """After 2 pi R / v the car is back at its start."""
     speed, steering = 8.0, 0.25
     duration = 2.0 * math.pi * L / math.tan(steering) / speed
     end = drive((3.0, -2.0, 0.5, speed, steering), 0.0, 0.0, duration, 1000)
@@ -77,7 +77,7 @@ def test_straight_line_is_exact() -> None:
 
 
 def test_equals_the_textbook_step() -> None:
-    """The shared slopes save work, not accuracy: equal to 1e-13 over random states and inputs."""
+    """The shared slopes lose no accuracy: equal to 1e-13 over random states and inputs."""
     random = np.random.default_rng(11)
     for _ in range(500):
         state = (*random.uniform(-50, 50, 2), random.uniform(-3, 3), random.uniform(-10, 40),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What holds for every vehicle model, and the kinematic one."""
+"""Properties of every vehicle model, and of the kinematic one."""
 
 from dataclasses import replace
 import math
@@ -63,7 +63,7 @@ def test_the_gear_decides_which_command_moves(name: str) -> None:
 
 @pytest.mark.parametrize('name', MODELS)
 def test_wheels_turn_at_rest(name: str) -> None:
-    """They answer while a brake holds the car, at no more than 0.4 rad/s."""
+    """The wheels turn while a brake holds the car, at no more than 0.4 rad/s."""
     model, state = made(name), at(0.0)
     for _ in range(300):
         state = model.step(state, 0.5, -1.0, DT)

@@ -17,7 +17,7 @@ SHIPPED = config_directory() / 'vehicles' / 'bmw_320i.yaml'
 
 
 def write_vehicle(folder: Path, changes: dict[str, Any]) -> str:
-    """Write the shipped car with changes (None removes a key) and give the file's path."""
+    """Write the shipped car with changes (None removes a key) and return the file's path."""
     values = yaml.safe_load(SHIPPED.read_text(encoding='utf-8')) | changes
     path = folder / 'car.yaml'
     path.write_text(yaml.safe_dump({key: value for key, value in values.items()
@@ -26,7 +26,7 @@ def write_vehicle(folder: Path, changes: dict[str, Any]) -> str:
 
 
 def test_shipped_car_is_commonroad_vehicle_2() -> None:
-    """What the file says to come from commonroad-vehicle-models does."""
+    """The values that the file attributes to commonroad-vehicle-models come from there."""
     ours, theirs = load_vehicle_parameters(), parameters_vehicle2()
     assert ours.name == 'bmw_320i'
     assert (ours.length, ours.width, ours.mass) == pytest.approx((theirs.l, theirs.w, theirs.m))
@@ -86,7 +86,7 @@ def test_bad_value_is_refused(tmp_path: Path, changes: dict[str, Any], named: st
     (b'- 1\n', 'is no mapping'), (b'mass: [1', 'is no YAML'), (b'\xff\xfe\x00', 'is no YAML'),
     (b'', 'is no mapping')])
 def test_other_content_is_refused(tmp_path: Path, content: bytes, named: str) -> None:
-    """Files that are no vehicle at all."""
+    """Files without a vehicle are refused."""
     path = tmp_path / 'car.yaml'
     path.write_bytes(content)
     with pytest.raises(InputError, match=named):
@@ -94,6 +94,6 @@ def test_other_content_is_refused(tmp_path: Path, content: bytes, named: str) ->
 
 
 def test_unknown_name_is_refused() -> None:
-    """The remedy says where the names are."""
+    """The remedy says where to find the names."""
     with pytest.raises(InputError, match='trabant.yaml: there is no such vehicle; name a file'):
         load_vehicle_parameters('trabant')

@@ -18,7 +18,7 @@ POWERTRAIN = Powertrain(VEHICLE)
 
 
 def drag_force(speed: float) -> float:
-    """Write down rho / 2 C_D A_f v^2 of CRG 23 with the numbers of the BMW 320i."""
+    """Return rho / 2 C_D A_f v^2 of CRG 23 with the numbers of the BMW 320i."""
     return 0.5 * 1.225 * 0.29 * 2.11 * speed**2
 
 
@@ -74,7 +74,7 @@ def test_command_is_saturated() -> None:
 
 
 def test_standing_car_is_held() -> None:
-    """Static friction: neither rolling resistance nor brakes start a motion."""
+    """Static friction holds it: rolling resistance and brakes start no motion."""
     for gear in (1, -1):
         assert POWERTRAIN.command(DriverCommand(), 0.0, gear) == 0.0
         assert POWERTRAIN.command(DriverCommand(brake=1.0), 0.0, gear) == 0.0
@@ -87,7 +87,7 @@ def test_standing_car_is_held() -> None:
 
 
 def test_brake_opposes_the_motion() -> None:
-    """Forwards it is negative, in reverse positive, and as strong."""
+    """Its force is negative forwards, and positive and equally strong in reverse."""
     brake = (1.0 - math.exp(-3.0)) * 11250.0
     for speed, gear in ((8.0, 1), (-8.0, -1)):
         acceleration = POWERTRAIN.command(DriverCommand(brake=1.0), speed, gear)

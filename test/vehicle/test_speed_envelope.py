@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The speeds from which one slows down in time: v^2 = V^2 + 2 b d before a limit V."""
+"""The speeds from which a vehicle slows down in time: v^2 = V^2 + 2 b d before a limit V."""
 
 from crgame_ros.vehicle.stopping import SpeedEnvelope
 import numpy as np

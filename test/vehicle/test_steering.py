@@ -20,7 +20,7 @@ GOOD = {'speed': [0.0, 10.0], 'steering_wheel_angle': [0.0, 4.0],
 
 
 def write_table(folder: Path, **changes: object) -> str:
-    """Write a ratio table with changes and give its path."""
+    """Write a ratio table with changes and return its path."""
     path = folder / 'ratio.yaml'
     path.write_text(yaml.safe_dump(GOOD | changes), encoding='utf-8')
     return str(path)
@@ -40,7 +40,7 @@ def test_ratio_is_bilinear() -> None:
 
 
 def test_ratio_is_even_and_held_beyond_the_grid() -> None:
-    """Left is as right, reverse as forward; outside the last value holds."""
+    """Left equals right, reverse equals forward; outside the grid the last value holds."""
     table = load_steering_ratio(VEHICLE.steering_ratio)
     assert table.ratio(-7.0, -2.0) == table.ratio(7.0, 2.0)
     assert table.ratio(90.0, 9.0) == table.ratios[-1][-1]
@@ -56,7 +56,7 @@ def test_target_angle_by_hand(tmp_path: Path) -> None:
 
 
 def test_target_angle_is_limited(tmp_path: Path) -> None:
-    """CRG 26: delta_max = 0.91 rad, where 7.85 rad over a ratio of 4 would ask for 1.96 rad."""
+    """CRG 26: delta_max = 0.91 rad, where 7.85 rad over a ratio of 4 would give 1.96 rad."""
     steering = Steering(replace(VEHICLE, steering_ratio=write_table(tmp_path)))
     assert VEHICLE.max_steering_angle == 0.91
     assert steering.target_angle(1.0, 0.0) == 0.91
@@ -64,7 +64,7 @@ def test_target_angle_is_limited(tmp_path: Path) -> None:
 
 
 def test_steering_grows_less_direct_with_speed() -> None:
-    """The same hand asks for a smaller angle the faster the car is."""
+    """The same steering wheel angle gives a smaller wheel angle at a higher speed."""
     steering = Steering(VEHICLE)
     angles = [steering.target_angle(0.5, speed) for speed in (0.0, 5.0, 10.0, 20.0, 30.0, 50.0)]
     assert all(b < a for a, b in zip(angles, angles[1:], strict=False))
@@ -96,7 +96,7 @@ def test_unlimited_rate_is_the_papers() -> None:
     ({'ratio': [[5.0, 4.0], [0.0, 3.0]]}, 'ratio[1]: holds 0.0; give a list of numbers above 0'),
     ({'ratio': [[5.0, 4.0], [math.inf, 3.0]]}, 'ratio[1]: holds inf; give')])
 def test_bad_table_is_refused(tmp_path: Path, changes: dict[str, object], named: str) -> None:
-    """The message names the file and what is wrong in it."""
+    """The message names the file and the error in it."""
     path = write_table(tmp_path, **changes)
     with pytest.raises(InputError) as caught:
         load_steering_ratio(path)
@@ -105,6 +105,6 @@ def test_bad_table_is_refused(tmp_path: Path, changes: dict[str, object], named:
 
 
 def test_missing_table_is_refused(tmp_path: Path) -> None:
-    """A vehicle that names a table which isn't there."""
+    """A vehicle that names a missing table is refused."""
     with pytest.raises(InputError, match='cannot read the table of steering ratios'):
         load_steering_ratio(str(tmp_path / 'none.yaml'))

@@ -24,13 +24,13 @@ def test_braking_is_against_the_motion(speed: float, acceleration: float) -> Non
     (2.0, -4.0, 0.5), (-2.0, 4.0, 0.5), (2.0, -1.0, 1.0), (2.0, 4.0, 1.0), (0.0, -4.0, 1.0),
     (2.0, 0.0, 1.0)])
 def test_time_to_rest_is_v_over_b(speed: float, acceleration: float, time_s: float) -> None:
-    """Within a step of 1 s; who does not brake, or not hard enough, moves all of it."""
+    """Within a step of 1 s; without braking, or without enough, the car moves for all of it."""
     assert moving_time(speed, acceleration, 1.0) == time_s
 
 
 @pytest.mark.parametrize('direction', [1.0, -1.0])
 def test_stop_within_a_step_covers_half_v_squared_over_b(direction: float) -> None:
-    """From 2 m/s at 4 m/s^2: 0.5 m, then it stands exactly; the steering goes on as long."""
+    """From 2 m/s at 4 m/s^2: 0.5 m, then it stands exactly; the steering moves for as long."""
     speed, acceleration = 2.0 * direction, -4.0 * direction
     moving_s = moving_time(speed, acceleration, 1.0)
     x, y, yaw, end, angle = step_to_rest(

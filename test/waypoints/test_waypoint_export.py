@@ -45,7 +45,7 @@ def circle(radius: float, angle: float = 2.0 * math.pi, count: int = 25) -> np.n
 
 
 def town() -> WaypointRoads:
-    """Make an S-bend that forks, an oncoming lane that is cut nowhere, and a narrow turn."""
+    """Make an S-bend that forks, an oncoming lane without cuts, and a narrow turn."""
     away = np.array([1.0, 0.2 * math.pi]) / math.hypot(1.0, 0.2 * math.pi)
     beside = np.array([-away[1], away[0]])
     end = S_BEND[-1]
@@ -63,12 +63,12 @@ def town() -> WaypointRoads:
 
 
 def network_of(exported: ExportedRoads) -> RoadNetwork:
-    """Load what was exported."""
+    """Load the exported network."""
     return RoadNetwork(parse_scenario(exported.xml_text, 'x').scenario.lanelet_network)
 
 
 def errors_of(exported: ExportedRoads) -> list[str]:
-    """List what the schema finds wrong."""
+    """List the errors that the schema finds."""
     schema = etree.XMLSchema(etree.parse(str(SCHEMA)))
     schema.validate(etree.fromstring(exported.xml_text.encode('utf-8')))
     return [entry.message for entry in schema.error_log]
@@ -100,7 +100,7 @@ def test_table_to_scenario_and_back(source: str, tmp_path: Path) -> None:
         there = after.at(s)
         assert np.hypot(there.x - here.x, there.y - here.y).max() < 0.01
         assert there.width == pytest.approx(here.width, abs=0.01)
-        # But for a sample beside a cut, which may be on either side of it.
+        # Except for a sample beside a cut, which may be on either side of it.
         cuts = after.s[1:][after.speed_limit[1:] != after.speed_limit[:-1]]
         apart = np.abs(s[:, None] - cuts).min(axis=1, initial=1.0) > 0.01
         assert there.speed_limit[apart].tolist() == here.speed_limit[apart].tolist()
@@ -164,7 +164,7 @@ def test_bounds_of_the_s_bend() -> None:
 
 
 def test_tight_bends_have_more_vertices() -> None:
-    """On a circle of 10 m chords of 1 m would be 14 mm beside the outer bound; 3 mm are."""
+    """On a circle of 10 m, chords of 1 m would be 14 mm off the outer bound; the error is 3 mm."""
     road = lane(circle(10.0, 3.0, 40), 4.0)
     found, = network_of(export_roads(WaypointRoads({1: road}, {}), 'arc')).lanelet_network.lanelets
     arc = 12.0 * circle(1.0, 3.0, 20_000)
@@ -174,7 +174,7 @@ def test_tight_bends_have_more_vertices() -> None:
 
 
 def test_links_that_one_lane_names_are_completed() -> None:
-    """Two lanes behind one: who follows, who came before, who is beside, from one side each."""
+    """Successors, predecessors and neighbours, each given by one of the two lanes only."""
     roads = WaypointRoads(
         {1: lane([(0.0, 0.0), (50.0, 0.0)]), 2: lane([(50.0, 0.0), (90.0, 0.0)]),
          3: lane([(50.0, 3.5), (90.0, 3.5)]), 4: lane([(90.0, 7.0), (50.0, 7.0)]),
@@ -207,7 +207,7 @@ def test_lanes_that_meet_do_not_gape() -> None:
     """
     Two straight lanes with 0.2 rad between them share their vertices where they meet.
 
-    So do the pieces of the first, which is cut where its end is turned already.
+    The pieces of the first do so, too; it is cut where its end is already turned.
     """
     roads = WaypointRoads({1: lane([(0.0, 0.0), (46.0, 0.0), (50.0, 0.0)], limit=(9.0, 8.0, 8.0)),
                            2: lane([(50.0, 0.0), (99.0, 10.0)])}, {1: LaneLinks(successors=(2,))})
@@ -215,7 +215,7 @@ def test_lanes_that_meet_do_not_gape() -> None:
     first, end, second = (network.find_lanelet_by_id(x) for x in (1, 3, 2))
     assert first.right_vertices[-1].tolist() == end.right_vertices[0].tolist()
     first_x, end_x = first.right_vertices[-1, 0], end.right_vertices[-1, 0]
-    # It fades out over 7 m: 3/7 of it 4 m before the end; 1.75 m times its sine.
+    # The turn fades out over 7 m: 3/7 of it 4 m before the end; 1.75 m times its sine.
     assert (first_x - 46.0, end_x - 50.0) == pytest.approx(
         [1.75 * math.sin(turn * 0.5 * math.atan2(10.0, 49.0)) for turn in (3.0 / 7.0, 1.0)],
         abs=1e-4)
@@ -239,7 +239,7 @@ def test_a_circuit_of_one_lane() -> None:
 
 @pytest.mark.parametrize('kind', ['urban', 'highway'])
 def test_the_file(kind: str) -> None:
-    """With a drive all of it is as the schema wants, without only the planning problem is not."""
+    """With a drive the file is valid; without one only the missing planning problem is invalid."""
     drive = Drive(1, 20.0, 8.0, 4)
     exported = export_roads(town(), 'town', kind, drive)  # type: ignore[arg-type]
     assert errors_of(exported) == []
@@ -285,7 +285,7 @@ def test_people_and_traffic_drive_there(tmp_path: Path) -> None:
 
 
 def test_an_av_drives_there(tmp_path: Path) -> None:
-    """Without a word about AVs the planning problem has one, which follows the lane."""
+    """Without AVs in the game the planning problem gets one, which follows the lane."""
     exported = export_roads(town(), 'town', drive=Drive(1, 20.0, 8.0, 3))
     (tmp_path / 'town.xml').write_text(exported.xml_text, encoding='utf-8')
     (tmp_path / 'town.yaml').write_text('scenario: town.xml\nhumans: []\n', encoding='utf-8')

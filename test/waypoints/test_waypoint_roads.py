@@ -36,13 +36,13 @@ lane,x,y,width,speed_limit,successors,left
 
 
 def roads_of(file: Path) -> tuple[RoadNetwork, WaypointRoads]:
-    """Derive the roads of a map."""
+    """Make the roads of a map."""
     network = RoadNetwork(load_scenario(file).scenario.lanelet_network)
     return network, WaypointRoads.from_lanelets(network)
 
 
 def published(name: str) -> Path:
-    """Name a real scenario, or skip."""
+    """Return the path of a real scenario, or skip."""
     if not (SHARED / name).exists():
         pytest.skip('the real scenarios (../shared/scenarios) are not on this machine')
     return SHARED / name
@@ -51,7 +51,7 @@ def published(name: str) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_lanes_follow_their_lanelets(file: Path) -> None:
-    """Centre within 1 cm, widths as the bounds have them, limits as the signs have them."""
+    """The centre is within 1 cm, widths are those of the bounds, limits those of the signs."""
     network, roads = roads_of(file)
     assert roads.lane_ids == network.lanelet_ids
     for lanelet_id in roads.lane_ids:
@@ -73,7 +73,7 @@ def test_lanes_follow_their_lanelets(file: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_links_are_the_lanelets_own(file: Path) -> None:
-    """Successors, predecessors and neighbours, these by their direction."""
+    """Successors, predecessors, and neighbours by their direction."""
     network, roads = roads_of(file)
     opposite = 0
     for lanelet in network.lanelet_network.lanelets:
@@ -92,7 +92,7 @@ def test_links_are_the_lanelets_own(file: Path) -> None:
 
 
 def test_false_successors_are_left_out() -> None:
-    """A lanelet that is said to follow itself does not (ZAM-Ramp)."""
+    """A lanelet named as its own successor does not follow itself (ZAM-Ramp)."""
     network, roads = roads_of(published('ZAM-Ramp-1_1-T-1.xml'))
     assert network.lanelet_network.find_lanelet_by_id(2).successor == [2]
     assert roads.successors(2) == ()
@@ -106,7 +106,7 @@ def test_false_successors_are_left_out() -> None:
     ('OSC_PedestrianCollision-1_1_T-1.xml', 0.35), ('DEU_Guetersloh-36_1_T-1.xml', 0.1),
     ('USA_US101-4_1_T-1.xml', 0.1)], ids=lambda value: str(value)[:7])
 def test_splines_do_not_swing_out(name: str, bound: float) -> None:
-    """100 m segments beside short ones and vertices 1 cm apart: up to 1.5 m off without care."""
+    """100 m segments beside short ones and vertices 1 cm apart: a plain spline is 1.5 m off."""
     network, roads = roads_of(published(name))
     worst, plain = 0.0, 0.0
     for lanelet_id in roads.lane_ids:
@@ -229,7 +229,7 @@ def test_table_round_trip_keeps_every_bit(file: Path, tmp_path: Path) -> None:
     ((TABLE, ''), r'line 1: there is no column "lane"'),
 ], ids=lambda value: value[:12] if isinstance(value, str) else '')
 def test_bad_tables_are_refused(change: tuple[str, str], message: str, tmp_path: Path) -> None:
-    """Each message names the file, the line and what is wrong there."""
+    """Each message names the file, the line and the error."""
     assert change[0] in TABLE
     (tmp_path / 'roads.csv').write_text(TABLE.replace(*change, 1), encoding='utf-8')
     with pytest.raises(InputError, match=message) as caught:

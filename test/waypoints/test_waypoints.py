@@ -47,7 +47,7 @@ def test_cubics_are_reproduced_exactly(axis: int) -> None:
     cubic = np.polynomial.Polynomial([2.0, 0.3, -0.01, 1.5e-4])
     s = np.cumsum([0.0, 3.0, 4.0, 2.5, 6.0, 5.0, 7.0, 4.0, 3.0])
     values = cubic(s)
-    # The other coordinate is what makes the lengths of the straight lines equal the stations.
+    # The other coordinate makes the lengths of the straight lines equal the stations.
     other = np.concatenate(([0.0], np.cumsum(np.sqrt(np.diff(s)**2 - np.diff(values)**2))))
     lane = lane_of(np.stack((values, other) if axis == 0 else (other, values), axis=-1))
     assert lane.s == pytest.approx(s, abs=1e-12)
@@ -143,7 +143,7 @@ def test_curves_that_come_back_to_themselves() -> None:
 
 
 def assert_nearest(lane: WaypointLane, points: Array) -> None:
-    """Compare distances with those to the lane sampled every 2 cm, as straight lines."""
+    """Check distances against those to the lane sampled every 2 cm, as straight lines."""
     dense = lane.at(np.linspace(0.0, lane.length, math.ceil(lane.length / 0.02) + 1))
     line = shapely.LineString(np.stack((dense.x, dense.y), axis=-1))
     found = lane.project(points)
@@ -172,7 +172,7 @@ def test_projection_against_dense_search_on_maps(directory: Path) -> None:
 
 
 def seconds(function: Callable[[], object]) -> float:
-    """Measure the fastest of several calls."""
+    """Return the time of the fastest of several calls."""
     times = []
     for _ in range(7):
         start = time.perf_counter()

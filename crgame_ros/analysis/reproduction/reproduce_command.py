@@ -113,7 +113,7 @@ def _table(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 
 DESCRIPTION = """\
-Repeat the evaluation of the CommonRoad-Game paper, and fail where what must come out does not.
+Repeat the evaluation of the CommonRoad-Game paper, and fail if an expected result is missing.
 
   one AV    a human is recorded once who cuts in and brakes to a stop, and meets the IDM planner
             and the reactive one with the same inputs (figures 8 to 11)

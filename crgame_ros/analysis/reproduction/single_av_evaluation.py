@@ -131,8 +131,8 @@ REACTIVE_EXPECTATIONS: tuple[Expectation[Encounter], ...] = (
     NO_CONTACT)
 HUMAN_EXPECTATIONS: tuple[Expectation[SameHuman], ...] = (
     Expectation('the same human', 'The states of the human are the same to the last bit against '
-                'every planner, and its poses those of the recording: only then is what differs '
-                "the planners' doing.",
+                'every planner, and its poses equal those of the recording: only then do '
+                'differences result from the planners alone.',
                 'the HV applies a consistent set of challenging maneuvers (IV-A)', _same),)
 
 

@@ -60,8 +60,8 @@ def _ended(vehicle_id: str, log: RunTrajectories | None) -> Iterator[str]:
     if log is not None:
         scheduler = log.game.scheduler
         end_s = (int(log.ks[-1]) - scheduler.k0) * scheduler.time_step_s
-        yield (f'scored up to {end_s:.1f} s: {vehicle_id} was put back on its lane then, which '
-               'nobody drives')
+        yield (f'scored up to {end_s:.1f} s: {vehicle_id} was then put back on its lane, '
+               'and this jump was not driven')
 
 
 class _Drives:

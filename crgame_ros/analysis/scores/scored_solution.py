@@ -75,8 +75,8 @@ def _score(scored: ScoredScenario, judge: SolutionJudge, nuplan: NuplanScorer, n
         who = name if len(parts) == 1 else f'{name}, problem {problem.planning_problem_id}'
         judged = judge.judge(part.found, part.driven, failed=failed, others=solved)
         if judged.feasibility.feasible is False and _has_rear_axles(part.found, problem, drive):
-            told.append('its positions are those of the rear axle, as files of 2021 have them: '
-                        'as such they would be feasible')
+            told.append('its positions seem to be those of the rear axle, as in files of 2021: '
+                        'read in this way, it is feasible')
         result.append(VehicleScores(
             who, 'solution', '', _score_drive(scored, nuplan, drive, part, told), judged,
             find_goal(problem, part.driven.state_list, drive.dt_s), None, tuple(told)))

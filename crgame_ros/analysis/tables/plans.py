@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float64]
 
 _ROWS = 4096
 REAR_AXLE = 'rear axle'
-NO_PLAN = 'what came was no plan'
+NO_PLAN = 'the answer was not a plan'
 STATE_COLUMNS = (
     ('x', 'm', 'first coordinate', StateColumn.X), ('y', 'm', 'second coordinate', StateColumn.Y),
     ('yaw', 'rad', 'heading', StateColumn.YAW), ('speed', 'm/s', 'speed', StateColumn.SPEED),

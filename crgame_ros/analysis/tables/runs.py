@@ -90,8 +90,8 @@ RUN_PARTS = (
         Column('agents', INTEGER, '1', 'of these, agents of traffic'),
         Column('planners', TEXT, '', 'planner of each AV, as a JSON object'),
         Column('events', INTEGER, '1', 'rows of events'),
-        Column('notices', TEXT, '', 'what of the run is not in here, one line each',
-               empty='all is'),
+        Column('notices', TEXT, '', 'data of the run that are missing here, one line each',
+               empty='all data are here'),
     ), _identity),
     TablePart((
         *(Column(name, NUMBER, unit, what, variant='as docs/timing.md defines it', empty=UNTIMED)

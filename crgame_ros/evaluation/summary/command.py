@@ -93,14 +93,14 @@ FORMATS = ('text', 'markdown', 'json')
 def add_summary_arguments(parser: 'argparse.ArgumentParser | argparse._ArgumentGroup') -> None:
     """Declare the arguments of a summary."""
     parser.add_argument('--format', choices=FORMATS, default='text',
-                        help='as what it is printed (default: text)')
-    parser.add_argument('--measure', action='append', metavar='NAME', help='what is summed up; '
+                        help='output format (default: text)')
+    parser.add_argument('--measure', action='append', metavar='NAME', help='measure to summarise; '
                         'may be given several times (default: all that docs/evaluation.md names)')
-    parser.add_argument('--by', action='append', metavar='FACTOR', help='what makes a group: '
-                        'planner, scenario, game, human, perception or traffic; may be given '
-                        'several times (default: planner)')
-    parser.add_argument('--baseline', metavar='PLANNER', help='from which differences are told '
-                        '(default: idm, or the first planner)')
+    parser.add_argument('--by', action='append', metavar='FACTOR', help='factor that defines '
+                        'the groups: planner, scenario, game, human, perception or traffic; may '
+                        'be given several times (default: planner)')
+    parser.add_argument('--baseline', metavar='PLANNER', help='planner with which the others '
+                        'are compared (default: idm, or the first planner)')
     parser.add_argument('--worst', action='append', metavar='NAME', help='measure by which the '
                         'worst cells are chosen; may be given several times, the first one counts '
                         'first (default: collision, then worst_ttc)')

@@ -195,7 +195,7 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
     :raises InputError: if an argument cannot be used, or a part cannot be read.
     """
     if not by or not set(by) <= set(TEXT_FACTORS):
-        raise InputError(f'{short(list(by))} cannot be told apart', '--by',
+        raise InputError(f'{short(list(by))} contains an unknown factor', '--by',
                          f'name some of {", ".join(TEXT_FACTORS)}')
     if not _FEWEST_RESAMPLES <= resamples <= _MOST_RESAMPLES:
         raise InputError(f'is {resamples}', '--resamples',

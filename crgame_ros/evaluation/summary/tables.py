@@ -21,8 +21,8 @@ NOTHING = '-'
 _ALWAYS_TOLD = ('scenario', 'planner', 'seed')
 # Found in trials with synthetic evaluations (docs/evaluation.md).
 _MANY_UNITS = 20
-_SHARE_OF_NONE = ('an interval from 0 to 0 is that of the resamples: what never happened in n may '
-                  'still happen as often as 3/n')
+_SHARE_OF_NONE = ('an interval from 0 to 0 says that no resample contains the event: after n '
+                  'cells without it, its rate may still be 3/n')
 _BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing '
               'differs one interval in twenty is, by chance')
 
@@ -160,12 +160,11 @@ def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterat
     for kind, names in sorted(kinds.items()):
         whose = '' if len(kinds) == 1 else f'of {", ".join(names)}: '
         if kind == 'scenarios':
-            yield (f'{whose}drawn are scenarios, each with all its {what}, for {what} of one '
-                   'scenario are alike (cluster bootstrap): the intervals speak of scenarios '
-                   'like these')
+            yield (f'{whose}whole scenarios are resampled, because {what} of one scenario are '
+                   'correlated (cluster bootstrap): the intervals apply to similar scenarios')
         else:
-            yield (f'{whose}drawn are {what}, because there are fewer than {FEWEST_SCENARIOS} '
-                   'scenarios: the intervals speak of these scenarios alone')
+            yield (f'{whose}{what} are resampled, because there are fewer than {FEWEST_SCENARIOS} '
+                   'scenarios: the intervals apply to these scenarios alone')
         if min(_units(group) for group in groups if group.resampled == kind) < _MANY_UNITS:
             drawn = what if kind == 'cells' else kind
             yield (f'{whose}of fewer than {_MANY_UNITS} {drawn} they are too narrow: of ten they '
@@ -202,8 +201,8 @@ def _differences(summary: Summary) -> SummaryTable:
     rows += [(SummaryCell(measure_label(measure)), *(
         _estimate(group.estimates[place], measure, signed=True) for group in groups))
         for place, measure in known_measures(summary)]
-    notes = (f'each minus {summary.baseline} in the same cell: all factors but the planner alike, '
-             'the mean of its AVs; n counts the pairs of which both have a value',
+    notes = (f'difference from {summary.baseline} in the cell with the same other factors, '
+             'averaged over its AVs; n counts the pairs of which both have a value',
              *_drawn(groups), _BY_CHANCE)
     return SummaryTable('differences', f'Differences from {summary.baseline}',
                         'Mean difference, 95 % interval and n', ('', *map(_group, groups)),

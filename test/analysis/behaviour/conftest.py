@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A straight road, cars on it, and what their drivers do."""
+"""A straight road, cars on it, and their drivers' inputs."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -60,7 +60,7 @@ def vehicle() -> VehicleParameters:
 
 @pytest.fixture(scope='session')
 def along(vehicle: VehicleParameters) -> Callable[..., Array]:
-    """Return a function that gives the states of a car whose centre takes a way."""
+    """Return a function that computes the states of a car whose centre follows a path."""
     def states(times_s: Array, x: Array, y: Array) -> Array:
         vx, vy = np.gradient(x, times_s), np.gradient(y, times_s)
         found = np.zeros((len(times_s), STATE_WIDTH))
@@ -74,7 +74,7 @@ def along(vehicle: VehicleParameters) -> Callable[..., Array]:
 
 @pytest.fixture(scope='session')
 def controls() -> Callable[..., DriverControls]:
-    """Return a function that gives a driver's controls at 100 Hz; what is not given rests."""
+    """Return a function that makes a driver's controls at 100 Hz; missing ones are 0."""
     def given(count: int, **values: Array) -> DriverControls:
         rest = np.zeros(count)
         return DriverControls(DT_S * np.arange(1, count + 1), values.get('throttle', rest),

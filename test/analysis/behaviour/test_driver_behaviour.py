@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All measures of whole offline runs: each is there, by hand where it is plain, however turned."""
+"""All measures of whole offline runs: present, correct by hand, and the same on turned maps."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -49,7 +49,7 @@ def _play(name: str, duration_s: float, triggers: tuple[tuple[int, str], ...] = 
 
 @pytest.fixture(scope='module')
 def changed() -> tuple[DriverBehaviour, ...]:
-    """Measure the human who changes lanes in a bend, in front of the AV."""
+    """Measure the human that changes lanes in a bend, in front of the AV."""
     return measure_behaviour(_play('lane_change', 12.0))
 
 
@@ -57,7 +57,7 @@ def changed() -> tuple[DriverBehaviour, ...]:
 @pytest.mark.parametrize('name', OF_VEHICLES)
 def test_every_measure_of_a_vehicle_is_there(
         name: str, changed: tuple[DriverBehaviour, ...]) -> None:
-    """A finite value of the human, with its definition; of the AV what needs no commands."""
+    """The human has finite values, with definitions; the AV those that need no commands."""
     human, av = changed
     assert math.isfinite(human.values[name])
     assert human.as_dict()['measures'][name] == {
@@ -69,12 +69,12 @@ def test_every_measure_of_a_vehicle_is_there(
 
 @pytest.mark.parametrize('name', OF_OTHERS)
 def test_every_measure_of_something_else_is_defined(name: str) -> None:
-    """What there is of events, lane changes, take-overs and steps has its entry."""
+    """Each column of events, lane changes, take-overs and steps has its entry."""
     assert MEASURES[name].per != 'vehicle'
 
 
 def test_the_data_dictionary_is_whole() -> None:
-    """No entry without words, and none too many; lists of SI units only, and of degrees."""
+    """No entry lacks a text, and none is superfluous; all units are SI units, or degrees."""
     assert [name for name, each in MEASURES.items() if each.per == 'vehicle'] == list(
         dict.fromkeys([name for name in MEASURES if name in OF_VEHICLES]))
     assert sorted(MEASURES) == sorted([*OF_VEHICLES, *OF_OTHERS])
@@ -92,7 +92,7 @@ def test_motion_is_that_of_the_states(changed: tuple[DriverBehaviour, ...]) -> N
     jerk = np.diff(record.log.vehicle_states[:, 0, StateColumn.ACCELERATION]) / 0.1
     assert human['speed_sd'] == pytest.approx(speed.std(ddof=1))
     assert (human['jerk_min'], human['jerk_max']) == pytest.approx((jerk.min(), jerk.max()))
-    # 80 km/h, as the signs have it.
+    # 80 km/h, as on the signs.
     assert human['time_above_limit'] == pytest.approx(0.1 * (speed > 80.0 / 3.6).sum())
     assert changed[0].driven_s == pytest.approx(12.0) and changed[1].driven_s == 0.0
 
@@ -114,7 +114,7 @@ def test_the_gap_before_the_av(changed: tuple[DriverBehaviour, ...]) -> None:
 
 
 def test_events_reactions_and_limits() -> None:
-    """A limit that an event sets, and a driver who brakes a second after another."""
+    """One event sets a limit, and the driver brakes a second after another event."""
     record = _play('crossing', 8.0, ((200, 'slow-zone'), (400, 'pedestrian')))
     commands = record.commands.copy()
     commands[:, 0, :3] = (0.3, 0.0, 0.0)
@@ -132,7 +132,7 @@ def test_events_reactions_and_limits() -> None:
 
 
 def _taken_over(record: RunRecord) -> RunRecord:
-    """Let somebody who asked at 2 s drive the AV from 3 s to 7 s, hands on at 3.5 s."""
+    """Make a take-over of the AV: asked at 2 s, driven from 3 s to 7 s, hands on at 3.5 s."""
     commands = record.commands.copy()
     driven = (record.times_s >= 3.0 - 1e-9) & (record.times_s <= 7.0 + 1e-9)
     commands[driven, 1] = 0.0
@@ -143,7 +143,7 @@ def _taken_over(record: RunRecord) -> RunRecord:
 
 
 def test_a_take_over_of_an_av() -> None:
-    """Only orders that take the AV's seat ask for it; or an event that is named."""
+    """Only orders of the AV's seat are requests, or a named event."""
     record = _taken_over(_play('crossing', 8.0, ((200, 'slow-zone'), (400, 'pedestrian'))))
     human, av = measure_behaviour(record)
     take_over, = av.take_overs
@@ -217,7 +217,7 @@ def test_an_av_is_measured_where_its_road_is(changed: tuple[DriverBehaviour, ...
 
 
 def test_json_holds_no_number_that_is_none(changed: tuple[DriverBehaviour, ...]) -> None:
-    """Neither NaN nor Infinity, also in the series."""
+    """It has no NaN and no Infinity, also in the series."""
     for each in changed:
         text = json.dumps(each.as_dict(series=True), allow_nan=False)
         assert len(json.loads(text)['series']['tlc']) == len(each.times_s) == 121
@@ -230,7 +230,7 @@ def test_the_same_record_gives_the_same_bits(changed: tuple[DriverBehaviour, ...
 
 
 def test_a_driver_of_nothing_but_noise_is_measured() -> None:
-    """A human who drives off the road: no lane, no failure."""
+    """A human drives off the road: no lane, no failure."""
     setup = build_setup(load_game(scenarios_directory() / 'lane_change.yaml'))
     commands = np.zeros((600, 4))
     commands[:, 0], commands[:, 2] = 0.3, 0.6

@@ -38,7 +38,7 @@ def test_leader_and_follower_bumper_to_bumper() -> None:
     assert found.follower == pytest.approx((1, 19.5, 19.5 / 26.0))
 
 
-def test_who_is_not_in_the_lane_does_not_count() -> None:
+def test_cars_outside_the_lane_do_not_count() -> None:
     """In the own lane, in the lane beyond, far away, absent; but one that overlaps by 0.5 m."""
     assert _gap([(120.0, 0.0), (120.0, 7.0), (300.0, 3.5), (math.nan, math.nan)],
                 [10.0] * 4) == (None, None)
@@ -48,7 +48,7 @@ def test_who_is_not_in_the_lane_does_not_count() -> None:
 
 
 def test_beside_each_other_and_standing() -> None:
-    """Beside each other the gap is negative; who stands behind never comes."""
+    """Beside each other the gap is negative; a standing car behind never arrives."""
     found = _gap([(103.0, 3.5), (80.0, 3.5)], [20.0, 0.0])
     assert found.leader is not None and found.follower is not None
     assert found.leader.gap == pytest.approx(-1.5) and found.leader.time_gap_s < 0.0

@@ -112,7 +112,7 @@ def test_random_cars_step_by_step(vehicle: VehicleParameters) -> None:
 
 
 def test_steps_are_looked_at_together(vehicle: VehicleParameters, road: Any) -> None:
-    """Many at once give what each gives alone."""
+    """Many at once have the same results as each alone."""
     lane = _straight_lane()
     rng = np.random.default_rng(4)
     rear = np.column_stack((np.zeros(20), rng.uniform(-0.4, 0.4, 20), rng.normal(0, 0.05, 20)))

@@ -120,5 +120,5 @@ def test_a_published_map_that_tells_of_neighbours_for_a_part_only(
 
 
 def test_a_street_without_lanes_is_no_error() -> None:
-    """Nobody is in a lane of an empty map."""
+    """On an empty map no vehicle is in a lane."""
     assert LaneVisits(RoadNetwork(LaneletNetwork())).follow(np.zeros((5, 3))) == ()

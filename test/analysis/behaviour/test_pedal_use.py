@@ -31,7 +31,7 @@ def test_applications_per_minute() -> None:
     assert use_of_pedal([travel[:1100], travel[1100:]], DT_S).per_minute == pytest.approx(8.0)
 
 
-def test_nothing_is_said_of_nobody() -> None:
+def test_without_a_driver_there_is_no_value() -> None:
     """Without a driver there is no pedal."""
     use = use_of_pedal([], DT_S)
     assert all(map(math.isnan, (*use.travel, use.share, use.per_minute)))

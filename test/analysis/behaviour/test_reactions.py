@@ -15,14 +15,14 @@ Make = Callable[..., DriverControls]
 
 
 def test_each_response_has_its_delay(controls: Make) -> None:
-    """Throttle let go after 0.6 s, brake pressed after 1.1 s, steering after 1.5 s."""
+    """Throttle released after 0.6 s, brake pressed after 1.1 s, steering after 1.5 s."""
     times_s = 0.01 * np.arange(1, COUNT + 1)
     throttle = np.clip(0.5 - 0.5 * (times_s - EVENT_S - 0.6), 0.0, 0.5)
     brake = np.where(times_s >= EVENT_S + 1.1 - 1e-9, 0.4, 0.0)
-    # Slowly at first: 10 degrees/s, and 30 from then on.
+    # Slowly at first: 10 degrees/s, and 30 degrees/s from then on.
     wheel = 10.0 * times_s + 20.0 * np.clip(times_s - EVENT_S - 1.5, 0.0, 1.0)
     found = reaction_to(EVENT_S, controls(COUNT, throttle=throttle, brake=brake, wheel_deg=wheel))
-    # A ramp of 0.5 a second has given way by 0.1 after 0.2 s; a rate is known a sample later.
+    # A ramp of 0.5 a second has fallen by 0.1 after 0.2 s; a rate is known a sample later.
     assert found == pytest.approx((0.6 + 0.2, 1.1, 1.5 + 0.01), abs=1e-9)
     later = reaction_to(EVENT_S, controls(COUNT, throttle=throttle, brake=brake, wheel_deg=wheel),
                         ResponseLimits(throttle_release=0.2, brake_press=0.5))
@@ -41,7 +41,7 @@ def test_without_a_response_there_is_none(controls: Make) -> None:
 
 
 def test_what_was_done_already_is_no_response(controls: Make) -> None:
-    """Who brakes and steers at the event responds when he does it anew."""
+    """A driver that brakes and steers at the event responds when it does so anew."""
     times_s = 0.01 * np.arange(1, COUNT + 1)
     held = np.where((times_s < EVENT_S + 0.5) | (times_s >= EVENT_S + 2.0 - 1e-9), 0.6, 0.0)
     wheel = 50.0 * np.minimum(times_s, EVENT_S + 1.0)
@@ -50,7 +50,7 @@ def test_what_was_done_already_is_no_response(controls: Make) -> None:
 
 
 def test_events_at_the_start_and_without_a_driver(controls: Make) -> None:
-    """The first command is that of the first step; where nobody drove nobody reacted."""
+    """The first command is that of the first step; without a driver there is no reaction."""
     brake = np.zeros(COUNT)
     brake[70:] = 1.0
     assert reaction_to(0.0, controls(COUNT, brake=brake)).brake_s == pytest.approx(0.71)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Steering reversals: of sines by hand, and of random signals by another reading of the text."""
+"""Steering reversals: of sines by hand, of random signals by another implementation."""
 
 import math
 
@@ -43,7 +43,7 @@ def test_sines_have_known_counts(amplitude_deg: float, frequency_hz: float,
                                  setting: ReversalSetting, count: int) -> None:
     """In each period one reversal at the top and one at the bottom; none at the very first top."""
     found = reversal_rate([_sine(amplitude_deg, frequency_hz)], DT_S, setting)
-    # Of what barely counts, or does not, the signal's ends may hold one more or less.
+    # Near the limit the signal's ends may have one reversal more or less.
     assert found == pytest.approx(count, abs=1.0 if frequency_hz == 0.6 else 0.0)
 
 

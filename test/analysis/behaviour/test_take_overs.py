@@ -41,7 +41,7 @@ def test_hands_on_and_the_first_stable_second() -> None:
     assert (found.seat_s, found.end_s) == pytest.approx((3.0, 12.0))
     assert found.to_hands_on_s == pytest.approx(2.1, abs=0.011)
     assert found.to_stable_s == pytest.approx(5.0)
-    # With all calm it is the swing that ends: down to 10 degrees of it are left at 5.75 s.
+    # Without the boundary the end of the swing counts: 10 degrees of it are left at 5.75 s.
     found, = find_take_overs(controls, np.ones_like(calm), [asked])
     assert found.to_stable_s == pytest.approx(3.75, abs=0.011)
 

@@ -42,7 +42,7 @@ joy:
 
 
 class Taking(ScriptedDriver):
-    """Somebody who has the AV from 3 s on, and presses the throttle at 3.5 s."""
+    """A driver that has the AV from 3 s on, and presses the throttle at 3.5 s."""
 
     def drives(self, n: int) -> bool:
         """Return whether the AV is obeying."""
@@ -126,7 +126,7 @@ def test_the_score_of_a_worked_example(events: Sequence[TaskEvent]) -> None:
 
 
 def test_nothing_answered_leaves_times_undefined() -> None:
-    """And no stimulus at all leaves the rate undefined."""
+    """Without any stimulus the rate is undefined, too."""
     missed = TaskEvent('detection_response', 'light', 1.0, 1.0, math.nan, 'missed', 1, 'hv0',
                        'stimulus')
     score, = detection_scores([missed])
@@ -138,13 +138,13 @@ def test_nothing_answered_leaves_times_undefined() -> None:
 
 
 def test_a_request_is_timed_until_the_first_input(record: RunRecord) -> None:
-    """Asked at 2 s: the brake at 3 s by who drives, the throttle of the AV at 3.5 s."""
+    """Asked at 2 s: the human's brake counts at 3 s, the throttle of the AV at 3.5 s."""
     rows = {row.name: row for row in task_events(record) if row.what == 'request'}
     assert rows['call'].onset_s == rows['robot'].onset_s == 2.0
     assert rows['call'].outcome == rows['robot'].outcome == 'taken'
     assert rows['call'].response_time_s == pytest.approx(1.0, abs=0.05)
     assert rows['robot'].response_time_s == pytest.approx(1.5, abs=0.02)
-    # Gone as soon as somebody drives it; else after lead and 5 s more.
+    # The request ends as soon as the AV is driven by hand; else after lead and 5 s more.
     assert rows['robot'].duration_s == pytest.approx(1.01, abs=0.011)
     assert rows['call'].duration_s == pytest.approx(8.0)
     radio = next(row for row in task_events(record) if row.name == 'radio')
@@ -153,7 +153,7 @@ def test_a_request_is_timed_until_the_first_input(record: RunRecord) -> None:
 
 
 def test_the_take_over_of_an_av_belongs_to_the_request(record: RunRecord) -> None:
-    """The same time as in the rows of tasks."""
+    """Its time is the same as in the rows of tasks."""
     _, av = measure_behaviour(record)
     take_over, = av.take_overs
     assert take_over.request is not None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Criticality of two cars in closed form, and on real maps however these lie and are numbered."""
+"""Criticality of two cars in closed form, and on real maps in any placement and numbering."""
 
 from dataclasses import replace
 import math
@@ -27,7 +27,7 @@ SCHEDULER = ScenarioScheduler(100_000_000, 10)
 
 
 class Placement:
-    """Where a map and what drives on it are put: mirrored at the x axis first, then turned."""
+    """The placement of a map and its vehicles: mirrored at the x axis first, then turned."""
 
     def __init__(self, angle: float = 0.0, mirrored: bool = False, renumbered: bool = False,
                  offset: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -49,7 +49,7 @@ class Placement:
         return (-yaw if self.mirrored else yaw) + self.angle
 
     def number(self, lanelet: int | None) -> int | None:
-        """Return a lanelet its id."""
+        """Return the id of a lanelet."""
         return lanelet if lanelet is None or not self.renumbered else 1_000_000 - lanelet
 
     def network(self, network: LaneletNetwork) -> LaneletNetwork:
@@ -90,7 +90,7 @@ def _state(pose: Array, speed: float, acceleration: float) -> Array:
 
 
 def _lane(loaded: LoadedScenario, placement: Placement) -> LoadedScenario:
-    """Put a straight lane of 400 m in the place of a scenario's roads."""
+    """Replace a scenario's roads by a straight lane of 400 m."""
     x = np.linspace(0.0, 400.0, 81)
     sides = [np.column_stack((x, np.full_like(x, y))) for y in (1.75, 0.0, -1.75)]
     network = LaneletNetwork.create_from_lanelet_list([Lanelet(*sides, 7)])
@@ -136,7 +136,7 @@ def test_two_cars_at_any_heading(cut_in: LoadedScenario) -> None:
             'gap': 45.5, 'time_gap': 2.275, 'thw': 2.275, 'ttc': 4.55,
             'ttc_a': (math.sqrt(373.0) - 10.0) / 3.0, 'drac': 100.0 / 91.0,
             'a_req': -3.0 - 100.0 / 91.0, 'ttc_2d': 4.55, 'min_distance': 45.5}, rel=1e-9)
-        # In the lane beside, at the same speed: nothing but a distance.
+        # In the lane beside, at the same speed: only a distance.
         assert np.isnan(beside[COLUMN['gap']]) and beside[COLUMN['drac']] == 0.0
         assert np.isinf(beside[[COLUMN[name] for name in ('ttc', 'ttc_a', 'ttc_2d')]]).all()
 
@@ -156,8 +156,8 @@ def test_the_nearest_in_the_corridor_leads(cut_in: LoadedScenario) -> None:
     assert gaps[1] == pytest.approx(80.0 - 0.2 - 52.25, abs=0.01)
 
 
-def test_who_is_passed_closely_does_not_lead(cut_in: LoadedScenario) -> None:
-    """0.1 m beside: no gap; but one that is touched there has one below 0, and no time left."""
+def test_a_closely_passed_car_does_not_lead(cut_in: LoadedScenario) -> None:
+    """0.1 m beside there is no gap; a touched car there has a gap below 0, and no time left."""
     for offset, gap in ((1.9, math.nan), (1.7, -3.5)):
         criticality = Criticality(_run(_lane(cut_in, Placement()),
                                        [_car('av0', Role.AUTONOMOUS)], [_car('o1', Role.STATIC)]))
@@ -175,7 +175,7 @@ SUBJECTS, STEPS = 2, 8
 
 
 def _measured(loaded: LoadedScenario, placement: Placement) -> list[TickMeasures]:
-    """Measure some recorded drives of a scenario that has been put somewhere."""
+    """Measure some recorded drives of a placed scenario."""
     obstacles = ScenarioObstacles(loaded)
     known = np.isfinite(obstacles.poses[:STEPS, :, 0]).all(axis=0)
     speeds = np.nan_to_num(np.hypot(*np.moveaxis(obstacles.velocities[:STEPS, :, :2], -1, 0)))

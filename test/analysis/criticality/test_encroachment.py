@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""WayCrossed ways: the time between one leaving and the other entering the conflict area."""
+"""Crossing paths: the time between one leaving and the other entering the conflict area."""
 
 from crgame_ros.analysis.criticality.encroachment import EncroachmentDetector, WayCrossed
 from crgame_ros.geometry.outline import placed
@@ -16,7 +16,7 @@ RADIUS = float(np.hypot(*BOX[0]))
 
 def _crossings(starts: Array, velocities: Array, seconds: float = 12.0, dt: float = 0.1,
                watched: int = 1, turn: float = 0.0) -> list[WayCrossed]:
-    """Let boxes drive straight on, seen from a map that is turned."""
+    """Compute the crossings of boxes that drive straight on, on a turned map."""
     rotation = np.array(((np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))))
     yaw = np.arctan2(velocities[:, 1], velocities[:, 0]) + turn
     crossings = EncroachmentDetector(watched, np.full(len(starts), RADIUS))
@@ -66,21 +66,21 @@ def test_at_any_angle_it_is_the_conflict_areas(angle: float) -> None:
     assert crossing.pet_s == pytest.approx(entered_s - left_s, abs=1e-6)
 
 
-def test_who_follows_meets_or_stands_crosses_nobody() -> None:
+def test_following_meeting_or_standing_is_no_crossing() -> None:
     """One behind the other, towards each other in two lanes, beside a standing one: nothing."""
     assert not _crossings(
         np.array([(-20.0, 0.0), (-40.0, 0.5), (90.0, 3.0), (5.0, 3.0)]),
         np.array([(10.0, 0.0), (9.0, 0.0), (-10.0, 0.0), (1e-9, 0.0)]), watched=2)
 
 
-def test_who_is_not_watched_counts_with_the_watched_alone() -> None:
+def test_others_count_with_the_watched_alone() -> None:
     """Of three crossing ways, those two with the watched one."""
     found = _crossings(np.array([(-20.0, 0.0), (0.0, -35.0), (30.0, -60.0)]),
                        np.array([(10.0, 0.0), (0.0, 8.0), (0.0, 8.0)]))
     assert [(each.first, each.second) for each in found] == [(0, 1), (0, 2)]
 
 
-def test_who_comes_late_crosses_no_more() -> None:
-    """After ten seconds it is forgotten; a newcomer is nobody's earlier way."""
+def test_a_late_one_crosses_no_more() -> None:
+    """A path is forgotten after ten seconds; a newcomer has no earlier path."""
     assert not _crossings(np.array([(-20.0, 0.0), (0.0, -110.0)]),
                           np.array([(10.0, 0.0), (0.0, 8.0)]), seconds=20.0)

@@ -38,7 +38,7 @@ def _searched(first: Array, second: Array, relative: Array) -> float:
         gap = own.distance(shapely.Polygon(second + time_s * relative))
         if gap < 1e-9:
             return time_s
-        # Nobody gets nearer faster than this.
+        # No pair approaches faster than this.
         time_s += max(gap / speed, 0.1 * RESOLUTION_S)
     return np.inf
 
@@ -58,7 +58,7 @@ def test_contact_against_a_search() -> None:
         expected = _searched(first, second, other - velocity)
         hits += np.isfinite(expected)
         if np.isinf(expected) or np.isinf(found):
-            # A corner that only just passes within the width of the search's step.
+            # A corner that barely passes within the width of the search's step.
             assert np.isinf(expected) and np.isinf(found), case
         assert found == pytest.approx(expected, abs=RESOLUTION_S)
     assert hits > 400

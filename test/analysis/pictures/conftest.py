@@ -45,13 +45,13 @@ def parked_cars() -> RunRecord:
 
 @pytest.fixture
 def cut_in_scene(cut_in: RunRecord) -> FrameScene:
-    """Return it to make frames of."""
+    """Return the scene of that run for frames."""
     return FrameScene(cut_in.log)
 
 
 @pytest.fixture
 def straight(cut_in: RunRecord) -> Callable[..., RunTrajectories]:
-    """Return a function that lets human and AV of the cut-in game drive as is said."""
+    """Return a function that drives human and AV of the cut-in game as given."""
     def make(human_x: list[float], human_speed: list[float], av_x: float) -> RunTrajectories:
         states = np.zeros((len(human_x), 2, 8))
         y = cut_in.log.vehicle_states[0, 1, StateColumn.Y]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Moments of runs that are known by hand."""
+"""Critical moments of runs, known by hand."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ def _record(log: RunTrajectories, *fired: FiredEvent) -> RunRecord:
 
 
 def _approach(straight: Make, steps: int, after: int) -> tuple[RunTrajectories, float]:
-    """Let the human drive at 10 m/s for some steps of 0.1 s and then stand, 40 m behind the AV."""
+    """Drive the human at 10 m/s for some steps of 0.1 s, then stand, from 40 m behind the AV."""
     times_s = 0.1 * np.arange(steps + after)
     x = 300.0 + 10.0 * np.minimum(times_s, 0.1 * steps)
     log = straight(x.tolist(), [10.0] * steps + [0.0] * after, 300.0 + 40.0)
@@ -45,7 +45,7 @@ def test_the_smallest_ttc_is_the_moment(straight: Make) -> None:
 
 
 def test_contacts_come_first_events_after_what_is_critical(straight: Make) -> None:
-    """Whatever their times; within a second the more critical one tells the other."""
+    """This holds for any times; within a second the more critical one includes the other."""
     log, _ = _approach(straight, 30, 40)
     fired = [FiredEvent('brake', 600, 60, 'trigger'), FiredEvent('gone', 300, 30, 'condition')]
     moments = critical_moments(_record(log, *fired), measure_log(log),
@@ -57,8 +57,8 @@ def test_contacts_come_first_events_after_what_is_critical(straight: Make) -> No
     assert moments[2].why == 'event brake'
 
 
-def test_who_touches_is_found_without_recorded_contacts(straight: Make) -> None:
-    """At the first tick at which the gap is closed."""
+def test_a_touch_is_found_without_recorded_contacts(straight: Make) -> None:
+    """It is at the first tick at which the gap is closed."""
     log, gap = _approach(straight, 50, 5)
     (first, *_) = critical_moments(_record(log), measure_log(log))
     assert first.time_s == pytest.approx(np.ceil(gap) / 10.0, abs=0.1)
@@ -66,6 +66,6 @@ def test_who_touches_is_found_without_recorded_contacts(straight: Make) -> None:
 
 
 def test_where_nothing_happens_there_is_no_moment(straight: Make) -> None:
-    """Both stand: how far apart they begin is none."""
+    """Both stand: their initial distance is no moment."""
     log = straight([300.0] * 10, [0.0] * 10, 340.0)
     assert critical_moments(_record(log), measure_log(log)) == ()

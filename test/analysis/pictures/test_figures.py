@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Lines of profiles and timing figures are the log's and the cycles'; tables theirs."""
+"""Lines of profiles are the log's, lines of timing figures and tables the cycles'."""
 
 import csv
 from io import StringIO
@@ -36,7 +36,7 @@ def _line(axes: Axes, name: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _timed(label: str, cycles: int, stall_s: float = 0.0) -> TimedRun:
-    """Let a run be 1 ms late at each cycle, and forgive a stall in the middle by a reset."""
+    """Make a run 1 ms late at each cycle, with a stall in the middle that a reset forgives."""
     rows = np.zeros((cycles, len(TIMING_COLUMNS)))
     n = np.arange(1, cycles + 1)
     dropped = np.where(n > cycles // 2, stall_s, 0.0)
@@ -63,7 +63,7 @@ def test_profiles_are_the_logs(two_avs: RunRecord) -> None:
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert labels == ['heading angle [rad]', 'y [m]', 'velocity [m/s]', 'acceleration [m/s$^2$]',
                       'steering angle [rad]']
-    # Told apart without colours, too.
+    # They can be distinguished without colours, too.
     lines = [line for line in figure.axes[0].lines if line.get_label() in ('hv0', 'av0', 'av1')]
     assert len({str(line.get_marker()) for line in lines}) == 3
     colours = [line.get_color() for line in lines]
@@ -102,7 +102,7 @@ def test_timing_lines_are_the_cycles() -> None:
 @pytest.mark.parametrize(('runs', 'columns', 'panels'),
                          [(1, 1, 2), (1, 2, 2), (2, 1, 4), (3, 2, 6)])
 def test_every_run_has_its_two_panels(runs: int, columns: int, panels: int) -> None:
-    """However many there are, all as wide as the page lets them be."""
+    """This holds for any number of runs; all panels are as wide as the page allows."""
     figure = timing_figure([_timed(f'run{i}', 20) for i in range(runs)], columns)
     assert len(figure.axes) == panels
     figure_bytes(figure, 'png')
@@ -146,7 +146,7 @@ def test_the_table_is_table_one() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('file_format', FORMATS)
 def test_the_same_run_gives_the_same_bytes(file_format: str, cut_in: RunRecord) -> None:
-    """Whatever the user's settings, and without a date; PDF embeds TrueType fonts."""
+    """They depend on no user settings and have no date; PDF embeds TrueType fonts."""
     def make() -> list[bytes]:
         ks = cut_in.log.ks[[10, 20]].tolist()
         return [figure_bytes(figure, file_format) for figure in (

@@ -43,7 +43,7 @@ def test_a_gif_lasts_as_long_as_the_run(cut_in: RunRecord, tmp_path: Path) -> No
 
 def test_without_ffmpeg_it_is_a_gif(cut_in: RunRecord, tmp_path: Path,
                                     monkeypatch: pytest.MonkeyPatch) -> None:
-    """Under the same name otherwise."""
+    """It has the same name but for the suffix."""
     monkeypatch.setattr(run_video.FFMpegWriter, 'isAvailable', classmethod(lambda cls: False))
     written = write_video(FrameScene(_short(cut_in, 2)), tmp_path / 'run.mp4')
     assert written == tmp_path / 'run.gif' and written.is_file()
@@ -51,7 +51,7 @@ def test_without_ffmpeg_it_is_a_gif(cut_in: RunRecord, tmp_path: Path,
 
 @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason='ffmpeg is not installed')
 def test_with_ffmpeg_it_is_mp4(cut_in: RunRecord, tmp_path: Path) -> None:
-    """An ISO file, which says so in its first bytes."""
+    """It is an ISO file by its first bytes."""
     written = write_video(FrameScene(_short(cut_in, 4)), tmp_path / 'run.mp4')
     assert written.read_bytes()[4:8] == b'ftyp'
 

@@ -33,7 +33,7 @@ def _in_map(points: FloatArray, window: FrameWindow) -> FloatArray:
 
 
 def _expected(log: RunTrajectories, row: int) -> dict[str, FloatArray]:
-    """Return the outlines of all who are there, from the log."""
+    """Return the outlines of all present vehicles and objects, from the log."""
     found = {}
     for i, item in enumerate(log.vehicles):
         pose = shifted(log.vehicle_states[row, i, :3], item.rear_to_center)
@@ -55,7 +55,7 @@ def _drawn(axes: Axes, kind: str) -> dict[str, FloatArray]:
 
 @pytest.mark.parametrize('name', ['two_avs', 'parked_cars'])
 def test_footprints_are_the_placed_outlines(name: str, request: pytest.FixtureRequest) -> None:
-    """Of everybody in the window, in data coordinates; every driven vehicle is within."""
+    """The window has all its outlines in data coordinates, and every driven vehicle."""
     log: RunTrajectories = request.getfixturevalue(name).log
     scene = FrameScene(log)
     ks = log.ks[[5, 12, 19]].tolist()
@@ -70,12 +70,12 @@ def test_footprints_are_the_placed_outlines(name: str, request: pytest.FixtureRe
         (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
         for body in driven:
             assert np.all((bodies[body] > (left, bottom)) & (bodies[body] < (right, top)))
-        # Nobody whose footprint reaches into the window is left out.
+        # No footprint that reaches into the window is left out.
         for body, corners in expected.items():
             inside = np.abs(window.to_window(corners)) < (0.5 * window.length, 0.5 * window.height)
             assert not inside.all(axis=1).any() or body in bodies
     assert len({(window.length, window.height) for window in windows}) == 1
-    # A metre is as long across as along.
+    # A metre has the same length in both directions.
     size = figure.get_size_inches()
     for axes in figure.axes:
         box = axes.get_position()
@@ -96,7 +96,7 @@ def test_the_front_is_in_front(two_avs: RunRecord) -> None:
 
 
 def test_traces_and_plans_are_the_logs(cut_in: RunRecord) -> None:
-    """The last 2 s of each rear axle; of the plan in force what is still to come."""
+    """Traces are the last 2 s of each rear axle; of the plan in force the rest is drawn."""
     log = cut_in.log
     early = np.column_stack((100.0 + np.arange(20.0), np.zeros(20), np.zeros(20)))
     late = early + (0.0, 1.0, 0.0)
@@ -106,7 +106,7 @@ def test_traces_and_plans_are_the_logs(cut_in: RunRecord) -> None:
     frame = scene.at(int(log.ks[30]), window)
     for i, line in enumerate(frame.traces):
         assert _in_map(line.points, window) == pytest.approx(log.vehicle_states[10:31, i, :2])
-    # At 3.0 s the second plan has not come yet, and 30 steps of the first are over: all it has.
+    # At 3.0 s the second plan has not come yet, and all 30 steps of the first are over.
     assert frame.plans == ()
     (plan,) = scene.at(int(log.ks[32]), window).plans
     assert _in_map(plan.points, window) == pytest.approx(late[2:, :2])
@@ -131,7 +131,7 @@ def test_the_road_is_cut_to_the_window(cut_in_scene: FrameScene) -> None:
 
 
 def test_a_camera_goes_along_where_one_stretch_is_too_long(cut_in: RunRecord) -> None:
-    """Over 0.4 s it stands, over 8 s it goes with the AV; both sizes are the same in a figure."""
+    """It stands over 0.4 s and follows the AV over 8 s; both sizes are the same in a figure."""
     near = series_windows(cut_in.log, [20, 22, 24])
     assert len(set(near)) == 1
     far = series_windows(cut_in.log, [0, 40, 80])
@@ -142,7 +142,7 @@ def test_a_camera_goes_along_where_one_stretch_is_too_long(cut_in: RunRecord) ->
     np.testing.assert_allclose(away, [away[0]] * 3, atol=1e-9)
 
 
-def test_names_stand_beside_their_vehicles_and_on_nobody(two_avs: RunRecord) -> None:
+def test_names_stand_beside_their_vehicles_and_on_none(two_avs: RunRecord) -> None:
     """One name each, whose middle is in no footprint and within 15 m of its vehicle."""
     axes = frames_figure(FrameScene(two_avs.log), two_avs.log.ks[[40]].tolist()).axes[0]
     bodies = _drawn(axes, 'body')
@@ -192,7 +192,7 @@ def test_an_svg_holds_the_same_footprints(two_avs: RunRecord) -> None:
 
 
 def test_strange_names_break_no_svg(cut_in: RunRecord) -> None:
-    """Ids come from files that anybody may have written."""
+    """Ids come from files of unknown authors."""
     log = cut_in.log
     first = log.descriptions[0]
     named = ObjectDescription('<a&"b', first.type, first.role, first.shape, first.rear_to_center)
@@ -218,7 +218,7 @@ def test_a_run_at_a_glance(two_avs: RunRecord) -> None:
 
 
 def test_a_step_that_is_not_in_the_log_is_refused(cut_in_scene: FrameScene) -> None:
-    """In one line, with those that are."""
+    """The error is one line, with the steps that are."""
     window = cut_in_scene.windows([0])[0]
     with pytest.raises(InputError, match='give one of 0 to 80'):
         cut_in_scene.at(81, window)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run to report: offline, with a title that somebody wrote in bad faith."""
+"""A run to report: offline, with a malicious title."""
 
 from dataclasses import replace
 import json
@@ -17,7 +17,7 @@ from crgame_ros.simulation.setup import build_setup
 import pytest
 
 HOSTILE = '</title><script>alert(1)</script> "quoted" \'too\' 🚗 \u202eesrever & <b>bold</b>'
-# What `timing_report` could say: of strings that came from a recording, nothing is trusted.
+# Possible output of `timing_report`: strings from a recording are not trusted.
 TIMING: dict[str, Any] = {
     **dict.fromkeys(('final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms',
                      'timeout_ratio', 'time_efficiency', 'precision_ratio', 'step_error_p99_ms',

@@ -30,7 +30,7 @@ def test_every_column_keeps_its_extremes_exactly(seed: int) -> None:
     found_xs, found_ys = thinned(xs, ys, columns)
     assert len(found_xs) <= 3 * columns + 2 and (np.diff(found_xs) >= 0.0).all()
     assert found_xs[0] == xs[0] and found_xs[-1] == xs[-1]
-    # What is left are points of the line.
+    # The remaining points are points of the line.
     place = np.searchsorted(xs, found_xs)
     np.testing.assert_array_equal(ys[place], found_ys)
     edges = np.linspace(xs[0], xs[-1], columns + 1)
@@ -45,7 +45,7 @@ def test_every_column_keeps_its_extremes_exactly(seed: int) -> None:
 
 
 def test_a_peak_of_one_point_in_twenty_minutes_stays() -> None:
-    """At 100 Hz; and a line that is short stays as it is."""
+    """This holds at 100 Hz; a short line is unchanged."""
     xs = np.arange(120_000) * 0.01
     ys = np.zeros(120_000)
     ys[77_777], ys[33_333] = 0.123456789, -9.87
@@ -63,7 +63,7 @@ def test_all_lines_together_have_a_limit() -> None:
 
 
 def test_what_is_encoded_can_be_read_to_the_last_bit() -> None:
-    """Values in 64 bits, little-endian; what is infinite is a hole, as in a plot."""
+    """Values have 64 bits, little-endian; infinite ones are gaps, as in a plot."""
     ys = np.array([1.0 / 3.0, np.inf, -1e-300, np.nan, 7.0])
     found = encoded(Plot('key', 'T', 'm', (PlotLine('hv0', np.arange(5.0), ys, 'av-0'),),
                          (PlotLimit(3.0, 'limit'),), (PlotSpan(1.0, 2.0, 'span', 'warn'),)), 100)
@@ -75,7 +75,7 @@ def test_what_is_encoded_can_be_read_to_the_last_bit() -> None:
 
 
 def test_the_way_in_a_plane_keeps_its_ends() -> None:
-    """However few points are left of it."""
+    """This holds for any number of points."""
     xs = np.linspace(0.0, 1.0, 10_001)
     plot = Plot('ways', 'T', 'm', (PlotLine('hv0', xs, 2.0 * xs, 'av-0'),), plane=True)
     line = encoded(plot, 60)['lines'][0]
@@ -85,7 +85,7 @@ def test_the_way_in_a_plane_keeps_its_ends() -> None:
 
 @pytest.mark.parametrize('text', ['</script><script>alert(1)</script>', '<!--', ']]>', '\u2028&'])
 def test_json_cannot_end_its_element(text: str) -> None:
-    """Nothing that HTML looks for is in it, and it reads as it was."""
+    """It has no characters that HTML interprets, and is read back unchanged."""
     written = script_json({text: [text]})
     assert not set('<>&') & set(written)
     assert json.loads(written) == {text: [text]}

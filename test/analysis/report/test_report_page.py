@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The page: what it says, and that nothing in it can do anything."""
+"""The report's page: its content, and that foreign text in it cannot run."""
 
 import base64
 from dataclasses import replace
@@ -28,11 +28,11 @@ def html(run: ReportRun) -> str:
 
 @pytest.fixture(scope='module')
 def page(html: str) -> Page:
-    """Read it."""
+    """Parse the page."""
     return Page(html)
 
 
-def test_what_somebody_wrote_is_text(page: Page) -> None:
+def test_foreign_text_is_text(page: Page) -> None:
     """Title, folder, refusal, violation and notice, as they were written."""
     title = '</title><script>alert(1)</script> "quoted" \'too\' 🚗 ⟨U+202E⟩esrever & <b>bold</b>'
     assert page.text_of('h1') == [title] and page.text_of('title') == [f'{title} – report']
@@ -46,7 +46,7 @@ def test_what_somebody_wrote_is_text(page: Page) -> None:
 
 
 def test_only_its_own_scripts_and_styles_may_run(page: Page) -> None:
-    """The hashes in the policy are those of what is there; nothing comes from elsewhere."""
+    """The hashes in the policy are those of its scripts and styles; it loads nothing else."""
     policy = next(found['content'] for found in page.attributes('meta')
                   if found.get('http-equiv') == 'Content-Security-Policy') or ''
     rules = dict(rule.split(' ', 1) for rule in policy.split('; '))
@@ -120,7 +120,7 @@ def _numbers(text: str) -> np.ndarray:
 
 
 def test_the_course_agrees_with_the_worst(run: ReportRun) -> None:
-    """What is plotted of a measure has its worst value at its time."""
+    """The plotted line of a measure has its worst value at its time."""
     for i, vehicle in enumerate(run.criticality.report()):
         for place, name in enumerate(PLOTTED):
             known = vehicle.worst.get(name)
@@ -134,12 +134,12 @@ def test_the_course_agrees_with_the_worst(run: ReportRun) -> None:
 
 
 def test_the_same_run_gives_the_same_bytes(run: ReportRun, html: str) -> None:
-    """Nothing in it tells when it was written."""
+    """The page has no time of writing."""
     assert report_html([run]) == html
 
 
 def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
-    """From when to when, by hand: the human in reverse, somebody in the AV's seat."""
+    """Their times are known by hand: the human in reverse, a driver in the AV's seat."""
     commands = run.record.commands.copy()
     commands[100:200, 0, 3] = 1.0
     commands[300:450, 1] = 0.25
@@ -153,7 +153,7 @@ def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
 
 
 def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None:
-    """Causes that took time, the worst in words; and that there were none, or nobody told."""
+    """It has each cause with its time, the worst in words; or that there are none or unknown."""
     cells = [text for path, text in page.texts
              if path and path[-1] in ('td', 'th', 'bdi', 'caption')]
     assert '2 steps were late by more than 0.5 ms' in cells
@@ -203,7 +203,7 @@ def test_what_people_in_the_seats_saw_is_told(run: ReportRun) -> None:
 
 
 def test_what_a_recording_does_not_tell_is_left_out(run: ReportRun) -> None:
-    """Without cycles there are neither inputs nor timing, and the page says so."""
+    """Without cycles there are no inputs and no timing, and the page says so."""
     bare = replace(run, timing=None, record=replace(
         run.record, ns=run.record.ns[:0], commands=run.record.commands[:0]))
     page = Page(report_html([bare]))
@@ -228,7 +228,7 @@ def test_several_runs_stand_side_by_side(run: ReportRun) -> None:
 
 
 def test_how_people_drove_is_told_with_its_variants(page: Page, run: ReportRun) -> None:
-    """The human's values, and what each measure is; the AV, whom nobody drove, has none."""
+    """It has the human's values and the measures' definitions; the undriven AV has none."""
     human, av = run.behaviour
     texts = [text for _, text in page.texts]
     assert 'How people drove' in page.text_of('h2')
@@ -243,7 +243,7 @@ def test_how_people_drove_is_told_with_its_variants(page: Page, run: ReportRun) 
 
 
 def _rows(page: Page, caption: str) -> dict[str, list[str]]:
-    """Return the cells of a table that hold anything, by the names of its rows."""
+    """Return the non-empty cells of a table, by the names of its rows."""
     rows: dict[str, list[str]] = {}
     inside, name = False, ''
     for path, text in page.texts:
@@ -275,7 +275,7 @@ def test_how_planners_drove_is_told_in_numbers(page: Page, run: ReportRun) -> No
     assert rows['Plans accepted that are no braking plans'] == ['0.700', '–']
     texts = ' '.join(text for _, text in page.texts)
     assert 'fails goal_reached' in texts and 'free drive at the speed limit' in texts
-    # Nobody measured ages: there is no row of dashes.
+    # Ages were not measured: there is no row of dashes.
     assert 'Age of the plan in use, median' not in rows
     titles = [each.get('title') or '' for each in page.attributes('span')]
     assert any(title.startswith(MEASURES_OF_SCORES['SM1'].definition) for title in titles)

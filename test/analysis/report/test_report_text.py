@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Text of somebody else comes out as text."""
+"""Foreign text comes out as text."""
 
 from html.parser import HTMLParser
 import math
@@ -35,7 +35,7 @@ def _read(html: str) -> _Reader:
     '👩‍🚗 drives', 'שלום', '']
 )
 def test_markup_quotes_and_emoji_are_text(text: str) -> None:
-    """A parser of HTML reads what was written, and no element but the one that isolates it."""
+    """A parser of HTML reads the same text, and no element but the one that isolates it."""
     found = _read(free(text))
     assert found.tags == ['bdi'] and found.text == text
     attribute = _read(f'<p title="{plain(text)}">')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs that the tests of the reproduction share: they take seconds to make."""
+"""Runs that the tests of the reproduction share: each takes seconds."""
 
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.analysis.reproduction.recorded_human import record_offline, RecordedHuman

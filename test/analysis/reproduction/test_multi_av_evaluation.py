@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What must come out of the multi-AV experiment does, and faults in a run are found."""
+"""The multi-AV experiment has its expected results, and faults in a run are found."""
 
 from dataclasses import replace
 
@@ -40,14 +40,14 @@ def _unmet(run: MultiAvRun) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.matrix
 def test_each_reacts(idm: MultiAvRun) -> None:
-    """Both are elsewhere than without the human, who is nowhere in that game."""
+    """Both are elsewhere than in the game without the human."""
     assert _unmet(idm) == []
     assert [item.id for item in idm.alone.vehicles] == ['av0', 'av1']
     assert len(idm.alone.ks) == round(10 * DURATION_S) + 1
 
 
-def test_nobody_reacts() -> None:
-    """At constant velocity nobody is anywhere else without the human."""
+def test_without_reactions() -> None:
+    """At constant velocity both AVs are in the same places without the human."""
     run = _run('constant-velocity')
     assert run.reactions() == {'av0': 0.0, 'av1': 0.0}
     assert 'each AV reacts' in _unmet(run)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""`crgame reproduce`: its files, its exit codes, and what it says where nobody reacts."""
+"""`crgame reproduce`: its files, exit codes, and output if no AV reacts."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ WORDS = ['reproduce', 'commonroad-game']
 
 
 @pytest.mark.exhaustive
-def test_nobody_reacts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_reactions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All files are there, each unmet expectation has its line, and the exit code is 1."""
     out = tmp_path / 'again'
     out.mkdir()
@@ -39,7 +39,7 @@ def test_nobody_reacts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
         assert f'({name}.svg)' in report
     assert sorted(path.name for path in (tmp_path / 'again_2' / 'runs').iterdir()) == [
         'idm.xml', 'reactive.xml', 'two_avs_idm.xml', 'two_avs_reactive.xml']
-    # What was there stays as it was.
+    # Existing files are unchanged.
     assert not list(out.iterdir())
 
 
@@ -51,7 +51,7 @@ def test_nobody_reacts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     (['--reactive', 'nowhere.py:Nobody'], 'nowhere.py')])
 def test_refusals(words: list[str], message: str, tmp_path: Path,
                   capsys: pytest.CaptureFixture[str]) -> None:
-    """What cannot be used is told in one line before anything is run or written."""
+    """Unusable arguments are refused in one line before anything is run or written."""
     assert main([*WORDS, '--offline', '--out', str(tmp_path / 'out'), *words]) == 2
     told = capsys.readouterr().err
     assert message in told

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What must come out of the single-AV experiment does, and does not where nobody reacts."""
+"""The single-AV experiment has its expected results, but not if the AV does not react."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ def test_idm(idm: Alternative) -> None:
         'leaves its lane', 'passes the human', 'does not stop']
 
 
-def test_nobody_reacts(cut_in: RecordedHuman, unmoved: Alternative) -> None:
+def test_without_reactions(cut_in: RecordedHuman, unmoved: Alternative) -> None:
     """At its speed the AV runs into the human: only the human's part is met."""
     assert _unmet(unmoved, IDM_EXPECTATIONS) == [
         'comes to a stop', 'keeps a gap behind the human', 'no contact']
@@ -49,7 +49,7 @@ def test_nobody_reacts(cut_in: RecordedHuman, unmoved: Alternative) -> None:
 
 @pytest.mark.slow
 def test_reactive() -> None:
-    """It goes around the human, whom it has passed after 12.5 s."""
+    """The AV drives around the human, and has passed after 12.5 s."""
     recorded = record_offline(scenarios_directory() / 'cut_in.yaml', 'constant-velocity', 12.5)
     run = recorded.against('reactive')
     assert _unmet(run, REACTIVE_EXPECTATIONS) == []

@@ -33,7 +33,7 @@ def _loop(lag_s: float) -> TimedRun:
 
 
 def test_order() -> None:
-    """Each of the three errors is looked at, and a loop that is no better meets none."""
+    """Each of the three errors is checked; a loop that is no better meets none."""
     met = judge_synchronization(Synchronization(_loop(0.0), _loop(0.001)))
     assert [each.is_met for each in met] == [True, True, True]
     assert met[0].found == '0.00 ms, naive 99.00 ms'
@@ -57,7 +57,7 @@ def test_paper_table() -> None:
 
 
 def test_naive_loop(tmp_path: Path) -> None:
-    """Its cycles tell what its metrics do; it never catches up, and only what it did counts."""
+    """Its cycles agree with its metrics; it never catches up, and only done cycles count."""
     setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
     loop = NaiveLoop(setup, tmp_path / 'naive')
     loop.run(0.5)

@@ -49,7 +49,7 @@ def road(limit: float | None = LIMIT) -> LoadedScenario:
 
 def straight(speed: Array | float, steps: int = 51, start: float = 20.0, y: float = 0.0,
              yaw: float = 0.0) -> tuple[Array, Array]:
-    """Return poses (K, 3) and speeds (K) of who drives straight on along its yaw."""
+    """Return poses (K, 3) and speeds (K) of a vehicle that drives straight on along its yaw."""
     speeds = np.broadcast_to(np.asarray(speed, dtype=float), steps).copy()
     way = np.concatenate(([0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * DT_S)))
     return np.column_stack((start + way * np.cos(yaw), y + way * np.sin(yaw),
@@ -65,6 +65,6 @@ def drive(speed: Array | float = LIMIT, *tracks: Track, rear_to_center: float = 
 
 def track(speed: Array | float, start: float, y: float = 0.0, yaw: float = 0.0, steps: int = 51,
           kind: TrackKind = 'vehicle', name: str = 'o1') -> Track:
-    """Return somebody else who drives straight on."""
+    """Return another vehicle that drives straight on."""
     poses, speeds = straight(speed, steps, start, y, yaw)
     return Track(name, kind, CAR, poses, np.abs(speeds))

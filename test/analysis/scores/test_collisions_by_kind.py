@@ -58,8 +58,8 @@ def test_the_first_touch_is_found(roads: RoadNetwork) -> None:
     assert found.time_s == pytest.approx(3.8)
 
 
-def test_who_is_absent_is_not_touched(roads: RoadNetwork) -> None:
-    """Who has no pose is nowhere."""
+def test_an_absent_vehicle_is_not_touched(roads: RoadNetwork) -> None:
+    """A vehicle without a pose is absent."""
     gone = track(0.0, 40.0)
     gone.poses[:45] = np.nan
     mine = drive(10.0, Track('o1', 'vehicle', gone.shape, gone.poses, gone.speeds))
@@ -67,7 +67,7 @@ def test_who_is_absent_is_not_touched(roads: RoadNetwork) -> None:
 
 
 def test_types_are_grouped_as_nuplan_does() -> None:
-    """Pedestrians and bicycles are vulnerable; what does not drive is an object."""
+    """Pedestrians and bicycles are vulnerable; non-driving things are objects."""
     assert kind_of_type('pedestrian') == kind_of_type('bicycle') == 'vulnerable'
     assert kind_of_type('constructionZone') == kind_of_type('pillar') == 'object'
     assert kind_of_type('truck') == kind_of_type('unknown') == 'vehicle'

@@ -89,11 +89,12 @@ def test_parts_of_constant_derivatives(scenario: Scenario, problem: PlanningProb
         4.0 * (TIME_S - 2.0 * DT_S))
 
 
-def test_distance_to_who_is_ahead(scenario: Scenario, problem: PlanningProblem) -> None:
+def test_distance_to_the_vehicle_ahead(scenario: Scenario, problem: PlanningProblem) -> None:
     """
-    exp(-0.2 d) for d m less the checker's ego radius, w / 2.5; nobody ahead costs nothing.
+    exp(-0.2 d) for d m less the checker's ego radius, w / 2.5; without a vehicle ahead 0.
 
-    Nor does, in the code, who is turned by exactly 0 rad: docs/scores.md says so.
+    In the code a vehicle ahead that is turned by exactly 0 rad costs nothing, too: see
+    docs/scores.md.
     """
     _check_distance(scenario, problem, 1e-6, TIME_S * math.exp(
         -0.2 * (20.0 - vehicle_parameters[KIND].w / 2.5)))

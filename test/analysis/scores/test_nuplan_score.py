@@ -31,7 +31,7 @@ def scorer() -> NuplanScorer:
 
 
 def _expert(way: float, steps: int = 51) -> Expert:
-    """Return an expert who drives so far along the lane [m]."""
+    """Return an expert that drives so far along the lane [m]."""
     return Expert('human', straight(way / ((steps - 1) * DT_S), steps)[0])
 
 
@@ -99,7 +99,7 @@ def test_progress(scorer: NuplanScorer, way: float, making: float) -> None:
 
 
 def test_what_is_to_be_known_of_an_expert(scorer: NuplanScorer) -> None:
-    """One who drove for less time, elsewhere, or off every lane."""
+    """No score for an expert that drove for less time, elsewhere, or off every lane."""
     found = scorer.score(drive(), _expert(20.0, 21), None)
     assert found.own_progress == pytest.approx(20.0, abs=1e-6)
     assert found.remarks == ('human drove for 2.0 s: progress is compared as long',)
@@ -122,8 +122,8 @@ def test_time_to_collision(scorer: NuplanScorer, gap: float, least_s: float,
     assert found.weighted['time_to_collision'] == expected
 
 
-def test_who_is_beside_counts_only_between_lanes(scorer: NuplanScorer) -> None:
-    """A car that comes from the side with 6 m/s: of interest only to who straddles two lanes."""
+def test_a_car_beside_counts_only_between_lanes(scorer: NuplanScorer) -> None:
+    """A car that comes from the side at 6 m/s counts only for a car astride two lanes."""
     beside = track(6.0, 24.0, y=8.0, yaw=-math.pi / 2.0, steps=5)
     for y, counts in ((0.0, False), (1.75, True)):
         found = scorer.score(drive(5.0, beside, steps=5, y=y), None, None)
@@ -140,7 +140,7 @@ def test_speed_limit(scorer: NuplanScorer, excess: float) -> None:
 
 
 def test_without_a_limit_there_is_no_excess() -> None:
-    """And the score says so."""
+    """The score says so."""
     found = NuplanScorer(road(None)).score(drive(30.0), None, None)
     assert found.weighted['speed_limit'] == 1.0
     assert 'no speed limit is known where it drove' in found.remarks

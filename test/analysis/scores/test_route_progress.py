@@ -25,7 +25,7 @@ def roads() -> RoadNetwork:
 
 
 def test_lanes_beside_are_the_same_part(roads: RoadNetwork) -> None:
-    """Who changes lanes drives on along the route; the oncoming lane is off it."""
+    """A lane change stays on the route; the oncoming lane is off it."""
     route = ComparedRoute(roads, [1, 2])
     assert route.lanelets == [1]
     x = np.linspace(20.0, 70.0, 11)
@@ -35,7 +35,7 @@ def test_lanes_beside_are_the_same_part(roads: RoadNetwork) -> None:
 
 
 def test_off_the_route_nothing_is_gained(roads: RoadNetwork) -> None:
-    """What was driven beside it counts again once it is entered again, as in nuPlan."""
+    """The way driven off it counts once the route is entered again, as in nuPlan."""
     points = np.array([(20.0, 0.0), (30.0, 0.0), (40.0, -20.0), (50.0, -20.0)])
     assert ComparedRoute(roads, [1]).progress(points) == pytest.approx(10.0)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Solutions that somebody made: of any vehicle model, together, and among who comes later."""
+"""Foreign solutions: of any vehicle model, together, and among later obstacles."""
 
 from dataclasses import replace
 import json
@@ -131,7 +131,7 @@ def test_problems_solved_together_meet_each_other() -> None:
     assert 'solved_all_problems' in alone.commonroad.checks.failed
 
 
-def test_who_comes_later_is_in_the_way() -> None:
+def test_a_later_obstacle_is_in_the_way() -> None:
     """A phantom obstacle, which the checker passes over, is hit from time step 12 on."""
     shape = Rectangle(4.0, 1.8, np.array([38.0, 0.0]))
     phantom = PhantomObstacle(9, SetBasedPrediction(
@@ -169,7 +169,7 @@ def test_positions_of_rear_axles_are_recognised() -> None:
     written = [KSState(time_step=state.time_step, position=state.position - rear * np.array(
         (math.cos(state.orientation), math.sin(state.orientation))), velocity=state.velocity,
         steering_angle=state.steering_angle, orientation=state.orientation) for state in driven]
-    # As the model gives them they are centres.
+    # The model's own positions are centres.
     verdicts = {}
     for name, states in (('given', driven), ('moved', written)):
         found, = _score([_solved(states)])

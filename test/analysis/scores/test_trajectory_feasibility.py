@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Feasibility of trajectories that a model has driven, and of those that none can."""
+"""Feasibility of trajectories that a model has driven, and of those that no model can."""
 
 import json
 
@@ -36,7 +36,7 @@ def problem() -> PlanningProblem:
 
 
 def _driven(problem: PlanningProblem, steps: int = 8, dt_s: float = DT_S) -> list[KSState]:
-    """Let the checker's own model drive a bend while it gains speed."""
+    """Drive the checker's own model through a bend with increasing speed."""
     dynamics = VehicleDynamics.KS(KIND)
     inputs = [InputState(time_step=step, steering_angle_speed=0.1, acceleration=2.0)
               for step in range(steps)]
@@ -64,10 +64,10 @@ def test_what_the_model_drove_is_feasible(problem: PlanningProblem) -> None:
 def test_what_no_model_drives(problem: PlanningProblem, change: str, first: int,
                               excess: tuple[str, float], reason: str) -> None:
     """
-    From step 4 to 5 something jumps: that is the first transition, told with what it lacks.
+    A value jumps from step 4 to 5: that is the first bad transition, named with its reason.
 
     The model may gain 11.5 m/s^2 and steer 0.4 rad/s; the drive has 2 m/s^2 and 0.1 rad/s already.
-    Steering angles themselves are not compared by the checker, but what they lead to is.
+    The checker does not compare the steering angles themselves, but their effects.
     """
     states = _driven(problem)
     for state in states[5:]:
@@ -136,6 +136,6 @@ def test_the_verdict_is_that_of_the_search(problem: PlanningProblem, aside: floa
 
 
 def test_a_single_state_has_no_transition(problem: PlanningProblem) -> None:
-    """Nothing is claimed of it."""
+    """It has no verdict."""
     found = check_feasibility(_solution(_driven(problem)[:1]), problem, DT_S)
     assert found.feasible is None and 'no transition' in found.reason

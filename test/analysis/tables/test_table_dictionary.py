@@ -42,7 +42,7 @@ def test_every_column_is_explained(table: TableDeclaration) -> None:
 
 
 def test_measures_are_defined_by_themselves() -> None:
-    """Unit and definition of each are those that the measure says of itself."""
+    """Unit and definition of each are the measure's own."""
     columns = {column.name: column for column in PAIRS.columns}
     assert list(columns)[-len(MEASURES):] == list(MEASURES)
     for name, measure in MEASURES.items():
@@ -51,7 +51,7 @@ def test_measures_are_defined_by_themselves() -> None:
 
 
 def test_a_table_schema_says_what_the_standard_wants() -> None:
-    """The words of Table Schema, of a column of each kind."""
+    """A column of each kind has the terms of Table Schema."""
     schema = {table.name: table_schema(table) for table in TABLES}
     fields = {field['name']: field for field in schema['states']['fields']}
     assert fields['k']['type'] == 'integer'

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A folder of tables: whole or not at all, and nobody else's files."""
+"""A folder of tables is written whole or not at all, and foreign files stay."""
 
 import hashlib
 import json
@@ -47,8 +47,8 @@ def test_the_dictionary_tells_of_the_files(tmp_path: Path, file_format: Any) -> 
 
 
 @pytest.mark.parametrize('error', [KeyboardInterrupt(), InputError('no'), ValueError('bug')])
-def test_who_is_interrupted_leaves_what_was_there(tmp_path: Path, error: BaseException) -> None:
-    """Nothing in a new folder, in an old one the earlier export as it was."""
+def test_an_interruption_leaves_what_was_there(tmp_path: Path, error: BaseException) -> None:
+    """A new folder has no files, an old one has the earlier export unchanged."""
     out = tmp_path / 'out'
     with pytest.raises(type(error)):
         fill(out, 1, error=error)
@@ -61,7 +61,7 @@ def test_who_is_interrupted_leaves_what_was_there(tmp_path: Path, error: BaseExc
 
 
 def test_an_earlier_export_is_replaced_and_nothing_else(tmp_path: Path) -> None:
-    """Also by another format; strangers' files stay, or stop it."""
+    """This holds also for another format; foreign files stay, or stop it."""
     fill(tmp_path, 1)
     (tmp_path / 'notes.csv').write_text('mine')
     fill(tmp_path, 2, 'csv')
@@ -76,8 +76,8 @@ def test_an_earlier_export_is_replaced_and_nothing_else(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('text', ['{}', 'no JSON', '[]', '{"createdBy": "somebody"}',
                                   '{"createdBy": "crgame_ros", "resources": [{"path": 3}]}'])
-def test_a_dictionary_of_somebody_else_is_not_touched(tmp_path: Path, text: str) -> None:
-    """Whatever is in a datapackage.json, it is replaced only if it tells of our tables."""
+def test_a_foreign_dictionary_is_not_touched(tmp_path: Path, text: str) -> None:
+    """A datapackage.json is replaced only if it describes our tables."""
     (tmp_path / 'datapackage.json').write_text(text)
     if 'crgame_ros' in text:
         fill(tmp_path, 1)
@@ -101,7 +101,7 @@ def test_a_dictionary_cannot_name_files_to_remove_elsewhere(tmp_path: Path) -> N
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
-    """A file in its place, say."""
+    """For instance a file is in its place."""
     (tmp_path / 'file').write_text('')
     with pytest.raises(InputError, match='cannot be written'):
         fill(tmp_path / 'file' / 'out', 1)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A table's file: what others read out of it, in pieces, and what is refused."""
+"""A table's file: readers' results, writing in pieces, and refusals."""
 
 import csv
 import math
@@ -48,7 +48,7 @@ def write(folder: Path, file_format: Any, *pieces: dict[str, Any]) -> Path:
 
 
 def same_numbers(found: list[float | None]) -> bool:
-    """Compare with VALUES bit by bit; where NaN is missing, either will do."""
+    """Compare with VALUES bit by bit; NaN and missing count as equal."""
     return np.array_equal(np.array([math.nan if each is None else each for each in found]),
                           np.array(VALUES), equal_nan=True)
 
@@ -125,8 +125,8 @@ def test_texts_that_nothing_takes(tmp_path: Path) -> None:
         assert found == ['a\ufffdb', 'a\ufffd[31m', 'a?b']
 
 
-def test_an_infinite_first_row_is_a_number_to_who_looks_at_few(tmp_path: Path) -> None:
-    """Whole numbers and missing ones first: who guesses types by the first rows guesses right."""
+def test_an_infinite_first_row_is_a_number_to_hasty_readers(tmp_path: Path) -> None:
+    """With whole and missing numbers first, a guess of the type by the first rows is right."""
     values = np.concatenate((np.full(60, np.nan), np.zeros(60), [0.5]))
     path = write(tmp_path, 'csv', {'number': np.arange(121), 'value': values})
     frame = polars.read_csv(path, infer_schema_length=10)
@@ -147,7 +147,7 @@ def test_written_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_table_without_rows_has_its_columns(tmp_path: Path) -> None:
-    """And so has one whose last piece is empty."""
+    """So has a table whose last piece is empty."""
     for file_format in FORMATS:
         for pieces in ((), ({'number': []},)):
             path = write(tmp_path, file_format, *pieces)
@@ -155,7 +155,7 @@ def test_a_table_without_rows_has_its_columns(tmp_path: Path) -> None:
             assert (frame.columns, frame.height) == (DECLARED.schema.names, 0)
 
 
-def test_columns_that_nobody_declared_are_refused(tmp_path: Path) -> None:
+def test_undeclared_columns_are_refused(tmp_path: Path) -> None:
     """A misspelt column must not be dropped in silence."""
     with pytest.raises(KeyError, match='valu'):
         write(tmp_path, 'parquet', {'number': [1], 'valu': [1.0]})

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What tests of summaries share."""
+"""Shared fixtures of the tests of summaries."""
 
 from pathlib import Path
 import sys

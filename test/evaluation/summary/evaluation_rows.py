@@ -31,7 +31,7 @@ class Evaluation:
     def add(self, status: str = 'ok', reason: str = '', traceback: str = '',
             avs: Sequence[Mapping[str, Any]] = (), hv: Mapping[str, Any] | None = None,
             **factors: Any) -> str:
-        """Add a cell, its AVs with what was measured of them, and perhaps a human."""
+        """Add a cell, its AVs with their measures, and perhaps a human."""
         own = FACTORS | factors
         key = key_of(own)
         self.cells.append({'cell': key, **own, 'status': status, 'reason': reason,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Intervals beside closed forms, SciPy's, and how often they hold the truth."""
+"""Intervals against closed forms, SciPy's, and their coverage of the true value."""
 
 from crgame_ros.evaluation.summary.group_bootstrap import DrawnUnits, GroupBootstrap
 import numpy as np
@@ -39,7 +39,7 @@ def test_intervals_of_cells_are_those_of_scipy(blocks: int) -> None:
 
 @pytest.mark.parametrize('blocks', [1, 8])
 def test_intervals_of_cells_have_the_width_of_theory(blocks: int) -> None:
-    """The bootstrap's standard error is that of the mean of the sample as it is."""
+    """The bootstrap's standard error is that of the mean of the given sample."""
     values = np.random.default_rng(5).normal(10.0, 2.0, 400)
     _, low, high = _cells(values, blocks)
     assert (high - low) / 2.0 == pytest.approx(HALF * values.std() / 20.0, rel=0.03)
@@ -101,7 +101,7 @@ def test_intervals_of_scenarios_hold_the_truth_and_those_of_cells_do_not() -> No
                 _scenarios(means, cells, 400, seed),
                 _cells((means[:, None] + cells).reshape(-1), resamples=100))):
             held[kind] += low <= 0.0 <= high
-    # Percentile intervals of 30 values hold it in about 94 %; cells count 20 times what there is.
+    # Percentile intervals of 30 values hold it in about 94 %; cells count each value 20 times.
     assert 0.91 < held[0] / 300 < 0.98
     assert held[1] / 300 < 0.65
 

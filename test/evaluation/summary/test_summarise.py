@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluations summed up, beside numbers that are got in another way."""
+"""Summaries of evaluations, against numbers from another computation."""
 
 from collections.abc import Sequence
 import math
@@ -76,7 +76,7 @@ def test_pairs_are_cells_alike_in_all_but_the_planner(two: Summary) -> None:
     # Of cell 2 the mean is that of its second AV: 6; of 3, 4, 5 it is 3 + number.
     ttc = _of(two, 'worst_ttc', 'mine', difference=True)
     assert (ttc.value, ttc.n) == (pytest.approx(np.mean([6.0, 6.0, 7.0, 8.0]) - 2.0), 4)
-    # Cell 3: one of its two AVs touched somebody.
+    # Cell 3: one of its two AVs had a contact.
     assert _of(two, 'collision', 'mine', difference=True).value == pytest.approx(0.5 / 4.0)
     failed = _of(two, 'failed', 'mine', difference=True)
     assert (failed.value, failed.n) == (pytest.approx((2 - 1) / 7), 7)
@@ -100,7 +100,7 @@ def test_the_worst_cells_come_contacts_first(two: Summary) -> None:
     assert [(cell.values, cell.factors[2], cell.vehicle) for cell in two.worst[:3]] == [
         ((1.0, 1.5), 'mine', 'av0'), ((1.0, 5.0), 'mine', 'av0'), ((0.0, 2.0), 'idm', 'av0')]
     assert len(two.worst) == 10 and len({cell.key for cell in two.worst}) == 10
-    # A cell that failed is none of them.
+    # A failed cell is not among them.
     assert all(cell.values[1] == 2.0 for cell in two.worst[2:9])
 
 
@@ -120,7 +120,7 @@ def test_few_scenarios_draw_cells_and_more_draw_scenarios(tmp_path: Path, two: S
 @pytest.mark.slow
 @pytest.mark.parametrize('scenarios', [3, 12])
 def test_neither_order_nor_parts_matter(tmp_path: Path, scenarios: int) -> None:
-    """Whatever part a row is in and wherever, not a bit of the summary differs."""
+    """For any part and place of a row the summary is the same to the last bit."""
     rows = many(240, scenarios)
     found = [summarise(rows.write(tmp_path / str(seed), parts, seed), resamples=200,
                        block_cells=60).as_dict() for seed, parts in ((1, 1), (2, 7), (3, 40))]
@@ -224,7 +224,7 @@ def test_what_is_added_meanwhile_is_not_read(tmp_path: Path) -> None:
     assert sum(batch.rows.num_rows for batch in read) == parts.rows == 20
 
 
-def test_a_goal_is_not_missed_where_nobody_scored(tmp_path: Path) -> None:
+def test_a_goal_is_not_missed_without_scores(tmp_path: Path) -> None:
     """The time of reaching it is empty in both cases; only the scored ones count."""
     rows = Evaluation()
     for seed, (reached_s, valid) in enumerate((
@@ -248,7 +248,7 @@ def test_any_column_of_vehicles_may_be_asked_for(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(('wanted', 'said'), [
     ({'measures': ['speeed']}, "no measure 'speeed' here"),
-    ({'by': ('seed',)}, "--by: ['seed'] cannot be told apart"),
+    ({'by': ('seed',)}, "--by: ['seed'] contains an unknown factor"),
     ({'baseline': 'theirs'}, "no planner 'theirs' here; there are idm, mine"),
     ({'baseline': 'idm', 'by': ('human',)}, 'no planners to compare'),
     ({'worst': ['distance']}, 'nothing tells a worse distance'),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A hundred thousand cells: what they take of memory, and that more do not take more."""
+"""A hundred thousand cells: their memory, and that more cells do not need more."""
 
 from pathlib import Path
 import subprocess
@@ -14,7 +14,7 @@ import pytest
 pytestmark = pytest.mark.exhaustive
 
 CELLS, SCENARIOS, PLANNERS = 100_000, 4, ('idm', 'mine', 'theirs', 'yours')
-# Of what is asked: less than 300 MB for 100,000 cells.
+# The requirement is less than 300 MB for 100,000 cells.
 MOST_MB = 300.0
 # Three times as many cells may take so much more, which is what allocators keep: 67,000 rows of
 # Python objects would be some 200 MB.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A summary as text, Markdown, JSON and HTML: what it says, and that nothing in it can act."""
+"""A summary as text, Markdown, JSON and HTML: its content, and that no text in it can run."""
 
 import argparse
 import base64
@@ -34,7 +34,7 @@ HOSTILE = '<script>alert(1)</script> | `x` \x1b[31m\n\u202eevil'
 
 @pytest.fixture
 def summary(tmp_path: Path) -> Summary:
-    """Two planners, the second one with a name that tries to act; one cell has a report."""
+    """Return two planners, the second one with a malicious name; one cell has a report."""
     rows = Evaluation()
     keys = []
     for seed in range(6):
@@ -66,7 +66,7 @@ def test_no_line_of_text_is_too_long(tmp_path: Path) -> None:
     names = [f'a planner with a rather long name, number {number}' for number in range(6)]
     found = summarise(many(60, 3, names).write(tmp_path / 'rows'), resamples=100)
     lines = summary_text(found).splitlines()
-    # But for the command, which names the folder.
+    # The command, which names the folder, is exempt.
     assert max(len(line) for line in lines if str(tmp_path) not in line) <= 120
     assert sum(line.lstrip().startswith('least TTC [s]') for line in lines) >= 6
 
@@ -109,7 +109,7 @@ def test_the_page_has_everything_in_it_and_can_do_nothing(summary: Summary,
 
 
 def test_only_keys_lead_to_reports(tmp_path: Path) -> None:
-    """Whatever a part says a key is, no link leaves the folder of reports."""
+    """For any key in a part no link leaves the folder of reports."""
     rows = Evaluation()
     rows.add(avs=[{'worst_ttc': 1.0}])
     rows.cells[0]['cell'] = rows.vehicles[0]['cell'] = '../../secret'
