@@ -82,7 +82,7 @@ def live_graph(game: Path, out: Path, *options: str) -> Iterator[Graph]:
         try:
             yield Graph(launcher, peer, address)
         finally:
-            # Killed nodes would leave their shared memory behind. Nobody needs what the launcher
+            # Killed nodes would leave their shared memory behind. Tests need no file that the
             # launcher makes of the recordings after their end.
             launcher.signal(signal.SIGINT)
             wait_until(lambda: not any(is_node(pid) for _, pid in launcher.started),

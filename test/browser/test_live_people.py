@@ -78,7 +78,7 @@ def throttle(graph: Graph, seat: str) -> float:
 
 
 def attack(address: str, number: int) -> bool:
-    """Send the requests of a client without a link; return whether they were refused."""
+    """Send requests without a link; return whether they were refused with an answer."""
     host, port = urlsplit(address).hostname or '', urlsplit(address).port or 0
     context = ssl._create_unverified_context()
     try:

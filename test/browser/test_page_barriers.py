@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The cockpit's page has no barriers that axe finds: WCAG 2.2, levels A and AA."""
+"""axe finds no barriers in the cockpit's page: WCAG 2.2, levels A and AA."""
 
 from axe_support import barriers
 from browser_support import Browser
@@ -15,7 +15,7 @@ ALARMS = [{'id': f'{kind}:{subject}', 'kind': kind, 'subject': subject, 'text': 
 @pytest.mark.matrix
 @pytest.mark.parametrize('theme', ['light', 'dark'])
 def test_every_tab(browser: Browser, theme: str) -> None:
-    """With the alarms of a vehicle that somebody drives."""
+    """No tab has barriers, also with the alarms of a driven vehicle."""
     found = []
     with served(RunBackend(RecordedRun(scenarios_directory() / 'traffic.yaml', 4.0),
                            every=2)) as server:
@@ -24,7 +24,7 @@ def test_every_tab(browser: Browser, theme: str) -> None:
         browser.run('document.documentElement.dataset.theme = arguments[0]', theme)
         server.publish('alarms', {'active': ALARMS})
         browser.wait('document.querySelectorAll(".alarm").length >= 2')
-        # One is taken note of, and both of them are over then: each looks another way.
+        # One alarm is acknowledged, and then both end: each state has another look.
         browser.run('document.querySelector(".alarm").click()')
         found += barriers(browser)
         server.publish('alarms', {'active': []})

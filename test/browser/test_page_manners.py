@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The page on any screen and for anybody: sizes, fingers, colours, words, alarms, saved files."""
+"""The page on all screens and for all people: sizes, touch, colours, alarms, saved files."""
 
 from collections.abc import Iterator
 import csv
@@ -15,7 +15,7 @@ from world_support import RecordedRun, RunBackend, Served, served
 
 SIZES = ((1920, 1080), (1280, 720), (1200, 800), (390, 844), (640, 360))
 OVERRIDE = 'abc \u202etxet'
-# Of the elements that are to be seen: those cut off by the window, and the smallest letters.
+# Among the visible elements: those cut off by the window, and the smallest letters.
 CUT_OFF = """
 const seen = (node) => node.checkVisibility({ visibilityProperty: true });
 return [...document.querySelectorAll(arguments[0])].filter(seen).filter((node) => {
@@ -36,7 +36,7 @@ return least;"""
 
 @pytest.fixture(scope='module')
 def run() -> RecordedRun:
-    """Return a game with traffic, whose events and title somebody else wrote."""
+    """Return a game with traffic, whose events and title have untrusted texts."""
     recorded = RecordedRun(scenarios_directory() / 'traffic.yaml', 14.0)
     recorded.scene |= {'title': OVERRIDE, 'events': [
         {'name': 'slow', 'label': '', 'when': None, 'kind': 'speed_limit', 'speed': 30 / 3.6,
@@ -46,11 +46,11 @@ def run() -> RecordedRun:
 
 @pytest.fixture(scope='module')
 def server(run: RecordedRun, module_browser: Browser) -> Iterator[Served]:
-    """Serve the run to one page whose person drives hv0."""
+    """Serve the run to one page that drives hv0."""
     with served(RunBackend(run, every=2)) as running:
         module_browser.open(running.address)
         module_browser.wait('window.crgame?.ready && crgame.world.shown && crgame.store.me.id')
-        # Hands can be on the controls of a page that has the focus.
+        # Hands can be on the controls only if the page has the focus.
         module_browser.driver.find_element('css selector', '#world').click()
         drive(running, module_browser)
         yield running
@@ -58,14 +58,14 @@ def server(run: RecordedRun, module_browser: Browser) -> Iterator[Served]:
 
 @pytest.fixture
 def page(server: Served, module_browser: Browser) -> Iterator[Browser]:
-    """Return the page in its usual size; it may not have complained afterwards."""
+    """Return the page in its usual size; check afterwards that it logged no error."""
     module_browser.resize(1280, 720)
     yield module_browser
     assert module_browser.console_errors() == []
 
 
 def drive(server: Served, browser: Browser, holder: str | None = None) -> None:
-    """Let the page, or somebody else, hold the seat of hv0."""
+    """Make the page, or another client, hold the seat of hv0."""
     me = holder or browser.run('return crgame.store.me.id')
     server.publish('seats', {'seats': {'hv0': {
         'source': 'cockpit', 'driver': 'cockpit', 'holder': me, 'holder_name': 'Me'}}})
@@ -81,7 +81,7 @@ def alarm(kind: str, subject: str) -> dict[str, Any]:
 @pytest.mark.parametrize('size', SIZES, ids=lambda size: f'{size[0]}x{size[1]}')
 def test_nothing_is_cut_off_and_the_road_is_free(
         page: Browser, size: tuple[int, int]) -> None:
-    """Header, tabs, buttons of the view and instruments, on screens from phone to desk."""
+    """Header, tabs, view buttons and instruments fit on screens from phone to desktop."""
     page.resize(*size)
     page.wait('innerWidth === arguments[0] && crgame.world.camera.width > 1', arguments=(size[0],))
     time.sleep(0.2)
@@ -98,7 +98,7 @@ def test_nothing_is_cut_off_and_the_road_is_free(
     assert free > 0.7
     size_px, where = page.run(SMALLEST)
     assert size_px >= 12.0, where
-    # Every key can be read, and lies beside what else is told.
+    # Every key is readable and does not cover other texts.
     assert page.run("""
         const told = [...document.querySelectorAll('.hud-kmh, .hud-limit, .hud-gear, .hud-pedals, '
           + '.hud-steering')].filter((node) => node.checkVisibility());
@@ -115,7 +115,7 @@ def test_nothing_is_cut_off_and_the_road_is_free(
 
 
 def test_fingers_drive(page: Browser) -> None:
-    """A finger on a key of the page is that key, two at once as well; R tapped is the gear."""
+    """A touch on a key of the page acts as that key, also two at once; a tap on R is the gear."""
     page.wait('crgame.driving.away === null', 'hands on the controls')
     page.run("""
         window.touch = (code, type, pointerId) => document.querySelector(`.cap-${code}`)
@@ -137,7 +137,7 @@ def test_fingers_drive(page: Browser) -> None:
         boxes = page.run("""return ['KeyA', 'KeyD', 'KeyS', 'KeyW', 'KeyR'].map((code) => {
             const box = document.querySelector(`.cap-${code}`).getBoundingClientRect();
             return [box.left, box.right, box.width, box.height]; });""")
-        # What a finger can hit: 44 px, as the guidelines of the platforms have it.
+        # A touch target has at least 44 px, by the guidelines of the platforms.
         assert min(min(box[2:]) for box in boxes[:4]) >= 44
         assert boxes[1][1] < boxes[2][0]
         assert page.run(CUT_OFF, '.cap') == []
@@ -157,9 +157,9 @@ def test_the_sign_shows_the_limit_that_an_event_has_set(server: Served, page: Br
               arguments=(usual,))
 
 
-def test_alarms_of_others_frame_nobody_and_are_acknowledged(
+def test_only_own_alarms_frame_the_screen_until_acknowledged(
         server: Served, page: Browser) -> None:
-    """Mine frames my screen until I say that I know; that of an AV is a word in the header."""
+    """An own alarm frames the screen until acknowledged; an AV's is a word in the header."""
     framed = 'return !document.querySelector("#alarm-frame").hidden'
     server.publish('alarms', {'active': [alarm('collision', 'av0')]})
     page.wait('document.querySelector("#alarms [data-kind=collision]")')
@@ -170,7 +170,7 @@ def test_alarms_of_others_frame_nobody_and_are_acknowledged(
     assert page.run(framed) is False
     assert page.run('return document.querySelector("#alarms [data-kind=off_road]").className'
                     ).endswith('known')
-    # Nobody is late in a pause.
+    # In a pause no agent is late.
     server.publish('alarms', {'active': [alarm('late', 'simulation')]})
     page.wait('crgame.store.alarms[0].kind === "late"')
     assert page.run('return document.querySelector("#alarms [data-kind=late]")') is None
@@ -194,7 +194,7 @@ def test_text_that_turns_others_around_is_isolated(page: Browser) -> None:
     title, tab, tip = page.run("""const node = document.querySelector('#title');
         return [node.textContent, document.title, node.title];""")
     assert title == wanted and tab.startswith(wanted) and tip.startswith(wanted)
-    # What does not shrink beside it gets its room.
+    # Neighbouring elements that do not shrink keep their space.
     assert page.run('const n = document.querySelector("#title");'
                     'return n.scrollWidth <= n.clientWidth')
 
@@ -225,7 +225,7 @@ def test_the_map_shows_that_it_has_the_focus(page: Browser) -> None:
 
 @pytest.mark.parametrize('theme', ['light', 'dark'])
 def test_green_can_be_read(page: Browser, theme: str) -> None:
-    """Its contrast is that of WCAG, 4.5 to 1 at least, in words and marks."""
+    """Its contrast is at least the 4.5 to 1 of WCAG, in words and marks."""
     page.run('document.documentElement.dataset.theme = arguments[0]', theme)
     ratio = page.run("""
         const colour = (name) => {
@@ -244,7 +244,7 @@ def test_green_can_be_read(page: Browser, theme: str) -> None:
 
 def test_plots_map_and_tables_are_saved(
         server: Served, page: Browser, tmp_path: Path) -> None:
-    """As the person's browser keeps them; Plotly's styles come from no inline sheet."""
+    """The browser stores the files; Plotly's styles come from no inline sheet."""
     page.driver.execute_cdp_cmd('Browser.setDownloadBehavior', {
         'behavior': 'allow', 'downloadPath': str(tmp_path)})
     server.control('start')
@@ -275,7 +275,7 @@ def test_plots_map_and_tables_are_saved(
 
 def test_the_last_seconds_are_shown_again_and_slower(
         server: Served, page: Browser, run: RecordedRun) -> None:
-    """From the states that the page has kept, where the recording has them."""
+    """The replay uses the states kept by the page, at the recording's times."""
     page.run('crgame.lastSeconds.open()')
     page.wait('crgame.lastSeconds.isOpen && crgame.world.shown.t > 0.3'
               ' && crgame.world.shown.t < 1.2')

@@ -41,7 +41,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Perceived, Path]
 
 def test_a_recording_shows_what_was_perceived(browser: Browser,
                                               recorded: tuple[Perceived, Path]) -> None:
-    """At seeded ticks in any order: outlines, fans, estimate and count are those of the bag."""
+    """At seeded ticks in any order outlines, fans, estimate and count are those of the bag."""
     perceived, bag = recorded
     setup = perceived.result.setup
     ids = [item.id for item in setup.descriptions]
@@ -68,7 +68,7 @@ def test_a_recording_shows_what_was_perceived(browser: Browser,
                      *perceived.result.object_poses[k, :, :2]]
             near = sum(bool(np.hypot(*(pose - av)) <= 80.0) for pose in poses)
             assert drawn['count']['near'] == near
-        # Who is not followed perceives nothing here.
+        # A vehicle that is not followed has no perception here.
         browser.run("crgame.world.follow('hv0', true);")
         browser.wait('crgame.perception.hollow.length === 0 && crgame.perception.fans === 0')
         assert browser.console_errors() == []
@@ -138,7 +138,7 @@ def scan(sensor: int, ranges: NDArray[np.float64], n: int = 0) -> bytes:
 
 
 def test_frames_are_read_as_they_were_written(page: Served, browser: Browser) -> None:
-    """Every number of a scan, a map and of who is seen."""
+    """All numbers of a scan, a map and the seen vehicles arrive unchanged."""
     ranges = np.array([3.5, np.inf, 12.25, 0.0])
     occupied = np.random.default_rng(0).random((13, 7)) < 0.5
     legend = '.world-legend [data-layer="unseen"]'
@@ -162,12 +162,12 @@ def test_frames_are_read_as_they_were_written(page: Served, browser: Browser) ->
         -3.0, 8.5, 0.25, 13, 7]
     assert read['cells'] == occupied.ravel().astype(int).tolist()
     assert read['seen'] == [0, 1, 4]
-    # The legend is written anew with a picture of the map.
+    # A picture of the map rewrites the legend.
     browser.wait(f'(() => {{ {said} }})() === "not seen by av0"')
 
 
 def test_a_fan_is_built_once_for_each_scan(page: Served, browser: Browser) -> None:
-    """Four sensors of 360 rays: frames between their scans make no paths and touch no ray."""
+    """With four sensors of 360 rays, frames between scans make no paths and touch no ray."""
     ranges = 40.0 + 30.0 * np.sin(np.linspace(0.0, 20.0, RAYS))
     browser.run("""
         window.lines = 0;
@@ -194,12 +194,12 @@ def test_a_fan_is_built_once_for_each_scan(page: Served, browser: Browser) -> No
     assert browser.run_async(drawn) == [SENSORS, built]
     send(page, 'scan:1:0', scan(0, ranges, n=1))
     browser.wait('window.lines > arguments[0]', arguments=(built,))
-    # One fan anew: its rays and at most two strokes for each hit.
+    # One new fan: its rays and at most two strokes for each hit.
     assert RAYS <= browser.run_async(drawn)[1] - built <= 3 * RAYS
 
 
 def test_thin_walls_are_seen_from_afar(page: Served, browser: Browser) -> None:
-    """A wall of one cell is 1/5 of a pixel wide on the whole map, and still there."""
+    """A wall of one cell, 1/5 of a pixel wide on the whole map, is still visible."""
     xmin, ymin, xmax, ymax = browser.run('return crgame.store.scene.bounds')
     occupied = np.zeros((200, 3000), dtype=bool)
     occupied[57] = True
@@ -224,7 +224,7 @@ def test_thin_walls_are_seen_from_afar(page: Served, browser: Browser) -> None:
 
 @pytest.mark.parametrize('role', ['traffic', 'scripted', 'recorded'])
 def test_each_role_has_its_colour(page: Served, browser: Browser, role: str) -> None:
-    """Agents of traffic, the game's own objects and recorded ones, near enough to see a roof."""
+    """Traffic agents, the game's objects and recorded ones differ, near enough to see a roof."""
     index = ('traffic', 'scripted', 'recorded').index(role)
     x, y, yaw, drawn = browser.run("""
         const at = 6 * arguments[0];
@@ -235,6 +235,6 @@ def test_each_role_has_its_colour(page: Served, browser: Browser, role: str) -> 
         crgame.world.redraw();
         return [...pose, crgame.world.stats.frames];""", index)
     browser.wait('crgame.world.stats.frames > arguments[0]', arguments=(drawn,))
-    # Behind the roof is glass, before the windscreen the bonnet.
+    # There is glass behind the roof and the bonnet ahead of the windscreen.
     bonnet = (x + 1.4 * np.cos(yaw), y + 1.4 * np.sin(yaw))
     assert pixel(browser, *bonnet) == color(browser, role)

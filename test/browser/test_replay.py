@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recording in the page: scrubbed, stepped and played, it shows what is in the bag."""
+"""A recording in the page shows the bag's content when scrubbed, stepped and played."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,7 +35,7 @@ from replay_support import (  # noqa: E402, I100 - importable from here on
 )
 
 DURATION_S, SECOND_S = 32.0, 1.5
-# Of the world: what was drawn last.
+# Of the world: its last drawn state.
 DRAWN = """
 const { t, n, k, epoch, vehicles, objects } = crgame.world.shown;
 return { t, n, k, epoch, vehicles: [...vehicles], objects: [...objects] };
@@ -78,13 +78,13 @@ def page(bag: Path, browser: Browser) -> Iterator[Browser]:
 
 
 def drawn(page: Browser) -> dict[str, Any]:
-    """Take the frame in which the world has drawn the player's time."""
+    """Return the frame in which the world has drawn the player's time."""
     page.wait(IS_DRAWN)
     return last_frame(page)
 
 
 def last_frame(page: Browser) -> dict[str, Any]:
-    """Take the frame that the world has drawn last."""
+    """Return the frame that the world has drawn last."""
     frame: dict[str, Any] = page.run(DRAWN)
     frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, STATE_COLUMNS)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
@@ -92,7 +92,7 @@ def last_frame(page: Browser) -> dict[str, Any]:
 
 
 def seek(page: Browser, t: float) -> dict[str, Any]:
-    """Go to a time and take what is drawn there."""
+    """Go to a time; return the frame drawn there."""
     page.run_async('await crgame.replay.seek(arguments[0]);', t)
     return drawn(page)
 
@@ -112,7 +112,7 @@ def test_poses_are_those_of_the_bag(page: Browser, log: RunTrajectories,
 
 @pytest.mark.exhaustive
 def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunTrajectories) -> None:
-    """The world stands as it was, instead of moving what it knows to where nobody was."""
+    """The world keeps its picture and does not extrapolate old states."""
     before = seek(page, 1.0)
     page.run("""
       const { fetch } = window;
@@ -135,7 +135,7 @@ def test_until_its_data_has_come_a_time_is_not_shown(page: Browser, log: RunTraj
 
 @pytest.mark.exhaustive
 def test_states_between_the_ticks(page: Browser, first_run: OfflineResult) -> None:
-    """At a simulation step the state is exact, and half way between two in their middle."""
+    """The state is exact at a simulation step, and the mean half way between two."""
     frame = seek(page, 1234 * 0.01)
     np.testing.assert_array_equal(frame['vehicles'][:, :3], first_run.vehicle_states[1234, :, :3])
     middle = seek(page, 12.345)['vehicles'][:, :3]
@@ -144,7 +144,7 @@ def test_states_between_the_ticks(page: Browser, first_run: OfflineResult) -> No
 
 
 def test_steps_land_on_ticks(page: Browser, log: RunTrajectories) -> None:
-    """Keys and buttons go from tick to tick, also back, over the border of two chunks."""
+    """Keys and buttons step from tick to tick, also back, across the border of two chunks."""
     seek(page, 4.837)
     body = page.driver.find_element(By.TAG_NAME, 'body')
     for keys, k in (('.', 49), ('.', 50), ('.', 51), (',', 50), (',', 49), (Keys.ARROW_LEFT, 48),
@@ -161,7 +161,7 @@ def test_steps_land_on_ticks(page: Browser, log: RunTrajectories) -> None:
 
 @pytest.mark.exhaustive
 def test_slider_is_dragged_and_steered_by_keys(page: Browser, log: RunTrajectories) -> None:
-    """A drag to the middle and back shows each place; the slider tells where it is."""
+    """A drag to the middle and back shows each time; the slider's label names its place."""
     slider = page.driver.find_element(By.ID, 'timeline-slider')
     page.run("""
       crgame.dragged = [];
@@ -192,7 +192,7 @@ def test_slider_is_dragged_and_steered_by_keys(page: Browser, log: RunTrajectori
 
 @pytest.mark.clock
 def test_it_plays_at_its_speed_and_pauses(page: Browser) -> None:
-    """The space bar plays; at 8 seconds a second, 3 s are passed quickly, and then it stands."""
+    """The space bar plays; at 8 times real time it passes 3 s quickly and then pauses."""
     seek(page, 2.0)
     page.run('crgame.replay.speed = 8;')
     body = page.driver.find_element(By.TAG_NAME, 'body')
@@ -205,18 +205,18 @@ def test_it_plays_at_its_speed_and_pauses(page: Browser) -> None:
     page.wait(f'crgame.world.shown.t === {t}')
     page.run_async('await new Promise((done) => setTimeout(done, 300));')
     assert page.run('return crgame.replay.t') == t
-    # It does not begin anew at the end.
+    # It does not restart at the end.
     seek(page, 31.5)
     page.run('crgame.replay.play();')
     page.wait('!crgame.replay.playing')
     page.wait('crgame.store.status.run === "ended"')
     assert page.run('return [crgame.replay.t, crgame.store.status.t]') == [32.0, 32.0]
-    # Not all that was seen is still held.
+    # Some of the shown chunks are no longer stored.
     assert page.run('return crgame.replay.chunksHeld') <= 12
 
 
 def test_events_are_jumped_to(page: Browser) -> None:
-    """Brackets lead from mark to mark, both ways, and say what it was."""
+    """Bracket keys go from mark to mark in both directions and name the event."""
     marks = page.run('return [...document.querySelectorAll(".mark")].map((m) => '
                      '[m.dataset.kind, m.title, m.querySelector("path").getAttribute("d"), '
                      'getComputedStyle(m).color])')
@@ -236,7 +236,7 @@ def test_events_are_jumped_to(page: Browser) -> None:
 
 @pytest.mark.exhaustive
 def test_documents_follow_the_time_back_too(page: Browser) -> None:
-    """Signals, fired events, alarms, plans and the status are those of the time shown."""
+    """Signals, fired events, alarms, plans and the status are those of the shown time."""
     def documents() -> Any:
         return page.run("""
           const { store } = crgame;
@@ -259,7 +259,7 @@ def test_documents_follow_the_time_back_too(page: Browser) -> None:
 
 @pytest.mark.exhaustive
 def test_plots_have_the_past_and_the_future(page: Browser, log: RunTrajectories) -> None:
-    """After a jump the history is there at once, from the recording."""
+    """After a jump the history comes from the recording at once."""
     seek(page, 20.0)
     page.wait('crgame.store.history(0, 10).t.length > 100')
     past = page.run('return crgame.store.history(0, 10);')
@@ -271,7 +271,7 @@ def test_plots_have_the_past_and_the_future(page: Browser, log: RunTrajectories)
 
 @pytest.mark.exhaustive
 def test_another_run_of_the_recording(page: Browser, bag: Path) -> None:
-    """The list of runs leads to the other one, with its own scene, and back."""
+    """The list of runs opens the other run, with its own scene, and the first one again."""
     second = read_trajectories(bag, 1)
     choice = page.driver.find_element(By.CSS_SELECTOR, '#timeline select[aria-label="Run"]')
     assert [o.text for o in choice.find_elements(By.TAG_NAME, 'option')] == ['1 of 2', '2 of 2']

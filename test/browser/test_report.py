@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A report in a browser: from its file, without network."""
+"""A report in a browser, opened from its file without network."""
 
 import base64
 from collections.abc import Iterator
@@ -39,8 +39,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def shown(browser: Browser, file: Path) -> Iterator[Browser]:
-    """Open it where there is no network, and see that nothing went wrong."""
-    # The log of requests tells of all that the page asks for.
+    """Open the report without network, and check that no error occurred."""
+    # The log of requests lists all that the page requests.
     browser.driver.execute_cdp_cmd('Network.enable', {})
     browser.driver.execute_cdp_cmd('Network.emulateNetworkConditions', {
         'offline': True, 'latency': 0, 'downloadThroughput': 0, 'uploadThroughput': 0})
@@ -52,7 +52,7 @@ def shown(browser: Browser, file: Path) -> Iterator[Browser]:
 
 
 def _look_at_all(browser: Browser) -> None:
-    """Scroll through the page: plots are drawn when they are seen."""
+    """Scroll through the page, as plots are drawn when they become visible."""
     browser.run_async("""
         for (const plot of document.querySelectorAll('.plot')) {
           plot.scrollIntoView({ behavior: 'instant' });
@@ -63,7 +63,7 @@ def _look_at_all(browser: Browser) -> None:
 
 
 def test_plots_are_drawn_and_nothing_is_asked_for(shown: Browser) -> None:
-    """Every plot has its lines; nothing but data of the file itself is loaded; a title is text."""
+    """Every plot has its lines; only data of the file itself is loaded; a title is plain text."""
     _look_at_all(shown)
     lines, plots = shown.run(
         f'return [{DRAWN}.length, document.querySelectorAll(".plot").length]')
@@ -78,7 +78,7 @@ def test_plots_are_drawn_and_nothing_is_asked_for(shown: Browser) -> None:
 
 @pytest.mark.exhaustive
 def test_a_worst_moment_leads_to_its_frame(shown: Browser) -> None:
-    """A click shows the picture, marks it, and marks the time in the plots of the run."""
+    """A click shows and marks the picture, and marks its time in the plots of the run."""
     _look_at_all(shown)
     shown.run('window.scrollTo({ top: 0, behavior: "instant" })')
     link = shown.driver.find_element('css selector', '.worst a[data-time]')
@@ -99,7 +99,7 @@ def test_a_worst_moment_leads_to_its_frame(shown: Browser) -> None:
 
 @pytest.mark.exhaustive
 def test_all_plots_of_a_run_show_the_same_time(shown: Browser) -> None:
-    """Zooming into one zooms the others."""
+    """Zooming into one plot zooms the others."""
     _look_at_all(shown)
     shown.run_async('await Plotly.relayout("run1-motion-speed", '
                     '{ "xaxis.range[0]": 2, "xaxis.range[1]": 6 });')
@@ -112,7 +112,7 @@ def test_all_plots_of_a_run_show_the_same_time(shown: Browser) -> None:
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_it_fits_and_can_be_read(shown: Browser, file: Path, width: int, height: int,
                                  scheme: str) -> None:
-    """Nothing is wider than the window, and text stands out (WCAG AA: 4.5 to 1)."""
+    """No element is wider than the window, and text has contrast (WCAG AA: 4.5 to 1)."""
     shown.resize(width, height)
     shown.prefer(scheme)
     shown.open(file.as_uri())
@@ -143,7 +143,7 @@ def _contrast(first: str, second: str) -> float:
 
 @pytest.mark.exhaustive
 def test_it_prints(shown: Browser) -> None:
-    """Every plot is on paper, though nobody has scrolled to it; as light as paper."""
+    """Every plot is printed, also without scrolling to it, on a light ground."""
     shown.prefer('dark')
     shown.run("""
         window.printed = null;

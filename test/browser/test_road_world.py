@@ -27,12 +27,12 @@ Scene = dict[str, Any]
 Pixels = NDArray[np.int_]
 
 SIZE_PX = 96
-# Maps with lines of their own: of two junctions and a ramp.
+# Maps with their own lines: two junctions and a ramp.
 MARKED = ('USA_Lanker-1_3_T-1', 'ZAM-Ramp-1_1-T-1',
           'more/DEU_TestIntersectionInteract-3_1_T-1')
 # The largest one, with a motorway's signs, and two of towns.
 PUBLISHED = ('more/OSC_Overtake-1_1_T-1', 'more/DEU_Starnberg-1_1_T-1', 'USA_Lanker-1_3_T-1')
-# One renderer for all scenes, apart from the page's own.
+# One renderer for all scenes, separate from the page's own.
 PREPARE = """
 const three = await import('/static/js/view3d/three.js');
 const { createRoadWorld } = await import('/static/js/view3d/road/road_world.js');
@@ -95,20 +95,20 @@ def scene_of(path: Path) -> Scene:
 
 
 def show(page: Browser, scene: Scene) -> dict[str, float]:
-    """Make the world of a scene; return what it may cost."""
+    """Make the world of a scene; return its drawing costs."""
     cost: dict[str, float] = page.run(SHOW, scene)
     return cost
 
 
 def look(page: Browser, x: float, y: float, z: float, *, yaw: float = 0.0, pitch: float = 0.0,
          states: dict[str, str] | None = None) -> Pixels:
-    """Take a picture (rows from below, columns, RGB) from a point of the map."""
+    """Return a picture (rows from below, columns, RGB) from a point of the map."""
     pixels = page.run(LOOK, x, y, z, yaw, pitch, states or {})
     return np.array(pixels).reshape(SIZE_PX, SIZE_PX, 4)[:, :, :3]
 
 
 def straight_bounds(scene: Scene, marking: str) -> list[tuple[NDArray[np.float64], float]]:
-    """Return middles (2) and headings [rad] of straight parts of bounds that are painted so."""
+    """Return middles (2) and headings [rad] of straight parts of bounds with a marking."""
     found = []
     for lanelet in scene['lanelets']:
         for side in ('left', 'right'):
@@ -126,14 +126,14 @@ def straight_bounds(scene: Scene, marking: str) -> list[tuple[NDArray[np.float64
 @pytest.mark.parametrize('name', MARKED)
 def test_lines_are_where_the_map_has_them(page: Browser, shared_scenarios: Path,
                                           name: str) -> None:
-    """Straight below: the line is white, as wide as it should be, the lane beside it is grey."""
+    """From above the line is white and of the right width, and the lane beside it grey."""
     scene = scene_of(shared_scenarios / f'{name}.xml')
     show(page, scene)
     bounds = straight_bounds(scene, 'solid')
     assert len(bounds) >= 2
     for (x, y), yaw in bounds[::max(len(bounds) // 3, 1)][:3]:
         picture = look(page, x, y, 3.0, yaw=yaw, pitch=-math.pi / 2)
-        # Across the line, which goes up: 3 m below, 40 deg show 2.18 m.
+        # Across the line, which runs upwards: at a distance of 3 m, 40 deg show 2.18 m.
         across = picture[SIZE_PX // 2 - 4:SIZE_PX // 2 + 4].mean(axis=0)
         # Yellow ones lack blue.
         painted = across[:, :2].min(axis=1) > 150
@@ -157,7 +157,7 @@ def test_published_maps_are_cheap(page: Browser, shared_scenarios: Path, name: s
     xmin, ymin, xmax, ymax = scene['bounds']
     picture = look(page, (xmin + xmax) / 2, (ymin + ymax) / 2,
                    min(max(xmax - xmin, ymax - ymin), 1500.0), pitch=-math.pi / 2)
-    # From high above there are roads in green land.
+    # From high above the picture shows roads in green land.
     red, green, blue = np.moveaxis(picture, 2, 0)
     assert ((green > red + 4) & (green > blue + 15)).mean() > 0.3
     assert (np.ptp(picture, axis=2) < 14).sum() > 15
@@ -188,13 +188,13 @@ def test_lights_show_the_signals(page: Browser, shared_scenarios: Path) -> None:
 @pytest.mark.parametrize(('light', 'visibility'), [('day', 120.0), ('dusk', 60.0)])
 def test_fog_leaves_the_contrast_that_it_should(page: Browser, light: str,
                                                 visibility: float) -> None:
-    """Koschmieder: of a black board against the sky exp(-3 d / V) is left, as light."""
+    """By Koschmieder a black board keeps the contrast exp(-3 d / V) to the sky, as light."""
     scene = scene_of(scenarios_directory() / 'fog.yaml')
     show(page, scene)
     page.run('roadTest.world.setEnvironment({ light: arguments[0], visibility: arguments[1] });',
              light, visibility)
     x, y = scene['bounds'][:2]
-    # Far outside of the map, beside the trees around it, looking away from it.
+    # Far outside the map, beside the trees around it, looking away from it.
     x, y = x - 700, y - 700
     for distance in (10.0, 30.0, 55.0):
         page.run("""
@@ -217,13 +217,13 @@ def test_fog_leaves_the_contrast_that_it_should(page: Browser, light: str,
 
 
 def as_light(pixels: Pixels) -> float:
-    """Return the mean green light of pixels, which are encoded as sRGB says."""
+    """Return the mean green light of pixels in sRGB encoding."""
     value = pixels[:, :, 1].mean() / 255.0
     return float(((value + 0.055) / 1.055) ** 2.4)
 
 
 def test_the_game_says_light_and_air(page: Browser) -> None:
-    """What a scene document says is shown at once; dusk is darker than day."""
+    """The environment of a scene document is shown at once; dusk is darker than day."""
     scene = scene_of(scenarios_directory() / 'intersection.yaml')
     lanelet = np.reshape(scene['lanelets'][0]['center'], (-1, 2))
     means = {}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Side screens: real windows beside the seat's own, in step with it while the run goes on."""
+"""Side screens: real windows beside the seat's own, in step with it during the run."""
 
 from collections.abc import Iterator
 import os
@@ -15,7 +15,7 @@ from world_support import RecordedRun, RunBackend, Served, served
 
 pytestmark = pytest.mark.exhaustive
 
-# Notes of each picture when it came, by the machine's clock [ms], and what time it shows [s].
+# Notes each picture's arrival by the machine's clock [ms] and its shown time [s].
 NOTE = """
 window.noted = [];
 let frames = -1;
@@ -83,6 +83,6 @@ def test_two_side_windows_show_the_time_of_the_main_one(
     for side in noted[1:]:
         both = (side[:, 0] > first[0, 0]) & (side[:, 0] < first[-1, 0])
         assert np.count_nonzero(both) > 10
-        # What the main window showed, at the moments of the side window's pictures.
+        # The main window's shown times at the moments of the side window's pictures.
         apart = side[both, 1] - np.interp(side[both, 0], first[:, 0], first[:, 1])
         assert np.max(np.abs(apart)) <= one_picture_s + 1e-3

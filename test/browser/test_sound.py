@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a driver hears, as samples that a real browser renders offline, seen by an FFT here."""
+"""The driver's sound, as samples rendered offline by a real browser, checked by FFT."""
 
 from collections.abc import Iterator
 import math
@@ -23,18 +23,18 @@ from sound_support import (
 )
 from world_support import RecordedRun, RunBackend, served
 
-# Of the car that docs/driving.md describes.
+# Values of the car in docs/driving.md.
 RATIOS = (4.171, 2.34, 1.521, 1.143, 0.867, 0.691)
 FINAL_DRIVE, WHEEL_RADIUS_M, FIRINGS_A_TURN = 3.46, 0.31, 2
 SOUND_SPEED = 343.0
-# By then everything has settled [samples].
+# All transients have ended by then [samples].
 SETTLED = RATE_Hz // 2
 SILENT_MOTOR: dict[str, Any] = {'train': 'ELECTRIC', 'rpm': 0}
 
 
 @pytest.fixture(scope='module')
 def page(module_browser: Browser) -> Iterator[Browser]:
-    """Open the page; its modules are loaded under the policy that the server sends with it."""
+    """Open the page; its modules load under the policy that the server sends."""
     run = RecordedRun(scenarios_directory() / 'cut_in.yaml', 0.2)
     with served(RunBackend(run)) as server:
         module_browser.open(server.address)
@@ -45,7 +45,7 @@ def page(module_browser: Browser) -> Iterator[Browser]:
 
 def heard_at(page: Browser, speed: float, powertrain: str = 'combustion',
              throttle: float = 0.3) -> dict[str, Any]:
-    """Let the page's listener hear a vehicle at a steady speed."""
+    """Compute the update that the page's listener makes of a vehicle at a steady speed."""
     heard: dict[str, Any] = page.run_async("""
         const [speed, powertrain, throttle] = arguments;
         const { Listener } = await import('/static/js/sound/listener.js');
@@ -63,7 +63,7 @@ def heard_at(page: Browser, speed: float, powertrain: str = 'combustion',
 
 
 def band_rms(samples: FloatArray, low_Hz: float, high_Hz: float) -> float:
-    """Return the amplitude of what lies between two frequencies."""
+    """Return the amplitude between two frequencies."""
     spectrum = np.abs(np.fft.rfft(samples)) ** 2
     bins_Hz = np.fft.rfftfreq(len(samples), 1.0 / RATE_Hz)
     return math.sqrt(spectrum[(bins_Hz >= low_Hz) & (bins_Hz <= high_Hz)].sum())
@@ -99,7 +99,7 @@ def test_a_motor_sings_eight_times_a_turn(page: Browser) -> None:
     ('combustion', 5, 2.84), ('electric', 0, 1.92)])
 def test_the_engine_is_louder_the_faster_one_drives(
         page: Browser, powertrain: str, gear: int, gained_dB: float) -> None:
-    """What the FFT has at the engine's tones, at speeds of one gear."""
+    """The amplitude of the engine's tones grows with speed within one gear."""
     heard = [heard_at(page, speed, powertrain, 0.0) for speed in (26.0, 32.0, 38.0, 45.0)]
     assert {own['gear'] for own in heard} == {gear}
     tones_Hz = [own['rpm'] / 60.0 * (FIRINGS_A_TURN if gear else 8) for own in heard]
@@ -121,7 +121,7 @@ def test_the_engine_is_louder_under_load_and_when_it_turns_faster(page: Browser)
 
 
 def test_tyres_and_wind_grow_with_speed(page: Browser) -> None:
-    """By 35 and 60 dB a decade: 10.5 and 18.1 dB from 15 to 30 m/s."""
+    """Levels grow by 35 and 60 dB a decade: 10.5 and 18.1 dB from 15 to 30 m/s."""
     slow, fast = (render_voice(page, 'road_voice', 'RoadVoice', {
         'speed': speed, 'deceleration': 0.0, 'lateral': 0.0, 'offRoad': False}, 2)[SETTLED:]
         for speed in (15.0, 30.0))
@@ -142,14 +142,14 @@ def test_brakes_and_tyres_squeal(page: Browser, state: dict[str, float], tone_Hz
 
 
 @pytest.mark.parametrize('closing', [30.0, -30.0])
-def test_who_comes_is_higher_and_who_goes_lower(page: Browser, closing: float) -> None:
-    """By c / (c - v), for an ear that stands."""
+def test_approaching_sounds_higher_and_receding_lower(page: Browser, closing: float) -> None:
+    """The pitch changes by c / (c - v) for a standing listener."""
     arrival = page.run_async("""
         const { arrival } = await import('/static/js/sound/hearing.js');
         const still = { x: 0, y: 0, yaw: 0, vx: 0, vy: 0 };
         return arrival(still, { x: 6, y: 0, yaw: 0, vx: -arguments[0], vy: 0 });""", closing)
     silent = own_vehicle(**SILENT_MOTOR)
-    # Slow tyres: nothing but the engine is to be seen.
+    # With slow tyres the spectrum shows the engine only.
     other = other_vehicle(rpm=3000, speed=0.0) | arrival
     left, _ = render(page, [update(own=silent, others=[other])])
     assert strongest_Hz(left[SETTLED:]) == pytest.approx(
@@ -157,8 +157,8 @@ def test_who_comes_is_higher_and_who_goes_lower(page: Browser, closing: float) -
 
 
 @pytest.mark.parametrize(('x', 'louder'), [(-5.0, 0), (5.0, 1)], ids=['left', 'right'])
-def test_who_is_at_a_side_is_heard_there(page: Browser, x: float, louder: int) -> None:
-    """Driving north, west is left; the other ear hears it, too."""
+def test_a_vehicle_is_heard_from_its_side(page: Browser, x: float, louder: int) -> None:
+    """Driving north, west is left; the other ear hears the vehicle too."""
     arrival = page.run_async("""
         const { arrival } = await import('/static/js/sound/hearing.js');
         const north = { x: 0, y: 0, yaw: Math.PI / 2, vx: 0, vy: 0 };
@@ -168,11 +168,11 @@ def test_who_is_at_a_side_is_heard_there(page: Browser, x: float, louder: int) -
     assert 5.0 < rms(samples[louder]) / rms(samples[1 - louder]) < 20.0
 
 
-def test_who_is_farther_away_is_quieter(page: Browser) -> None:
+def test_a_farther_vehicle_is_quieter(page: Browser) -> None:
     levels = [rms(render(page, [update(
         own=own_vehicle(**SILENT_MOTOR), others=[other_vehicle(distance=distance)])])[0][SETTLED:])
         for distance in (10.0, 20.0)]
-    # 1 / distance, and a little less: it fades to nothing at 100 m.
+    # 1 / distance, and slightly less, as it fades to 0 at 100 m.
     assert levels[1] / levels[0] == pytest.approx(0.5 * (1 - 0.2 ** 2) / (1 - 0.1 ** 2), rel=0.01)
 
 
@@ -193,7 +193,7 @@ def test_a_horn_has_two_notes_while_it_sounds(page: Browser, whose: str) -> None
 
 
 def test_an_indicator_clicks_three_times_a_second(page: Browser) -> None:
-    """90 blinks a minute, a click when the lamp goes on and one when it goes off."""
+    """90 blinks a minute give a click when the lamp goes on and one when it goes off."""
     own = own_vehicle(**SILENT_MOTOR, lights=1)
     samples = render(page, [update(0.03 * i, own) for i in range(100)], 3.0)[0]
     loud = np.flatnonzero(np.abs(samples) > 0.005) / RATE_Hz
@@ -203,11 +203,11 @@ def test_an_indicator_clicks_three_times_a_second(page: Browser) -> None:
 
 
 def test_a_collision_and_a_kerb_are_heard_once(page: Browser) -> None:
-    # So slow that the ground beside the road is not heard.
+    # Slow enough not to hear the ground beside the road.
     own = own_vehicle(**SILENT_MOTOR, speed=0.5)
     peaks: list[float] = []
     for trouble, then in (({'collision': True},) * 2, ({'offRoad': True},) * 2,
-                          # While the wheels are on the road all the time.
+                          # The wheels are on the road all the time.
                           ({'kerb': 1.0}, {}), ({'kerb': 0.35}, {})):
         samples = render(page, [update(0.0, own), update(0.5, own, **trouble),
                                 update(0.53, own, **then), update(1.5, own, **then)], 2.5)[0]
@@ -219,28 +219,28 @@ def test_a_collision_and_a_kerb_are_heard_once(page: Browser) -> None:
 
 
 def test_shut_it_is_silence_to_the_last_bit(page: Browser) -> None:
-    """As it is while sound is off, at standstill and at speed."""
+    """A closed graph, as while sound is off, gives zeros at standstill and at speed."""
     loud = own_vehicle(rpm=6000, load=1.0, speed=40.0, deceleration=10.0, lights=4)
     for own in (own_vehicle(), loud):
         assert not render(page, [update(own=own, others=[other_vehicle()])], gain=0.0).any()
 
 
 def test_no_sample_is_ever_beyond_full_scale(page: Browser) -> None:
-    """Everything at once at the whole volume: six neighbours, horns, brakes, a collision."""
+    """The case has all sounds at full volume: six neighbours, horns, brakes, a collision."""
     own = own_vehicle(rpm=6500, load=1.0, speed=60.0, deceleration=12.0, lateral=12.0, lights=7)
     others = [other_vehicle(id=f'av{i}', distance=0.5, rpm=6000, speed=50.0, lights=4, pan=0.3)
               for i in range(6)]
     samples = render(page, [update(0.0, own, others),
                             update(0.5, own, others, collision=True, offRoad=True)], 1.5)
     assert 0.3 < np.abs(samples).max() < 1.0
-    # The limiter works at what is too loud, not at everything: an engine alone is as it was made.
+    # The limiter changes only loud sounds: an engine alone stays unchanged.
     single, double = (np.abs(render(page, [update(own=own_vehicle(rpm=3000))], gain=gain)).max()
                       for gain in (0.25, 0.5))
     assert double == pytest.approx(2.0 * single, rel=1e-3)
 
 
 def test_nothing_clicks_when_gears_change_or_silence_comes(page: Browser) -> None:
-    """No step from sample to sample is larger than those of the loudest steady engine."""
+    """No step between samples is larger than those of the loudest steady engine."""
     updates = [update(0.0, own_vehicle(rpm=5000, load=0.8)),
                update(0.5, own_vehicle(rpm=2800, load=0.1)),
                update(1.0, own_vehicle(rpm=2800, load=0.9))]

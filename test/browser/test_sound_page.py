@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Sound and rumble as a person has them: begun by a click, still when they should be."""
+"""Sound and rumble in use: they start by a click and are silent when they must be."""
 
 from collections.abc import Iterator
 import time
@@ -14,7 +14,7 @@ from world_support import RecordedRun, RunBackend, Served, served
 
 pytestmark = pytest.mark.exhaustive
 
-# Every sample that the page sends to its speakers passes `heardPeak`, too.
+# Every sample that the page sends to its speakers also passes `heardPeak`.
 TAP = """
 const connect = AudioNode.prototype.connect;
 AudioNode.prototype.connect = function (to, ...rest) {
@@ -31,8 +31,8 @@ AudioNode.prototype.connect = function (to, ...rest) {
   return connect.call(this, to, ...rest);
 };
 """
-# Stands for the hardware that a test has not: one gamepad of the standard layout, whose motors
-# note what they are asked for.
+# Stands for missing hardware: one gamepad of the standard layout, whose motors record
+# their commands.
 PAD = """
 window.effects = [];
 const buttons = Array.from({ length: 17 }, () => ({ value: 0, pressed: false, touched: false }));
@@ -63,7 +63,7 @@ def run() -> RecordedRun:
 
 @pytest.fixture
 def page(run: RecordedRun, browser: Browser) -> Iterator[Served]:
-    """Open the page before the run, still."""
+    """Open the page before the run begins."""
     added = [browser.driver.execute_cdp_cmd(
         'Page.addScriptToEvaluateOnNewDocument', {'source': source}) for source in (TAP, PAD)]
     with served(RunBackend(run)) as server:
@@ -80,20 +80,20 @@ def click(browser: Browser, selector: str) -> None:
 
 
 def turn_on(browser: Browser) -> None:
-    """Turn the sound on as a person does."""
+    """Turn the sound on as a person does, by a click."""
     click(browser, '#sound')
     click(browser, '#sound-panel .drive-button')
     browser.wait('crgame.sound.on', 'sound')
 
 
 def silent(browser: Browser) -> None:
-    """Wait until nothing but zeros goes to the speakers: 32768 of them are 0.7 s."""
+    """Wait until only zeros go to the speakers: 32768 of them are 0.7 s."""
     browser.wait('crgame.sound.heard === null && (heardPeak()[0] === "suspended"'
                  ' || heardPeak()[1] === 0)', 'silence')
 
 
 def take_seat(page: Served, browser: Browser) -> None:
-    """Let this page hold the human's seat."""
+    """Make this page hold the human's seat."""
     me = browser.run('return crgame.store.me')
     page.publish('seats', {'seats': {'hv0': {
         'source': 'cockpit', 'driver': 'cockpit', 'holder': me['id'], 'holder_name': me['name'],
@@ -141,7 +141,7 @@ def test_the_volume_is_kept_and_told(page: Served, browser: Browser) -> None:
     assert client.sound.volume == pytest.approx(0.05)
     browser.driver.refresh()
     browser.wait('window.crgame?.ready')
-    # It was on: it waits for a gesture, and says so.
+    # Sound was on: the page waits for a gesture and says so.
     assert browser.run('return [crgame.sound.volume, crgame.sound.wanted]') == [0.05, True]
 
 
@@ -158,7 +158,7 @@ def test_a_hidden_page_is_silent(page: Served, browser: Browser) -> None:
     browser.driver.close()
     browser.driver.switch_to.window(own)
     hidden = [note for note in browser.run('return notes') if note[0] == 'hidden']
-    # The analyser keeps the last samples of a context that has been suspended.
+    # The analyser keeps the last samples of a suspended context.
     assert hidden and (hidden[-1][1] == 'suspended' or hidden[-1][2] == 0)
     browser.wait("document.visibilityState === 'visible' && heardPeak()[1] > 0.01", 'the engine')
 
@@ -180,14 +180,14 @@ def test_a_game_may_have_none(page: Served, browser: Browser, run: RecordedRun) 
 
 
 def off_road(page: Served, browser: Browser) -> None:
-    """Let the human's vehicle be beside the road."""
+    """Put the human's vehicle beside the road."""
     page.backend.drivability = {'hv0': {'collision': False, 'off_road': True, 'hit': []}}
     browser.wait('crgame.store.status.drivability.hv0?.off_road', 'off the road')
 
 
 def test_a_kerb_between_two_lanes_is_felt(page: Served, browser: Browser,
                                           run: RecordedRun) -> None:
-    """The human cuts in over it, and has never left the road."""
+    """The human cuts in across the kerb without leaving the road."""
     page.publish('scene', run.scene | {'lanelets': [
         lanelet | {'right_line': 'curb'} if lanelet['left_line'] == 'solid' else lanelet
         for lanelet in run.scene['lanelets']]})

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a study in a browser: readable in both themes, on phones and on paper."""
+"""The report of a study in a browser is readable in both themes, on phones and on paper."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,10 +42,10 @@ return Math.min(...[...document.querySelectorAll('.conditions text')].map((each)
 
 
 class _Unrecorded(StudyMaker):
-    """Of its drives nothing but their journal is left."""
+    """A session whose drives have left only their journal."""
 
     def record(self, *_: Any, **__: Any) -> Path:
-        """Leave nothing."""
+        """Write no files."""
         return self.folder
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The summary of an evaluation in a browser: from its file, without network."""
+"""The summary of an evaluation in a browser, opened from its file without network."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +19,7 @@ from evaluation_rows import many  # noqa: E402, I100
 
 @pytest.fixture(scope='module')
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write the page of an evaluation, of which the worst cell has a report."""
+    """Write the page of an evaluation whose worst cell has a report."""
     rows = many(240, 12, ('idm', 'mine', 'a planner whose name is longer than its column'))
     folder = rows.write(tmp_path_factory.mktemp('evaluation') / 'rows', 3)
     summary = summarise(folder)
@@ -42,7 +42,7 @@ def offline(browser: Browser) -> Iterator[Browser]:
 
 
 def test_it_fits_can_be_read_and_leads_to_reports(offline: Browser, page: Path) -> None:
-    """On wide and narrow screens, light and dark (WCAG AA: 4.5 to 1; 3 to 1 of pictures)."""
+    """It works on wide and narrow screens, light and dark (WCAG AA: 4.5 to 1; pictures 3 to 1)."""
     for width, scheme in ((1280, 'light'), (1280, 'dark'), (390, 'light'), (390, 'dark')):
         offline.resize(width, 844)
         offline.prefer(scheme)
@@ -61,7 +61,7 @@ def test_it_fits_can_be_read_and_leads_to_reports(offline: Browser, page: Path) 
 
 
 def _contrast(browser: Browser, selector: str) -> float:
-    """Return the ratio of an element's colour to that of its ground as WCAG 2 defines it."""
+    """Return the contrast ratio of an element's colour to its background as in WCAG 2."""
     colours = browser.run("""
         const node = document.querySelector(arguments[0]);
         let ground = node;

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The 3D view in a real browser: where things are in its pictures, and what it does in need."""
+"""The 3D view in a real browser: positions in its pictures, and its fallbacks."""
 
 from collections.abc import Iterator
 import math
@@ -24,7 +24,7 @@ MIRRORS = {
     'left': ((1.78, 0.92, 0.98), 0.19, 0.13, 1.4, -11.0, -3.0),
     'inner': ((1.75, 0.0, 1.26), 0.24, 0.065, math.inf, 0.0, -2.0),
     'right': ((1.78, -0.92, 0.98), 0.19, 0.13, 1.4, 9.0, -3.0)}
-# Draws one picture of a vehicle at each pose; gives where a point of the map is in it.
+# Draws one picture of a vehicle at each pose; returns the place of a map point in it.
 PROJECT = """
 const [poses, across, width, height] = arguments;
 const { Vector3 } = await import('/three/three.module.js');
@@ -67,7 +67,7 @@ def cockpit(run: RecordedRun) -> Iterator[Served]:
 
 @pytest.fixture(scope='module')
 def page(cockpit: Served, module_browser: Browser) -> Browser:
-    """Return a page whose 3D view is open, in a window that costs little."""
+    """Return a page with an open 3D view, in a small window to save time."""
     if find_libraries() is None:
         pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     module_browser.resize(640, 400)
@@ -86,7 +86,7 @@ def in_vehicle(pose: NDArray[np.float64], point: Any) -> NDArray[np.float64]:
 
 
 def sight(aside: float, pitch: float) -> tuple[NDArray[np.float64], ...]:
-    """Return the directions forwards, to the left and up of somebody who looks there [rad]."""
+    """Return the directions forwards, left and up for a direction of view [rad]."""
     forwards = np.array([math.cos(pitch) * math.cos(aside), math.cos(pitch) * math.sin(aside),
                          math.sin(pitch)])
     left = np.array([-math.sin(aside), math.cos(aside), 0.0])
@@ -94,7 +94,7 @@ def sight(aside: float, pitch: float) -> tuple[NDArray[np.float64], ...]:
 
 
 def pinhole(offset: NDArray[np.float64], aside: float, across: float) -> tuple[float, float]:
-    """Return the pixel in which an eye sees a point: similar triangles, nothing else."""
+    """Return the pixel in which an eye sees a point, by similar triangles alone."""
     forwards, left, up = sight(aside, 0.0)
     scale = 0.5 * WIDTH / math.tan(0.5 * across) / (offset @ forwards)
     return 0.5 * WIDTH - scale * (offset @ left), 0.5 * HEIGHT - scale * (offset @ up)
@@ -102,7 +102,7 @@ def pinhole(offset: NDArray[np.float64], aside: float, across: float) -> tuple[f
 
 def on_glass(point: NDArray[np.float64], name: str) -> tuple[float, float]:
     """
-    Return where on a mirror's glass its driver sees a point, from the left and from the top.
+    Return the place on a mirror's glass where its driver sees a point, from left and top.
 
     The line from the eye's image behind the glass to the point passes through it there.
 
@@ -114,12 +114,12 @@ def on_glass(point: NDArray[np.float64], name: str) -> tuple[float, float]:
     eye = middle - backwards / (1 / away + 2 / radius)
     along = point - eye
     hit = eye + along * ((middle - eye) @ backwards) / (along @ backwards) - middle
-    # Who looks ahead has the mirror's left where somebody who looks back has the right.
+    # The mirror's left in the view ahead is the right in a view back.
     return 0.5 + (hit @ left) / width, 0.5 - (hit @ up) / height
 
 
 def make_poses(run: RecordedRun) -> list[dict[str, Any]]:
-    """Draw poses on the whole map, and for each points that eye and mirrors can see."""
+    """Draw random poses on the whole map, each with points that eye and mirrors can see."""
     random = np.random.default_rng(5)
     xmin, ymin, xmax, ymax = run.scene['bounds']
     poses = []
@@ -148,7 +148,7 @@ def make_poses(run: RecordedRun) -> list[dict[str, Any]]:
 @pytest.mark.exhaustive
 def test_points_of_the_map_are_where_a_pinhole_at_the_eye_sees_them(
         page: Browser, run: RecordedRun) -> None:
-    """In the driver's view and in side and rear windows, at 200 poses: to a pixel in 1920."""
+    """In the driver's view and in side and rear windows, 200 poses agree to a pixel in 1920."""
     poses, across = make_poses(run), math.radians(75.0)
     found = page.run_async(PROJECT, poses, across, WIDTH, HEIGHT)
     assert {item['mirror'] for item in found} == set(MIRRORS)
@@ -159,7 +159,7 @@ def test_points_of_the_map_are_where_a_pinhole_at_the_eye_sees_them(
         assert math.dist(seen, expected) < 1.0, pose
         name = item['mirror']
         expected = on_glass(in_vehicle(stand, pose['behind'][name]), name)
-        # The picture of the camera that looks back is turned over on the glass.
+        # The rear camera's picture is mirrored on the glass.
         seen = (0.5 * (1 - item['glass'][0]), 0.5 * (1 - item['glass'][1]))
         # A mirror is a fifth to a quarter of the picture's width.
         assert math.dist(seen, expected) * 0.25 * WIDTH < 1.0, (name, pose)
@@ -179,7 +179,7 @@ def test_a_car_true_to_scale_subtends_what_it_would(page: Browser) -> None:
         return settings.seat;""")
     assert angle == {'screen_width_m': 0.6, 'eye_distance_m': 0.7}
     page.wait('crgame.view3d.stats.frames > arguments[0] + 1', arguments=(frames,))
-    # Focal length of the picture [px], and how wide a pixel is on the screen [m].
+    # Focal length of the picture [px], and width of a pixel on the screen [m].
     focal = page.run("""
         const { picture } = crgame.view3d;
         return 0.5 * picture.stats.height * picture.camera.projectionMatrix.elements[5];""")
@@ -193,10 +193,10 @@ def test_a_car_true_to_scale_subtends_what_it_would(page: Browser) -> None:
 
 
 def test_the_map_rests_while_it_is_covered_and_few_calls_draw_the_view(page: Browser) -> None:
-    """Without the small map nothing of the map is drawn; V brings it back."""
+    """Without the small map no part of the map is drawn; V shows the map again."""
     page.run("crgame.view3d.settings.set('inset', false)")
     page.wait('document.querySelector("#world").clientWidth === 0')
-    # The frame in which it vanished may have drawn it.
+    # The frame that hid the map may still have drawn it.
     before = page.run_async("""
         for (let i = 0; i < 3; i += 1) {
           await new Promise((resolve) => requestAnimationFrame(resolve));
@@ -223,7 +223,7 @@ def test_the_map_rests_while_it_is_covered_and_few_calls_draw_the_view(page: Bro
 
 
 def test_what_a_camera_cannot_see_is_left_out_and_nothing_else(page: Browser) -> None:
-    """The same pixels as with everything handed over, of a fraction of the triangles."""
+    """A fraction of the triangles gives the same pixels as all of them."""
     found = page.run_async("""
         const { Frustum } = await import('/three/three.module.js');
         const { picture } = crgame.view3d;
@@ -270,7 +270,7 @@ def test_what_a_camera_cannot_see_is_left_out_and_nothing_else(page: Browser) ->
 
 
 def test_what_is_left_out_of_pictures_is_hardly_seen(page: Browser) -> None:
-    """With the least detail, at as many pixels: fewer triangles, 97 % of the pixels alike."""
+    """The least detail at the same size has fewer triangles and 97 % of the pixels alike."""
     found = page.run_async("""
         const { DETAILS } = await import('/static/js/view3d/quality.js');
         const { picture } = crgame.view3d;
@@ -313,7 +313,7 @@ def test_what_is_left_out_of_pictures_is_hardly_seen(page: Browser) -> None:
 
 @pytest.mark.clock
 def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
-    """The page says so; when the context is back, pictures are what they were."""
+    """The page reports it; after the context's return the pictures are as before."""
     page.run("""
         const context = document.querySelector('#view3d').getContext('webgl2');
         window.loss = context.getExtension('WEBGL_lose_context');
@@ -339,14 +339,14 @@ def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
           seen.add(`${pixels[i] >> 4} ${pixels[i + 1] >> 4} ${pixels[i + 2] >> 4}`);
         }
         return seen.size;""")
-    # Sky, road, ground and a car with its shades.
+    # Sky, road, ground, and a car with its shading.
     assert colors > 5
 
 
 @pytest.mark.exhaustive
 def test_a_side_window_shows_the_time_of_the_first_and_nothing_else(
         page: Browser, cockpit: Served) -> None:
-    """No panels, no instruments; what it shows is what the seat's window showed last."""
+    """It has no panels or instruments and shows the last time of the seat's window."""
     first = page.driver.current_window_handle
     page.driver.switch_to.new_window('window')
     try:
@@ -375,12 +375,12 @@ def test_a_side_window_shows_the_time_of_the_first_and_nothing_else(
 
 def test_without_the_library_the_map_works_and_a_line_says_so(
         cockpit: Served, browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing else fails: the page has its map, and no error but the file that is not there."""
+    """The page keeps its map and logs no error but the missing file."""
     with served(RunBackend(cockpit.backend.run)) as other:
         monkeypatch.setattr(page_files, 'find_libraries', lambda: None)
         browser.open(other.address)
         browser.wait('crgame.ready && crgame.store.scene && crgame.world.stats.frames > 0')
-        # Viewpoints can be chosen where there is a view: on the map one button opens it.
+        # Viewpoints can be chosen only in the view; on the map one button opens it.
         assert browser.run("""
             return [...document.querySelectorAll('.view3d-buttons button')].filter(
               (node) => node.getClientRects().length > 0).length""") == 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fingers in the 3D view: keys on phones and tablets, which leave the road free."""
+"""Touch in the 3D view: keys on phones and tablets that leave the road visible."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,10 +14,10 @@ from world_support import RecordedRun, RunBackend, Served, served
 pytestmark = pytest.mark.exhaustive
 
 SIZES = ((390, 844), (640, 360), (844, 390), (820, 1180), (1180, 820))
-# What fingers have no room for has other ways: S brakes, both indicators are hazard lights.
+# Functions without a touch key have other ways: S brakes, both indicators are hazard lights.
 LEFT_OUT = {'cap cap-Space', 'cap cap-KeyJ'}
 COARSE = [{'name': name, 'value': 'coarse'} for name in ('pointer', 'any-pointer')]
-# Keys that cannot be hit, as the browser finds what is under a finger, and what lies under keys.
+# Keys that the browser does not find under a finger, and elements that lie under keys.
 LAYOUT = """
 const box = (node) => node.getBoundingClientRect();
 const seen = (name) => [...document.querySelectorAll(name)].filter(
@@ -58,7 +58,7 @@ def cockpit() -> Iterator[Served]:
 
 @pytest.fixture(params=['', '?stage=hv0'], ids=['page', 'stage'])
 def phone(cockpit: Served, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Browser]:
-    """Open the driver's view of a seat where fingers point, in the page and on its own."""
+    """Open the driver's view of a seat with touch input, in the page and on its own."""
     if find_libraries() is None:
         pytest.skip('the 3D view is not tested: `crgame page-libraries` has not fetched three.js')
     driver = browser.driver
@@ -82,7 +82,7 @@ def phone(cockpit: Served, browser: Browser, request: pytest.FixtureRequest) -> 
 
 
 def test_keys_lie_beside_what_is_read_and_the_road_is_free(phone: Browser) -> None:
-    """On phones and tablets, upright and not: each key can be hit and hides nothing."""
+    """On phones and tablets, in both orientations, each key can be hit and hides nothing."""
     for width, height in SIZES:
         phone.resize(width, height)
         phone.wait('innerWidth === arguments[0] && crgame.view3d.stats.width > 0 && '
@@ -91,13 +91,13 @@ def test_keys_lie_beside_what_is_read_and_the_road_is_free(phone: Browser) -> No
         found = phone.run(LAYOUT)
         assert set(found['hidden']) == LEFT_OUT, (width, height)
         assert found['missed'] == found['covered'] == [], (width, height)
-        # What a finger can hit: 44 px, as the guidelines of the platforms have it.
+        # A touch target has at least 44 px, by the guidelines of the platforms.
         assert min(found['sizes']) >= 44, (width, height)
         assert found['free'] > 0.7, (width, height)
 
 
 def test_two_fingers_drive(phone: Browser) -> None:
-    """Touches of the browser itself: throttle and left at once, and let go one by one."""
+    """Real touches press throttle and left at once and release them one by one."""
     phone.driver.find_element('css selector', '#view3d').click()
     phone.wait('crgame.driving.away === null', 'hands on the controls')
     points = phone.run("""return ['KeyW', 'KeyA'].map((code) => {
@@ -119,7 +119,7 @@ def test_two_fingers_drive(phone: Browser) -> None:
 
 
 def test_a_phone_has_the_button_of_the_3d_view(cockpit: Served, phone: Browser) -> None:
-    """On the page: a phone has no V; what pinching does needs no button."""
+    """The page has the button, as a phone has no V; pinching needs no button."""
     if 'stage' in phone.driver.current_url:
         assert phone.run('return document.querySelector(".view3d-buttons") === null')
         return

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of the 3D view: how much is drawn for it at most, kept as a file, and in focus."""
+"""One picture of the 3D view: its drawing costs, its saved file, and its focus."""
 
 from collections.abc import Iterator
 import math
@@ -24,8 +24,8 @@ for (let i = 0; i < 60; i += 1) {
 }
 crgame.store.receiveFrame(cars.buffer, performance.now());
 """
-# Draws from several places all around: each mirror once, from behind and from above. Gives the
-# most of each count.
+# Draws from several places all around: each mirror once, from behind and from above. Returns
+# the maximum of each count.
 ALL_AROUND = CARS + """
 const { picture } = crgame.view3d;
 picture.sharp = true;
@@ -51,7 +51,7 @@ for (const [x, y] of [[5, 2], [320, 182], [595, 542]]) {
 return most;
 """
 
-# Gives how each car's front wheels are turned, and how long it is between its axles.
+# Returns each car's front wheel angle and wheelbase.
 WHEELS = CARS + """
 const { FittedParts } = await import('/static/js/view3d/fitted_parts.js');
 const { addWheels } = FittedParts.prototype;
@@ -101,7 +101,7 @@ def page(cockpit: Served, browser: Browser) -> Browser:
 @pytest.mark.parametrize('light', ['day', 'dusk'])
 def test_60_vehicles_on_400_lanelets_take_few_calls_and_triangles(
         run: RecordedRun, cockpit: Served, page: Browser, light: str) -> None:
-    """At 1920x1080 with all detail, lamps and beams of everybody included at dusk."""
+    """The limits hold at 1920x1080 with all detail, lamps and beams of all vehicles at dusk."""
     cockpit.publish('scene', large_scene(run) | {
         'environment': {'light': light, 'visibility': 30000.0}})
     page.wait('crgame.store.scene.lanelets.length === 400 && crgame.store.latest')
@@ -116,7 +116,7 @@ def test_60_vehicles_on_400_lanelets_take_few_calls_and_triangles(
 @pytest.mark.exhaustive
 def test_wheels_of_others_are_turned_as_they_drive(
         run: RecordedRun, cockpit: Served, page: Browser) -> None:
-    """The angle of a single-track model with their speed and yaw rate: 1.6 degrees here."""
+    """The angle is a single-track model's at their speed and yaw rate: 1.6 degrees here."""
     cockpit.publish('scene', large_scene(run))
     page.wait('crgame.store.scene.lanelets.length === 400 && crgame.store.latest')
     found = page.run_async(WHEELS)
@@ -129,10 +129,10 @@ def test_wheels_of_others_are_turned_as_they_drive(
 
 @pytest.mark.exhaustive
 def test_the_view_is_saved_as_it_is_seen(page: Browser, tmp_path: Path) -> None:
-    """Though nothing has moved since its last picture: by the button, as PNG with mirrors."""
+    """The button saves a PNG with mirrors, even without motion since the last picture."""
     page.driver.execute_cdp_cmd('Browser.setDownloadBehavior', {
         'behavior': 'allow', 'downloadPath': str(tmp_path)})
-    # When all pictures after the last change are drawn, the canvas holds nothing any more.
+    # After all pictures of the last change are drawn, the canvas has no content.
     frames = page.run_async("""
         let before = -1;
         while (before !== crgame.view3d.stats.frames) {
@@ -158,8 +158,8 @@ def test_the_view_is_saved_as_it_is_seen(page: Browser, tmp_path: Path) -> None:
 
 @pytest.mark.exhaustive
 def test_the_view_shows_that_it_has_the_focus_and_says_what_is_around(page: Browser) -> None:
-    """As the map does: with a ring, and the words about those around as its description."""
-    # Focus is seen in a page that has it.
+    """It has a ring, as the map has, and the words about surrounding vehicles as description."""
+    # The ring is visible only if the page has the focus.
     page.driver.find_element('css selector', '#view3d').click()
     assert page.run('return document.activeElement.id') == 'view3d'
     found = page.run("""
@@ -177,7 +177,7 @@ def test_the_view_shows_that_it_has_the_focus_and_says_what_is_around(page: Brow
 @pytest.mark.exhaustive
 def test_keys_typed_into_fields_bring_no_pictures_out_of_turn(
         cockpit: Served, page: Browser) -> None:
-    """Only what may drive is waited for, at the rate at which the run goes."""
+    """Extra pictures follow only keys that may drive, at the pace of the run."""
     cockpit.publish('seats', {'seats': {'hv0': {
         'source': 'cockpit', 'driver': 'cockpit', 'holder_name': 'Me',
         'holder': page.run('return crgame.store.me.id')}}})

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the world shows is the recording: between the samples, at every rate, and standing."""
+"""The world shows the recorded states: between samples, at every rate, and at standstill."""
 
 from collections.abc import Iterator
 import time
@@ -15,7 +15,7 @@ import pytest
 from world_support import RecordedRun, RunBackend, Served, served
 
 # Linear interpolation over two missing samples (30 ms) at 9 m/s^2 is wrong by a t^2 / 8 = 1 mm;
-# a display that is one sample (10 ms) off is wrong by 0.2 m at the 20 m/s and more of this game.
+# a display one sample (10 ms) off is wrong by 0.2 m at this game's speeds of 20 m/s and more.
 SAME_PLACE_M = 0.002
 SHOWN = """
 const { t, n, epoch, vehicles, objects } = crgame.world.shown;
@@ -41,7 +41,7 @@ def page(run: RecordedRun, browser: Browser) -> Iterator[Served]:
 
 
 def shown(browser: Browser) -> dict[str, Any]:
-    """Take the last frame as it was drawn."""
+    """Return the last frame as it was drawn."""
     frame: dict[str, Any] = browser.run(SHOWN)
     frame['vehicles'] = np.array(frame['vehicles'], dtype=float).reshape(-1, STATE_COLUMNS)
     frame['objects'] = np.array(frame['objects'], dtype=float).reshape(-1, 6)
@@ -74,7 +74,7 @@ def test_vehicles_and_objects_stand_where_the_recording_has_them(
         since = frame['t'] - tick * run.dt_s * run.steps_per_tick
         moved = run.objects[tick, :, :3] + since * run.objects[tick, :, 3:]
         assert frame['objects'][:, :3] == pytest.approx(moved, abs=1e-9, nan_ok=True)
-    # The clock keeps behind the newest sample nearly always.
+    # The clock is nearly always behind the newest sample.
     assert seen > 40
 
 
@@ -92,7 +92,7 @@ def test_time_never_goes_back_and_keeps_close_behind(page: Served, browser: Brow
         return rows;"""))
     assert (np.diff(times) >= 0.0).all()
     assert times[-1] > times[0] + 0.5
-    # 10 ms of sample period and 8 ms of jitter, and as much again for a busy machine.
+    # 10 ms of sample period and 8 ms of jitter, and the same again for a busy machine.
     assert np.median(behind) < 0.04
 
 
@@ -108,7 +108,7 @@ def test_pause_holds_the_last_state_exactly(
     second = shown(browser)
     assert first['t'] == second['t'] == first['latest'] == pytest.approx(page.backend.n * 0.01)
     assert np.array_equal(second['vehicles'][:, :8], run.states[page.backend.n, :, :8])
-    # Nothing moves, so nothing is drawn again but what the status asks for.
+    # Nothing moves, so only changes of the status cause a new picture.
     assert second['frames'] - first['frames'] < 10
 
 
@@ -126,7 +126,7 @@ def test_reset_shows_the_new_epoch_only(
     browser.wait('crgame.world.shown.t > 1')
     page.control('pause')
     page.control('reset')
-    # Between the reset and the first state after it there is nothing to be shown.
+    # Nothing can be shown between the reset and the first state after it.
     browser.wait('crgame.world.shown?.epoch === 1')
     frame = shown(browser)
     assert frame['t'] == 0.0
@@ -174,7 +174,7 @@ def test_history_gives_the_recorded_speeds(
     past = browser.run('return crgame.store.history(1, 1.0)')
     steps = np.rint(np.array(past['t']) / run.dt_s).astype(int)
     assert past['speed'] == pytest.approx(run.states[steps, 1, 3], abs=1e-12)
-    # At 20 Hz, as far back as asked for.
+    # At 20 Hz, for the requested time.
     assert 10 <= len(steps) <= 21
     assert np.ptp(past['t']) <= 1.0
 
@@ -202,7 +202,7 @@ def test_simulation_that_began_anew_behind_a_new_connection_is_shown(
         page.backend.epoch, page.backend.n = 2, 150
         page.call(page.backend.send_now)
         browser.wait('crgame.world.shown?.epoch === 2 && crgame.world.shown.n === 150')
-        # Late frames of an epoch that is over stay hidden, as long as the connection lives.
+        # Late frames of a past epoch stay hidden while the connection lasts.
         page.backend.epoch = 0
         page.call(page.backend.send_now)
         time.sleep(0.3)

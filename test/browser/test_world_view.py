@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The world's camera, what can be seen of vehicles and plans, and how long drawing takes."""
+"""The world's camera, the visibility of vehicles and plans, and the drawing time."""
 
 from collections.abc import Callable, Iterator
 import math
@@ -17,7 +17,7 @@ from selenium.webdriver.common.keys import Keys
 from world_support import large_scene, RecordedRun, RunBackend, Served, served
 
 NORTH = math.pi / 2
-# A colour of the canvas may be blended with its neighbours' by at most this at a pixel's edge.
+# Largest blend of a canvas colour with its neighbours' colours at a pixel's edge.
 SAME_COLOR = 12
 LONGEST_SCRIPT_MS = 8.0
 
@@ -30,7 +30,7 @@ def run() -> RecordedRun:
 
 @pytest.fixture
 def page(run: RecordedRun, browser: Browser) -> Iterator[Served]:
-    """Open the page before the run, still."""
+    """Open the page before the run begins."""
     with served(RunBackend(run)) as server:
         browser.open(server.address)
         browser.wait('window.crgame?.ready && crgame.world.shown && crgame.world.followed')
@@ -124,7 +124,7 @@ def test_begins_behind_the_first_human_with_its_heading_up(
     view = camera(browser)
     assert view['up'] == pytest.approx(run.states[0, 0, 2], abs=1e-3)
     assert view['x'] == pytest.approx(run.states[0, 0, 0] + 1.4227, abs=0.05)
-    # More road before it than behind it.
+    # More road is shown ahead of it than behind it.
     assert browser.run('return crgame.world.camera.anchorY / crgame.world.camera.height') > 0.5
 
 
@@ -205,7 +205,7 @@ def test_drag_moves_the_map_with_the_hand_and_right_drag_turns_it(
         canvas, 200, 0).click_and_hold().move_by_offset(0, 100).release() \
         .key_up(Keys.SHIFT).perform()
     still(browser)
-    # The hand goes down on the right of the middle: the map turns clockwise, its up with it.
+    # The hand moves down on the right of the middle: the map turns clockwise, with its up.
     assert 0.2 < camera(browser)['up'] - up < 0.8
 
 
@@ -236,7 +236,7 @@ def test_plan_is_drawn_until_an_event_hides_it(
     times = 0.1 * np.arange(31)
     plan = np.column_stack([x + 8.0 * times * math.cos(yaw), y + 8.0 * times * math.sin(yaw),
                             np.full(31, yaw), np.full(31, 8.0), times])
-    # 14.6 m ahead is no whole half second of the plan: on the band and the line, on no dot.
+    # 14.6 m ahead is no multiple of half a second of the plan: on band and line, on no dot.
     beside = (float(x + 14.6 * math.cos(yaw) - 0.6 * math.sin(yaw)),
               float(y + 14.6 * math.sin(yaw) + 0.6 * math.cos(yaw)))
     road = pixel(browser, *beside)
@@ -309,8 +309,8 @@ def test_400_lanelets_and_60_obstacles_draw_within_8_ms_of_script(
     assert browser.console_errors() == []
 
 
-# Moves 60 cars and gives the script time of 120 frames, the first 30 left to the compiler. In the
-# first half everything is in view, in the second the camera is near, where all details are.
+# Moves 60 cars; returns the script time of 120 frames, without 30 for the compiler. In the
+# first half all cars are in view; in the second the camera is near and all details are drawn.
 SIXTY_CARS = """
 const { world, store } = crgame;
 const cars = new Float64Array(6 + 60 * 6);

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The real server of the cockpit in front of a run that was computed before."""
+"""The real server of the cockpit, serving a precomputed run."""
 
 import asyncio
 from collections.abc import Iterator, Mapping
@@ -54,7 +54,7 @@ class RecordedRun:
 
 
 def large_scene(run: RecordedRun) -> dict[str, object]:
-    """Lay out 100 curved roads of four lanes, 60 cars on them."""
+    """Make 100 curved roads of four lanes with 60 cars."""
     lanelets = []
     for index in range(400):
         road, lane = divmod(index, 4)
@@ -84,7 +84,7 @@ class RunBackend:
     """
     Sends the run's frames, as a live backend does, and obeys pause, start, step and reset.
 
-    :param run: what is sent.
+    :param run: the sent run.
     :param every: simulation steps between two STATE frames.
     :param jitter_s: each STATE frame is late by up to this.
     """
@@ -97,7 +97,7 @@ class RunBackend:
         self.state = 'paused'
         self.stalled = False
         self.factor = 1.0
-        # As the status says it.
+        # The words of the status.
         self.drivability: dict[str, dict[str, Any]] = {}
         self.n = self.epoch = 0
         self.messages: list[Mapping[str, Any]] = []
@@ -208,7 +208,7 @@ class Served:
         self.address = f'http://{HOST}:{port}/'
 
     def call(self, function: Any, *arguments: Any) -> None:
-        """Call something of the backend in its own thread."""
+        """Call a function of the backend in its thread."""
         self._loop.call_soon_threadsafe(function, *arguments)
 
     def control(self, action: str) -> None:
@@ -225,7 +225,7 @@ class Served:
 
 @contextmanager
 def served(backend: RunBackend, framed_by: str = '') -> Iterator[Served]:
-    """Serve the page and a backend, as the cockpit does; one page may show it within itself."""
+    """Serve the page and a backend as the cockpit does; one origin may frame the page."""
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever, daemon=True)
     thread.start()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A wheel with a motor whose file is a socket: whatever is written to it can be read elsewhere."""
+"""A wheel with a motor whose file is a socket, so that a test can read what is written."""
 
 import ctypes
 import math
@@ -20,14 +20,14 @@ from crgame_ros.vehicle.steering import Steering
 from evdev import ecodes, ff
 from scipy.optimize import brentq
 
-# What is written: a mark, then the bytes of the ioctl or of the event.
+# Format: a mark, then the bytes of the ioctl or of the event.
 UPLOAD, EVENT, ERASE = b'U', b'E', b'X'
 EVENT_FORMAT = 'HHi'
 EFFECT_SIZE = ctypes.sizeof(ff.Effect)
 
 
 def wheel_at(speed: float, yaw_rate: float) -> float:
-    """Return the angle of the usual vehicle's wheel that holds a turn [rad]."""
+    """Return the steering wheel angle of the usual vehicle in a steady turn [rad]."""
     car = load_vehicle_parameters()
     steering, full = Steering(car), car.max_steering_wheel_angle
     angle = math.atan(car.wheelbase * yaw_rate / speed)
@@ -40,7 +40,7 @@ def raw_of(angle: float) -> int:
 
 
 class Motor:
-    """Does what evdev does with a descriptor: uploads and writes; one effect has room."""
+    """Stands for evdev on a descriptor: uploads and writes; it has room for one effect."""
 
     def __init__(self, file: socket.socket | None = None) -> None:
         self.file = file
@@ -50,7 +50,7 @@ class Motor:
         self.error: OSError | None = None
 
     def upload_effect(self, effect: ff.Effect) -> int:
-        """Take an effect as EVIOCSFF does."""
+        """Upload an effect as EVIOCSFF does."""
         data = memoryview(effect).tobytes()
         self._send(UPLOAD + data)
         read = ff.Effect.from_buffer_copy(data)
@@ -64,7 +64,7 @@ class Motor:
         return 7
 
     def write(self, etype: int, code: int, value: int) -> None:
-        """Take an event."""
+        """Write an event."""
         self._send(EVENT + struct.pack(EVENT_FORMAT, etype, code, value))
         self.events.append((etype, code, value))
 
@@ -97,7 +97,7 @@ class PushedWheel(EvdevDevice):
         self.limits = limits or device_map.force
 
     def turn(self, angle: float) -> None:
-        """Turn it to an angle [rad]."""
+        """Turn the wheel to an angle [rad]."""
         self.decoder.axes[ecodes.ABS_X] = raw_of(angle)
 
     @property
@@ -112,7 +112,7 @@ class PushedWheel(EvdevDevice):
 
 
 def main() -> None:
-    """Push hard to the right for ever, in the file that was handed on."""
+    """Push hard to the right forever, in the inherited file."""
     wheel = PushedWheel(Motor(socket.socket(fileno=int(sys.argv[1]))))
     wheel.turn(wheel_at(20.0, 0.3))
     force = ForceFeedback(wheel, load_vehicle_parameters())

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Force feedback: the limits of the torque, and that it ends whenever it has to."""
+"""Force feedback: the limits of the torque, and the conditions that end it."""
 
 import errno
 import math
@@ -51,7 +51,7 @@ needs_uinput = pytest.mark.skipif(
 
 
 def test_cap_and_slew_hold_whatever_is_asked() -> None:
-    """Random torques, of which some are no numbers or endless, at random intervals."""
+    """Cap and slew rate hold for random torques, also NaN and infinite, at random intervals."""
     draw = random.Random(11)
     for _ in range(50):
         limits = ForceLimits(max_torque=draw.uniform(0.5, 20.0), strength=draw.uniform(0.0, 5.0),
@@ -77,7 +77,7 @@ class Drive:
         self.now_s = 100.0
 
     def go(self, seconds: float, *, seen: bool = True, driving: bool = True) -> float:
-        """Let time pass, with or without new states; give the last torque, 0 without a motor."""
+        """Advance time, with or without new states; return the last torque, 0 without a motor."""
         torque = 0.0
         for _ in range(round(seconds / STEP_S)):
             self.now_s += STEP_S
@@ -89,7 +89,7 @@ class Drive:
 
 
 def test_a_bend_pushes_back_through_one_effect() -> None:
-    """One upload makes it, the others change it; it is renewed long before the kernel ends it."""
+    """One upload makes the effect, others change it; it is renewed long before it expires."""
     drive = Drive()
     torque = drive.go(1.0)
     assert torque == pytest.approx(MODEL.aligning(20.0, 0.25, WHEEL), abs=1e-3)
@@ -104,7 +104,7 @@ def test_a_bend_pushes_back_through_one_effect() -> None:
 
 @pytest.mark.parametrize('how', [{'seen': False}, {'driving': False}], ids=['pause', 'seat'])
 def test_the_force_ends_with_the_states_or_the_seat(how: dict[str, bool]) -> None:
-    """A pause or a lost simulation is 0.2 s without a state; then it falls at the slew."""
+    """After 0.2 s without a state (pause, lost simulation) the force falls at the slew rate."""
     drive = Drive()
     torque = drive.go(1.0)
     fall_s = abs(torque) / 60.0
@@ -112,14 +112,14 @@ def test_the_force_ends_with_the_states_or_the_seat(how: dict[str, bool]) -> Non
     assert drive.motor.levels[-1] == 0
     if how == {'driving': False}:
         return
-    # The simulation's clock has stood: messages of the same stamp are no new states.
+    # The simulation's clock stands: messages of the same stamp are no new states.
     drive.force.see_motion(drive.now_s, drive.force._time_s, 20.0, 0.25)
     assert drive.go(0.1, **how) == 0.0
     assert drive.go(1.0) == pytest.approx(torque)
 
 
 def test_strength_direction_and_cap_are_the_maps() -> None:
-    """Twice the strength at an inverted motor of 1 N m, of which 60 % may be used."""
+    """The map sets twice the strength, an inverted motor of 1 N m, and a cap of 60 %."""
     limits = ForceLimits(max_torque=1.0, strength=2.0, cap=0.6, inverted=True)
     drive = Drive(limits)
     assert drive.go(1.0) == pytest.approx(-0.6)
@@ -129,7 +129,7 @@ def test_strength_direction_and_cap_are_the_maps() -> None:
 
 
 def test_unplugged_and_plugged_in_again() -> None:
-    """The error ends it; another device gets an effect of its own, from no force on."""
+    """The error ends the effect; another device gets a new one, which starts without force."""
     drive = Drive()
     torque = drive.go(1.0)
     drive.motor.error = OSError(errno.ENODEV, 'No such device')
@@ -143,7 +143,7 @@ def test_unplugged_and_plugged_in_again() -> None:
 
 
 def test_the_road_and_collisions_are_felt() -> None:
-    """Off the road the torque swings around the aligning one; a collision jolts, and fades."""
+    """Off the road the torque swings around the aligning one; a collision gives a fading jolt."""
     drive = Drive()
     torque = drive.go(1.0)
     drive.force.see_drivability(False, True)
@@ -156,7 +156,7 @@ def test_the_road_and_collisions_are_felt() -> None:
 
 
 def test_a_killed_process_leaves_no_force() -> None:
-    """Nobody but the process has the file: kill -9 closes it, upon which the kernel lets go."""
+    """Only the process has the file: kill -9 closes it, and the kernel then ends the effect."""
     here, there = socket.socketpair()
     process = subprocess.Popen([sys.executable, str(Path(__file__).with_name('pushed_wheel.py')),
                                 str(there.fileno())], pass_fds=(there.fileno(),),
@@ -185,7 +185,7 @@ def test_a_killed_process_leaves_no_force() -> None:
 
 
 def test_maps_say_what_their_motor_holds() -> None:
-    """Each wheel that ships has a motor, nothing else; what is out of bounds is refused."""
+    """Only maps of shipped wheels have a motor; values out of bounds are refused."""
     for device_map in load_device_maps():
         assert (device_map.force is not None) == (device_map.kind.name == 'WHEEL')
     text = (ROOT / 'config/devices/logitech_g29.yaml').read_text()
@@ -196,7 +196,7 @@ def test_maps_say_what_their_motor_holds() -> None:
 
 
 class VirtualMotor:
-    """A wheel that the kernel shows like a real one, with a motor that notes what is asked."""
+    """A wheel that the kernel presents like a real one, with a motor that records requests."""
 
     def __init__(self) -> None:
         axes = [(ecodes.ABS_X, AbsInfo(32767, 0, 65535, 0, 0, 0)), *(
@@ -229,12 +229,12 @@ class VirtualMotor:
                     self.erased.set()
 
     def turn(self, angle: float) -> None:
-        """Turn it to an angle [rad]."""
+        """Turn the wheel to an angle [rad]."""
         self.device.write(ecodes.EV_ABS, ecodes.ABS_X, raw_of(angle))
         self.device.syn()
 
     def close(self) -> None:
-        """Unplug it."""
+        """Unplug the wheel."""
         self._ended = True
         self._thread.join()
         self.device.close()
@@ -242,7 +242,7 @@ class VirtualMotor:
 
 @needs_uinput
 def test_the_kernel_takes_the_force_and_ends_it() -> None:
-    """Through evdev's own ioctls: uploads arrive, and the kernel erases what is left behind."""
+    """Uploads through evdev's ioctls arrive, and the kernel erases leftover effects."""
     motor = VirtualMotor()
     try:
         wheel = open_evdev(G29)
@@ -258,7 +258,7 @@ def test_the_kernel_takes_the_force_and_ends_it() -> None:
             force.step(time.monotonic())
             time.sleep(0.008)
         assert motor.levels[-1] < -0.5 * FULL_LEVEL
-        # As any end of the process does, without a word to the motor.
+        # Any end of the process does this, without a command to the motor.
         wheel.close()
         assert motor.erased.wait(10.0)
     finally:
