@@ -61,7 +61,7 @@ PER_KM_AND_LANE = 25.0
 AHEAD = 1500.0
 # Vehicles a crossing in town.
 PER_CROSSING = 8.0
-NOBODY = np.zeros((0, 3))
+NONE = np.zeros((0, 3))
 
 
 class Start:
@@ -113,7 +113,7 @@ def stepper(traffic: Traffic) -> Callable[[], None]:
     ticks = iter(range(10**9))
 
     def step() -> None:
-        traffic.advance(WorldView(next(ticks), NOBODY, NOBODY))
+        traffic.advance(WorldView(next(ticks), NONE, NONE))
         traffic.states  # noqa: B018 - read once a step, as by the engine
 
     return step

@@ -33,7 +33,7 @@ REWARD = {'progress': 0.05, 'offset': -0.1, 'heading': -0.5, 'speeding': -0.1, '
 # How the start of the AV varies, so that the drive is not learned by heart.
 VARY = {'speed': 3.0, 'along': 10.0}
 PEDAL, STEERING = 7, 5
-# Nobody ahead is as somebody far away who drives as fast: distance [m].
+# No leader counts as a leader far ahead at the same speed: distance [m].
 CLEAR = 80.0
 
 

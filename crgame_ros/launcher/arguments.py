@@ -32,10 +32,10 @@ examples:
                                                   a recorded game again, against another planner
   ./run.sh --replay runs/NAME/bag                 look at a recording, with a time line
 
-driver sources: cockpit (the run waits for somebody in the browser), auto (wheel, gamepad or
+driver sources: cockpit (the run waits for a person in the browser), auto (wheel, gamepad or
 keyboard, whichever is found), evdev[:NAME], keys:FILE, joy:FILE (scripted), joy (an external joy
-node), replay:BAG (without a game the recording's own), policy:FILE.py:load, idle. Whoever they
-are, somebody in the browser can take the seat.
+node), replay:BAG (without a game the recording's own), policy:FILE.py:load, idle. A
+person in the browser can take over any of them.
 planners: idm, idm-package, reactive, reactive-package, constant-velocity, a registered name,
 module:Class, file.py:Class or policy:FILE.py:load."""
 

@@ -18,7 +18,7 @@ WHEELBASE = 0.6
 REAR_TO_CENTER = 0.3
 BoolArray = NDArray[np.bool_]
 
-NOBODY = -1
+NONE = -1
 # The agent has no leader, or no blocker; -1 and below are other objects.
 FREE = -2**62
 # The highest speed allowed for a type of vehicle on any road in Germany; for bicycles and
@@ -177,7 +177,7 @@ class Agents(AgentTable):
         self.share: FloatArray = np.ones(self.count)
         self.factor[:] = 1.0
         for name in ('source', 'grant', 'until', 'before', 'before_until', 'previous'):
-            getattr(self, name)[:] = NOBODY
+            getattr(self, name)[:] = NONE
         self.leader[:] = self.blocker[:] = FREE
 
     def centers(self) -> FloatArray:
@@ -214,7 +214,7 @@ class Agents(AgentTable):
         self.leader[slot] = self.blocker[slot] = FREE
         for none in (self.source, self.grant, self.until, self.before, self.before_until,
                      self.previous):
-            none[slot] = NOBODY
+            none[slot] = NONE
 
     def remove(self, slots: IntArray, k: int) -> None:
         """Remove agents from the road; their slots are free again after a tick of absence."""

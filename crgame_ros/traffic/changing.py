@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
-from crgame_ros.traffic.agents import Agents, AgentTable, centers_of, NOBODY
+from crgame_ros.traffic.agents import Agents, AgentTable, centers_of, NONE
 from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.courtesy import CourtesyRules, relief_at_change
@@ -251,7 +251,7 @@ class LaneChanges:
             returns = stuck[back]
             agents.lane[returns], agents.s[returns], agents.d[returns] = (
                 lane[back], s[back], d[back])
-            agents.source[stuck] = NOBODY
+            agents.source[stuck] = NONE
             agents.calm_until[stuck] = k + self._give_up
 
     def decide(self, k: int, agents: Agents, slots: IntArray, desired: FloatArray,
@@ -346,7 +346,7 @@ class LaneChanges:
         agents.source[slot], agents.side[slot] = agents.lane[slot], wish.side[i]
         agents.lane[slot], agents.s[slot] = beside.lane[i], beside.s[i]
         agents.d[slot] = beside.d[i]
-        agents.previous[slot] = NOBODY
+        agents.previous[slot] = NONE
         agents.waits[slot] = 0
         agents.content_until[slot] = k + self._content
         agents.calm_until[slot] = k + self._calm + round(
@@ -417,11 +417,11 @@ def _finish(agents: AgentTable, give_up: int) -> IntArray:
     stuck = np.empty(len(agents.x), np.int64)
     count = 0
     for i in range(len(agents.x)):
-        if agents.source[i] == NOBODY:
+        if agents.source[i] == NONE:
             continue
         done = agents.s[i] - agents.from_s[i]
         if done >= agents.span[i]:
-            agents.source[i] = NOBODY
+            agents.source[i] = NONE
         elif agents.active[i] and agents.source[i] != agents.lane[i] and (
                 agents.waits[i] > (1 if done < STARTED * agents.span[i] else LATER) * give_up):
             stuck[count] = i

@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.traffic.agents import Agents, AgentTable, FREE, NOBODY
+from crgame_ros.traffic.agents import Agents, AgentTable, FREE, NONE
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.conflicts import Conflicts, ConflictTable
 from crgame_ros.traffic.exit_room import is_full, promise, Promises
@@ -93,7 +93,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
         agents.blocker[slot] = FREE
         if agents.grant[slot] >= 0 and _withdraws(rules, ticks, k, agents, passage, meeting, at,
                                                   i):
-            agents.grant[slot] = agents.before[slot] = NOBODY
+            agents.grant[slot] = agents.before[slot] = NONE
             halt[i] = agents.grant_hold[slot]
     for i in _in_turn(k, agents, slots):
         slot = slots[i]
@@ -148,8 +148,8 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
         for step in range(way.depth[i]):
             ahead |= way.lane[i, step] == agents.until[slot]
         if not ahead or agents.grant_left[slot] < -PASSED:
-            agents.grant[slot], agents.sees[slot] = NOBODY, False
-            agents.before[slot] = NOBODY
+            agents.grant[slot], agents.sees[slot] = NONE, False
+            agents.before[slot] = NONE
 
 
 @compiled

@@ -5,7 +5,7 @@
 import math
 from typing import NamedTuple
 
-from crgame_ros.traffic.agents import AgentTable, NOBODY
+from crgame_ros.traffic.agents import AgentTable, NONE
 from crgame_ros.traffic.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lane_change import urgency
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
@@ -125,7 +125,7 @@ def _is_inside(to: Destinations, agents: AgentTable, slot: int, lane: int) -> bo
 def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slot: int,
              at: Situations, i: int) -> bool:
     """Return whether an agent may change lanes at all, here and now."""
-    if agents.source[slot] != NOBODY or agents.calm_until[slot] > k or (
+    if agents.source[slot] != NONE or agents.calm_until[slot] > k or (
             at.blocked[i] <= TOO_NEAR):
         return False
     speed, lane = agents.speed[slot], agents.lane[slot]

@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
+from crgame_ros.traffic.agents import Agents, AgentTable, NONE
 from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.encounters import FIRMEST, moderate
 from crgame_ros.traffic.lane_change import SHORTEST_CHANGE
@@ -132,7 +132,7 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
         speed, lane = agents.speed[slot], agents.lane[slot]
         beside = lanes.left[lane] >= 0 or lanes.right[lane] >= 0
         # An agent that is nearer already cannot leave this room any more.
-        if swings[slot] and beside and agents.source[slot] == NOBODY and (
+        if swings[slot] and beside and agents.source[slot] == NONE and (
                 blocked[i] > 0.5 * SWING_OUT):
             distance[i] = min(distance[i], blocked[i] - SWING_OUT)
         last = way.lane[i, way.depth[i] - 1]
@@ -228,9 +228,9 @@ class Longitudinal:
         """
         slots = corridor.owner
         speed = agents.speed[slots]
-        nobody = np.full(len(slots), np.inf)
+        free = np.full(len(slots), np.inf)
         result = np.asarray(self._followers.for_agents(slots).acceleration(
-            speed, desired, nobody, speed), dtype=float)
+            speed, desired, free, speed), dtype=float)
         if len(pairs.agent):
             who, entry = pairs.agent, pairs.entry
             wanted = self._followers.for_agents(slots[who]).acceleration(

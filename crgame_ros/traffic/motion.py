@@ -4,7 +4,7 @@
 
 import math
 
-from crgame_ros.traffic.agents import Agents, AgentTable, NOBODY
+from crgame_ros.traffic.agents import Agents, AgentTable, NONE
 from crgame_ros.traffic.compiled import bare, inlined
 from crgame_ros.traffic.lane_change import offset_at
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
@@ -118,7 +118,7 @@ def _target(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     d += curve_shift(curvature, front) + swing_out(
         here.swing + share * (after.swing - here.swing),
         here.swing_long + share * (after.swing_long - here.swing_long), front)
-    if agents.source[i] != NOBODY:
+    if agents.source[i] != NONE:
         d += offset_at(agents.curve[i], along - agents.from_s[i], agents.span[i])
     cos = here.cos + share * (after.cos - here.cos)
     sin = here.sin + share * (after.sin - here.sin)
@@ -150,7 +150,7 @@ def _go_over(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int, 
     agents.previous[i], agents.lane[i] = lane, onto
     agents.from_s[i] -= length
     s, d, _ = project_on(lanes, onto, x, y, s - length, 3)
-    if agents.source[i] != NOBODY:
+    if agents.source[i] != NONE:
         # A change in progress goes on even where the lane that it leaves has ended.
         beside = lanes.right[onto] if agents.side[i] > 0 else lanes.left[onto]
         agents.source[i] = beside if beside >= 0 else onto

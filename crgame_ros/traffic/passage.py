@@ -162,7 +162,7 @@ class PassageRules:
         beside = np.abs(nodes - group.s[:, None]) <= reach[:, None]
         above = np.where(beside, (group.d + group.half_width + half_width)[:, None], -np.inf)
         below = np.where(beside, (group.d - group.half_width - half_width)[:, None], np.inf)
-        nobody = np.full((1, len(nodes)), np.inf)
-        lows = np.maximum.accumulate(np.concatenate((-nobody, above)), axis=0)
-        highs = np.minimum.accumulate(np.concatenate((below, nobody))[::-1], axis=0)[::-1]
+        unbounded = np.full((1, len(nodes)), np.inf)
+        lows = np.maximum.accumulate(np.concatenate((-unbounded, above)), axis=0)
+        highs = np.minimum.accumulate(np.concatenate((below, unbounded))[::-1], axis=0)[::-1]
         return lows, highs

@@ -8,7 +8,7 @@ import math
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.traffic.adoption import Adopted, fits
-from crgame_ros.traffic.agents import Agents, NOBODY
+from crgame_ros.traffic.agents import Agents, NONE
 from crgame_ros.traffic.conflicts import Conflicts, NARROW
 from crgame_ros.traffic.drivers import DesiredSpeeds
 from crgame_ros.traffic.encounters import is_in_the_way
@@ -78,7 +78,7 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
     long = 0.5 * (length + lengths * np.abs(np.cos(turn)) + widths * np.abs(np.sin(turn)))
     wide = 0.5 * (width + lengths * np.abs(np.sin(turn)) + widths * np.abs(np.cos(turn)))
     # An agent that changes lanes takes both.
-    wide += np.concatenate((np.where(agents.source[here] != NOBODY, LANE, 0.0),
+    wide += np.concatenate((np.where(agents.source[here] != NONE, LANE, 0.0),
                             np.zeros(len(others.length))))
     gap = 0.5 if close else START_GAP + START_TIME * np.maximum(speeds, speed)
     if not close:

@@ -11,7 +11,7 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.agents import Agents, centers_of, FREE, NOBODY
+from crgame_ros.traffic.agents import Agents, centers_of, FREE, NONE
 from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fading, note_leaders
@@ -258,7 +258,7 @@ class Traffic:
         """Make agents that change lanes also follow the leader in the lane that they leave."""
         agents, lanes = self._agents, self._graph.table
         source = agents.source[slots]
-        row = np.flatnonzero((source != NOBODY) & (source != agents.lane[slots]))
+        row = np.flatnonzero((source != NONE) & (source != agents.lane[slots]))
         if not len(row):
             return
         who, lane = slots[row], source[row]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.traffic.agents import AgentTable, NOBODY, write_centers
+from crgame_ros.traffic.agents import AgentTable, NONE, write_centers
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import FloatArray
 from crgame_ros.traffic.placement import Bodies, Entries, VEHICLE_TIME, WALKER_TIME
@@ -98,7 +98,7 @@ class Others:
         poses = shifted(world.poses[of], self._shift[piece])
         return Bodies(poses, world.velocities[of], self._accelerations(world)[of],
                       self._length[piece], self._width[piece], -1 - of, self._time[piece],
-                      np.full(len(of), NOBODY))
+                      np.full(len(of), NONE))
 
     def _accelerations(self, world: WorldView) -> FloatArray:
         """Return the accelerations (O) of the others along their headings, between two ticks."""
@@ -140,7 +140,7 @@ def with_agents(others: Bodies, agents: AgentTable) -> Bodies:
         result.acceleration[n], result.owner[n] = agents.acceleration[slot], slot
         result.length[n], result.width[n] = agents.length[slot], agents.width[slot]
         result.time[n] = 0.0
-        result.claim[n] = agents.lane[slot] if agents.source[slot] != NOBODY else NOBODY
+        result.claim[n] = agents.lane[slot] if agents.source[slot] != NONE else NONE
     return result
 
 

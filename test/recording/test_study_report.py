@@ -94,4 +94,4 @@ def test_before_the_first_session_there_is_a_report(studied: Studied, tmp_path: 
             (studied.folder / 'study' / name).read_bytes())
     assert main(['study', 'data', str(tmp_path / 'empty'), '--bids']) == 0
     html = report_of(tmp_path / 'empty')
-    assert 'Nobody has begun yet' in html and 'There are no values yet' in html
+    assert 'No participant has begun yet' in html and 'There are no values yet' in html

@@ -92,7 +92,7 @@ def input_section(run: ReportRun) -> Section | None:
             for i, item in vehicles]
     html = table('Inputs that the simulation consumed', (
         'vehicle', 'throttle on', 'brake on', 'hardest brake', 'in reverse', 'driven'), rows,
-        'numbers') if rows else note('Nobody gave any input: planners drove all the time.')
+        'numbers') if rows else note('There was no input: planners drove all the time.')
     if spans:
         html += table('Reverse gear, and AVs driven by hand', (
             'what', 'from [s]', 'to [s]'), [

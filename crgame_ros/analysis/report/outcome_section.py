@@ -48,7 +48,7 @@ def _violations(run: ReportRun) -> str:
         return note('Violations: the recording does not tell.')
     found = run.outcome['drivability']['list']
     if not found:
-        return note('Nobody left the road or broke a rule that was checked.')
+        return note('No vehicle left the road or broke a rule that was checked.')
     return table('Violations, when each began', ('vehicle', 'what', 'at [s]'), [
         (named(run, item['vehicle']), free(item['what']),
          NOTHING if item['n'] is None else moment(run, _time_s(run, item)))

@@ -19,7 +19,7 @@ import numpy as np
 
 REAR_AXLE = 'rear axle'
 AT_STEPS = 'at the scenario steps'
-NOBODY = 'it was never defined: no other was near'
+NEVER_NEAR = 'it was never defined: no other was near'
 HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
 # Keys of `timing.json`, with the meaning of each count.
 COUNTS = {
@@ -76,13 +76,13 @@ def _criticality(run: TableRun) -> Mapping[str, Sequence[Any]]:
 def _worst_columns() -> list[Column]:
     columns = []
     for name in MEASURES:
-        value = measure_column(name, 'worst_', NOBODY)
+        value = measure_column(name, 'worst_', NEVER_NEAR)
         columns += [
             value,
             Column(f'{value.name}_of', TEXT, '', f'id of the other one at the worst {name}',
-                   empty=NOBODY),
+                   empty=NEVER_NEAR),
             Column(f'{value.name}_time_s', NUMBER, 's', f'time of the worst {name}, since the '
-                   'start of the run', variant='the first such moment', empty=NOBODY)]
+                   'start of the run', variant='the first such moment', empty=NEVER_NEAR)]
     return columns
 
 

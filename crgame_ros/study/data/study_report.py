@@ -80,7 +80,7 @@ def _people(data: StudyData) -> str:
              f'{row["trials"]} of {row["trials_planned"]}', 'yes' if row['complete'] else 'no')
             for row in _rows(data, 'participants')]
     if not rows:
-        return note('Nobody has begun yet.')
+        return note('No participant has begun yet.')
     means = [(column.name, [row[column.name] for row in _rows(data, 'participants')
                             if row[column.name] is not None]) for column in fields]
     told = '; '.join(f'{plain(name)}: mean {number(sum(values) / len(values), 1)}, '

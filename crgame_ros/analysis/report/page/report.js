@@ -261,7 +261,7 @@
     }
   }
 
-  // What nobody looks at is not drawn.
+  // Hidden plots are not drawn.
   const observer = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       const node = /** @type {PlotNode} */ (entry.target);
