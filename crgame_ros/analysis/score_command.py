@@ -18,8 +18,8 @@ if TYPE_CHECKING:  # A command that needs no engine starts without it.
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 
 DESCRIPTION = """\
-Score who drove: CommonRoad's costs and checks, feasibility, nuPlan's closed-loop score, and what
-planners answered.
+Score the drivers of a run: CommonRoad's costs and checks, feasibility, nuPlan's closed-loop score,
+and the planners' answers.
 
   crgame score runs/NAME                                     each vehicle of a run
   crgame score runs/NAME --expert runs/HUMAN                 progress compared with a human's run
