@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Access control of the server: the token, the Host header and the Origin header."""
+"""Access to the server: token, Host and Origin header, and the addresses that lead to it."""
 
 from dataclasses import dataclass, replace
 import errno

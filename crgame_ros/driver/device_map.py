@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Device maps: which axes, buttons and keys of a device drive the vehicle."""
+"""Device maps: axes, buttons and keys that drive the vehicle, and limits of a wheel's motor."""
 
 from collections.abc import Set
 from dataclasses import dataclass

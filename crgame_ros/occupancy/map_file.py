@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The YAML file of a map_server map: image, position and meaning of grey values."""
+"""The YAML file of a map_server map (image, position, grey values), and what makes such a map."""
 
 from dataclasses import dataclass, field, fields
 import math

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reads games from files, or passes them through."""
+"""Reads games from files, and names the argument in refusals instead of the option."""
 
 from collections.abc import Iterator
 import contextlib

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The kinds of YAML files that users write, and the classes that declare them."""
+"""The kinds of YAML files that users write, the classes that declare them, and JSON Schemas."""
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass, MISSING

@@ -98,3 +98,67 @@ export function textOf(node) {
   }
   return [...node.childNodes].map(textOf).join(' ').replace(/\s+/g, ' ').trim();
 }
+
+/**
+ * Make further names of the open page's window global.
+ *
+ * @param {...string} names
+ */
+export function expose(...names) {
+  for (const name of names) {
+    Object.defineProperty(globalThis, name,
+      { value: globalThis.window[name], configurable: true, writable: true });
+  }
+}
+
+/** The page's clock and animation frames, which only a test moves. */
+export class Pictures {
+  now_ms = 1000;
+  #waiting = new Map();
+  #asked = 0;
+
+  constructor() {
+    performance.now = () => this.now_ms;
+    globalThis.requestAnimationFrame = (draw) => {
+      this.#asked += 1;
+      this.#waiting.set(this.#asked, draw);
+      return this.#asked;
+    };
+    globalThis.cancelAnimationFrame = (number) => this.#waiting.delete(number);
+  }
+
+  /** Return how many functions wait for the next frame. */
+  get waiting() {
+    return this.#waiting.size;
+  }
+
+  /**
+   * Move the clock on, and draw one frame.
+   *
+   * @param {number} [by_ms]
+   */
+  draw(by_ms = 20) {
+    this.now_ms += by_ms;
+    const waiting = [...this.#waiting.values()];
+    this.#waiting.clear();
+    waiting.forEach((draw) => draw(this.now_ms));
+  }
+}
+
+/**
+ * Send an event as a browser does.
+ *
+ * @param {EventTarget} target
+ * @param {string} type
+ * @param {object} [values] of the event, such as `key` or `timeStamp`
+ * @returns {Event} the event, for `defaultPrevented`
+ */
+export function send(target, type, values = {}) {
+  const { Event } = globalThis.window;
+  const event = new Event(type, { bubbles: true, cancelable: true });
+  for (const [name, value] of Object.entries(values)) {
+    Object.defineProperty(event, name, { value, configurable: true });
+  }
+  target.dispatchEvent(event);
+  return event;
+}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scores only the drives of a run: nuPlan's score and plans, without CommonRoad's checker."""
+"""Scores of a run's drives by nuPlan, and the expert: without CommonRoad's checker."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
