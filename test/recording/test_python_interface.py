@@ -210,7 +210,7 @@ def test_a_notebook_shows_it(run: OfflineRun) -> None:
     ({'planner': ['idm', 'idm']}, 'planner: 2 planners for 1 AVs'),
     ({'planner': 'external'}, 'live runs only'),
     ({'planner': Failing, 'options': {'speed': 1}}, '"speed" is unknown'),
-    ({'planner': Failing(), 'options': {'speed': 1}}, 'takes no options'),
+    ({'planner': Failing(), 'options': {'speed': 1}}, 'cannot have options'),
     ({'seed': -1}, 'seed: is -1'), ({'duration_s': -1.0}, 'duration: is -1.0 s'),
     ({'rate_hz': 0.0}, 'rate_hz: '), ({'latency_steps': -1}, 'latency: is -1'),
     ({'driver': 'cockpit'}, 'needs a person'), ({'triggers': {'x': 0.0}}, 'no event "x"'),

@@ -126,7 +126,7 @@ BAD = [
     (spoilt(too_fast), 'speed of .* beyond the limit'),
     (spoilt(too_tight), 'lateral acceleration of 80.00'),
     (backwards_in_time, 'time_from_start is off the grid'), (wrong_stamp, 'answers no request'),
-    (wrong_names, 'joint_names are av1/x'), (one_state, '1 state is no plan')]
+    (wrong_names, 'joint_names are av1/x'), (one_state, 'the plan has 1 state')]
 
 
 @pytest.mark.parametrize(('make', 'reason'), BAD, ids=[reason for _, reason in BAD])
