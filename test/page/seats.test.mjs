@@ -26,7 +26,8 @@ beforeEach(() => {
 
 const show = (hv0, av0 = PLANNED) => store.receive({ type: 'seats', seats: { hv0, av0 } });
 const row = (id) => root.querySelector(`[data-seat="${id}"]`);
-const buttons = (id) => [...row(id).querySelectorAll('button')].map((button) => button.textContent);
+const buttons = (id) => [...row(id).querySelectorAll('button')].map(
+  (button) => button.textContent);
 const press = (id, text) => click([...row(id).querySelectorAll('button')].find(
   (button) => button.textContent === text));
 const news = () => root.querySelector('.drive-news').textContent;
@@ -39,7 +40,7 @@ test('a free seat can be driven, and an AV taken over', async () => {
   assert.deepEqual(driving.claimed, ['hv0', 'av0']);
 });
 
-test('the holder gives the seat back, or hands it over to a person who has to accept', async () => {
+test('the holder gives the seat back, or hands it over to a person who accepts', async () => {
   show({ ...FREE, holder: 'c1', requests: [{ client: 'c2', name: 'Bob' }] });
   assert.deepEqual(buttons('hv0'), ['Hand over to Bob', 'Give back']);
   assert.ok(row('hv0').hasAttribute('data-mine'));
