@@ -169,12 +169,18 @@ class RunList {
       + 'MB: recording, scenario and reports. They cannot be brought back.', 'Delete')) {
       return;
     }
+    let refusal = '';
     try {
       await api.deleteRun(run.id);
     } catch (error) {
-      setText(this.#error, errorText(error));
+      refusal = errorText(error);
+      setText(this.#error, refusal);
     }
     await this.refresh();
+    if (refusal) {
+      // A new list wipes out what was told before.
+      setText(this.#error, refusal);
+    }
   }
 }
 

@@ -29,7 +29,8 @@ export class ScenarioList {
   #list = element('div', { class: 'scenario-list', role: 'radiogroup', 'aria-label': 'Scenario' });
   #nothing = element('p', { class: 'hint', hidden: true });
   #filter;
-  /** @type {Map<string, {entry: Entry, button: HTMLButtonElement, words: string}>} */
+  /** @type {Map<string, {entry: Entry, button: HTMLButtonElement, item: HTMLElement,
+   *   words: string}>} */
   #entries = new Map();
 
   /**
@@ -91,24 +92,25 @@ export class ScenarioList {
       on: { click: () => this.#chosen(entry) },
     }, icon('check'),
     element('span', { class: 'scenario-title', text: title }));
-    this.#entries.set(entry.id, {
-      entry, button, words: `${title} ${entry.name} ${KINDS[entry.kind]}`.toLowerCase(),
-    });
-    return entry.kind !== 'upload' ? button : element('div', { class: 'upload' }, button,
+    const item = entry.kind !== 'upload' ? button : element('div', { class: 'upload' }, button,
       element('button', { type: 'button', class: 'icon-button', title: 'Delete this upload',
         'aria-label': `Delete ${title}`, 'data-action': 'delete', 'data-id': entry.id,
         on: { click: () => this.#unwanted(entry) } }, icon('bin')));
+    this.#entries.set(entry.id, {
+      entry, button, item, words: `${title} ${entry.name} ${KINDS[entry.kind]}`.toLowerCase(),
+    });
+    return item;
   }
 
   #sift() {
     const wanted = this.#filter.value.toLowerCase().split(/\s+/).filter(Boolean);
     let found = 0;
-    for (const { button, words } of this.#entries.values()) {
-      button.hidden = !wanted.every((word) => words.includes(word));
-      found += button.hidden ? 0 : 1;
+    for (const { item, words } of this.#entries.values()) {
+      item.hidden = !wanted.every((word) => words.includes(word));
+      found += item.hidden ? 0 : 1;
     }
     for (const folder of /** @type {Iterable<HTMLElement>} */ (this.#list.children)) {
-      folder.hidden = !folder.querySelector('button:not([hidden])');
+      folder.hidden = !folder.querySelector(':scope > :is(button, div):not([hidden])');
     }
     this.#nothing.hidden = found > 0;
     this.#nothing.textContent = this.#entries.size === 0

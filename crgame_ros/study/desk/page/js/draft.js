@@ -59,7 +59,11 @@ export class Draft {
   }
 
   #write() {
-    sessionStorage.setItem(this.#key, JSON.stringify(this.#state));
+    try {
+      sessionStorage.setItem(this.#key, JSON.stringify(this.#state));
+    } catch {
+      // A full or forbidden storage: a reload then asks again.
+    }
   }
 }
 

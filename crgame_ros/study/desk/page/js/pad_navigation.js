@@ -76,7 +76,7 @@ export class PadNavigation {
     } else if (stop.matches('button')) {
       enter(stops[at + (order === 'next' ? 1 : -1)]);
     } else {
-      change(stop, focused, order === 'next' ? 1 : -1);
+      change(stop, focused, order === 'next' ? 1 : -1, stops[at + 1]);
     }
   }
 }
@@ -113,8 +113,9 @@ function confirm(stop, focused, following) {
  * @param {Element} stop
  * @param {Element|null} focused
  * @param {1|-1} by
+ * @param {Element|undefined} following
  */
-function change(stop, focused, by) {
+function change(stop, focused, by, following) {
   const inputs = [...stop.querySelectorAll('input')];
   if (!(focused instanceof HTMLInputElement)) {
     return;
@@ -126,6 +127,11 @@ function change(stop, focused, by) {
   }
   const chosen = stop.querySelector('input:checked') !== null;
   const place = inputs.indexOf(focused);
+  if (focused.type === 'checkbox' && by > 0 && place === inputs.length - 1) {
+    // A wheel has no other way on: confirming checks the box.
+    enter(following);
+    return;
+  }
   const next = inputs[focused.type === 'radio' && !chosen ? place
     : Math.min(Math.max(place + by, 0), inputs.length - 1)];
   next.focus();
