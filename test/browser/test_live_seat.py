@@ -184,7 +184,7 @@ def test_a_mere_driver_gets_the_reason_of_a_refusal(page: LivePage) -> None:
     page.click('#outcome [data-action=stop]')
     page.click('dialog.confirm[open] .danger')
     page.wait('document.querySelector(".score[data-state=told]")', 'the score')
-    assert 'Somebody stopped it' in page.text('#outcome')
+    assert 'It was stopped by hand' in page.text('#outcome')
     page.run_async("await crgame.connection.request({type: 'role', role: 'drive'});")
     page.wait_for_text('.outcome-gone', 'Only a director can choose what is run')
     assert page.run("""return [...document.querySelectorAll('#outcome button:disabled')].map(

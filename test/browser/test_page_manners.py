@@ -146,6 +146,7 @@ def test_fingers_drive(page: Browser) -> None:
         page.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': []})
 
 
+@pytest.mark.exhaustive
 def test_the_sign_shows_the_limit_that_an_event_has_set(server: Served, page: Browser) -> None:
     page.wait('document.querySelector(".hud-limit[data-on]")?.textContent > 0')
     usual = page.run('return document.querySelector(".hud-limit").textContent')
@@ -157,6 +158,7 @@ def test_the_sign_shows_the_limit_that_an_event_has_set(server: Served, page: Br
               arguments=(usual,))
 
 
+@pytest.mark.exhaustive
 def test_only_own_alarms_frame_the_screen_until_acknowledged(
         server: Served, page: Browser) -> None:
     """An own alarm frames the screen until acknowledged; an AV's is a word in the header."""
@@ -301,6 +303,7 @@ def test_the_last_seconds_are_shown_again_and_slower(
     assert page.run('crgame.lastSeconds.open(); return crgame.lastSeconds.isOpen') is False
 
 
+@pytest.mark.exhaustive
 def test_r_held_begins_anew_and_tapped_does_not(server: Served, page: Browser) -> None:
     epoch = page.run('return crgame.store.epoch')
     press = "window.dispatchEvent(new KeyboardEvent(arguments[0], { code: 'KeyR' }));"

@@ -143,6 +143,7 @@ def test_states_between_the_ticks(page: Browser, first_run: OfflineResult) -> No
                                rtol=0, atol=1e-9)
 
 
+@pytest.mark.exhaustive
 def test_steps_land_on_ticks(page: Browser, log: RunTrajectories) -> None:
     """Keys and buttons step from tick to tick, also back, across the border of two chunks."""
     seek(page, 4.837)
@@ -215,6 +216,7 @@ def test_it_plays_at_its_speed_and_pauses(page: Browser) -> None:
     assert page.run('return crgame.replay.chunksHeld') <= 12
 
 
+@pytest.mark.exhaustive
 def test_events_are_jumped_to(page: Browser) -> None:
     """Bracket keys go from mark to mark in both directions and name the event."""
     marks = page.run('return [...document.querySelectorAll(".mark")].map((m) => '

@@ -244,6 +244,14 @@ test('a held run is ended after a question', async () => {
   }
 });
 
+test('the result of a run that ended while it was held is closed by the first click', async () => {
+  await hold();
+  status({ run: 'ended', reason: 'stop' });
+  assert.equal(phase(), 'over');
+  await click(button('close'));
+  assert.equal(phase(), 'closed');
+});
+
 test('a mere driver gets the reason of each refusal, and nothing is asked', async () => {
   const reason = (deed) => `Only a director can ${deed} the run; you are a driver.`;
   be(RIGHTS.drive);

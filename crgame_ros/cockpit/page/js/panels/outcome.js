@@ -72,7 +72,7 @@ class Outcome {
       this.#held = false;
     });
     store.on('status', ({ run }) => {
-      this.#held &&= run !== 'running';
+      this.#held &&= run !== 'running' && run !== 'ended';
     });
     store.on('events', ({ fired }) => {
       // Back on the lane: the notice of the contact is no longer needed.
