@@ -354,7 +354,8 @@ def test_command_serves_until_it_is_told_to_stop(bag: Path, tmp_path: Path,
          '--port', '18466'], stdout=subprocess.PIPE, text=True, env=os.environ)
     try:
         assert process.stdout is not None
-        address = next(word for word in process.stdout.readline().split()
+        # On a busy machine its progress comes first.
+        address = next(word for line in process.stdout for word in line.split()
                        if word.startswith('http://'))
         with urlopen(f'{address}api/replay/info', timeout=30) as answer:
             assert json.load(answer)['chunks'] == 3
