@@ -57,6 +57,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=left_out)
     items[:] = sorted(kept, key=lambda item: not _starts_graphs(item))
     for item in items:
+        if _starts_graphs(item):
+            item.add_marker(pytest.mark.graph)
         if item.get_closest_marker('xdist_group') is None:
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition('::')[0]))
 
