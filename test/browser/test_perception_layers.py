@@ -143,7 +143,7 @@ def test_frames_are_read_as_they_were_written(page: Served, browser: Browser) ->
     occupied = np.random.default_rng(0).random((13, 7)) < 0.5
     legend = '.world-legend [data-layer="unseen"]'
     said = f"return document.querySelector('{legend}').textContent"
-    browser.wait(f'(() => {{ {said} }})() === "whom av0 sees is not known now"')
+    browser.wait(f'(() => {{ {said} }})() === "what av0 sees is not known now"')
     send(page, 'scan:1:2', scan(2, ranges))
     send(page, 'seen:1', encode_seen(0, 0, 0, 0.0, 1, [0, 1, 4]))
     send(page, 'occupancy', encode_occupancy(0, 0, 0, 0.0, (-3.0, 8.5), 0.25, occupied))
