@@ -319,7 +319,7 @@ def test_a_lost_graphics_context_is_survived(page: Browser) -> None:
         window.loss = context.getExtension('WEBGL_lose_context');
         window.loss.loseContext();""")
     page.wait("""[...document.querySelectorAll('#notices *')].some(
-        (node) => node.textContent.includes('took the 3D view back'))""")
+        (node) => node.textContent.includes('has lost the graphics card'))""")
     frames = page.run('return crgame.view3d.stats.frames')
     page.run('window.loss.restoreContext()')
     page.wait('!crgame.view3d.picture.lost && crgame.view3d.stats.frames > arguments[0] + 3',
