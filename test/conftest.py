@@ -50,21 +50,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     tier = config.getoption('--tier')
     kept, left_out, seen = [], [], set[str]()
     for item in items:
+        if item.path.relative_to(ROOT / 'test').parts[0] in GRAPH_FOLDERS:
+            item.add_marker(pytest.mark.graph)
         case_of = item.nodeid.partition('[')[0]
         (kept if _is_in(item, tier, case_of in seen) else left_out).append(item)
         seen.add(case_of)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
-    items[:] = sorted(kept, key=lambda item: not _starts_graphs(item))
+    items[:] = sorted(kept, key=lambda item: item.get_closest_marker('graph') is None)
     for item in items:
-        if _starts_graphs(item):
-            item.add_marker(pytest.mark.graph)
         if item.get_closest_marker('xdist_group') is None:
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition('::')[0]))
-
-
-def _starts_graphs(item: pytest.Item) -> bool:
-    return item.path.relative_to(ROOT / 'test').parts[0] in GRAPH_FOLDERS
 
 
 def _is_in(item: pytest.Item, tier: str, is_further_case: bool) -> bool:
@@ -73,7 +69,7 @@ def _is_in(item: pytest.Item, tier: str, is_further_case: bool) -> bool:
     marked = {mark.name for mark in item.iter_markers()}
     if {'exhaustive', 'clock'} & marked or ('matrix' in marked and is_further_case):
         return False
-    return tier == 'default' or not (_starts_graphs(item) or 'slow' in marked)
+    return tier == 'default' or not {'graph', 'slow'} & marked
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
