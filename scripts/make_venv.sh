@@ -67,9 +67,9 @@ install -r "$venv/requirements.txt" ||
     fail 'the packages are not installed: see above; check network, disk and the settings of pip'
 # 45 MB that are never used: ROS headers, as nothing is compiled against them, and tests of packages.
 rm -rf "$venv/include"
-for package in "$venv"/lib/python*/site-packages/{numba,networkx,numpy,pyarrow,scipy}; do
-    find "$package" -type d -name tests -prune -exec rm -rf {} +
-done
+find "$venv"/lib/python*/site-packages -type d \
+    -regex '.*/site-packages/\(numba\|networkx\|numpy\|pyarrow\|scipy\)/\(.*/\)?tests' \
+    -prune -exec rm -rf {} +
 # 70 MB that wheels contain several times, since they cannot hold links.
 hardlink --content --quiet --minimum-size 64KiB "$venv" 2>/dev/null || true
 ln -sf ../../crgame "$venv/bin/crgame"
