@@ -55,11 +55,18 @@ class RunList {
     }
   }
 
-  /** Fetch the list of runs from the server. */
-  async refresh() {
+  /**
+   * Fetch the list of runs from the server.
+   *
+   * @param {string} [refusal] of an order, to be told meanwhile and with the new list
+   */
+  async refresh(refusal = '') {
+    if (refusal) {
+      setText(this.#error, refusal);
+    }
     try {
       const runs = await api.fetchRuns();
-      setText(this.#error, '');
+      setText(this.#error, refusal);
       this.#show(runs);
     } catch (error) {
       setText(this.#error, errorText(error));
@@ -174,13 +181,8 @@ class RunList {
       await api.deleteRun(run.id);
     } catch (error) {
       refusal = errorText(error);
-      setText(this.#error, refusal);
     }
-    await this.refresh();
-    if (refusal) {
-      // A new list wipes out what was told before.
-      setText(this.#error, refusal);
-    }
+    await this.refresh(refusal);
   }
 }
 
