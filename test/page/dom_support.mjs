@@ -21,12 +21,7 @@ const GLOBALS = ['document', 'localStorage', 'navigator', 'location', 'CSS', 'Mu
 export function openPage(html = '') {
   const window = new Window({ url: 'http://127.0.0.1:8080/' });
   globalThis.window = window;
-  for (const name of GLOBALS) {
-    Object.defineProperty(globalThis, name, {
-      value: typeof window[name] === 'function' && name === 'getComputedStyle'
-        ? window[name].bind(window) : window[name],
-      configurable: true, writable: true });
-  }
+  expose(...GLOBALS);
   document.write(`<!DOCTYPE html><html><body>${html}</body></html>`);
   return document.body;
 }
@@ -65,7 +60,7 @@ export function liveStore(vehicles, more = {}) {
   return store;
 }
 
-/** Rights of somebody who only watches, or drives, for `you` messages. */
+/** Rights of a spectator and of a driver, for `you` messages. */
 export const RIGHTS = {
   watch: { role: 'spectator', directs: false, drives: false, seat: '', may_direct: false,
     may_drive: false },
