@@ -138,7 +138,7 @@ def test_every_plan_is_accepted(cut_in: Path) -> None:
 def test_no_request_is_late(cut_in: Path) -> None:
     """A free machine answers nearly every tick in time."""
     plans = json.loads((cut_in / 'timing.json').read_text())['planners']['av0']
-    assert plans['accepted'] >= 0.9 * TICKS
+    assert plans['accepted'] >= plans['requests'] - 1 >= 0.9 * TICKS
     assert plans['timed_out'] == plans['steps_without_plan'] == 0
 
 
@@ -153,8 +153,8 @@ def test_plans_answer_requests(cut_in: Path) -> None:
             times = [point.time_from_start.sec * 1_000_000_000 + point.time_from_start.nanosec
                      for point in item.message.points]
             assert times == [100_000_000 * i for i in range(31)]
-    # All but perhaps the last one; fewer than ticks on a busy machine.
-    assert len(set(stamps['plan'])) >= len(set(stamps['request'])) - 1 > 0
+    # On a busy machine a planner may take longer than a tick: it is then asked less often.
+    assert len(set(stamps['plan'])) >= 0.9 * len(set(stamps['request'])) > 0.3 * TICKS
     assert set(stamps['plan']) <= set(stamps['request'])
     # This holds however late recorder and planner are matched.
     assert min(stamps['plan']) == min(stamps['request'])
