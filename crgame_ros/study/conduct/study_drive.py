@@ -35,7 +35,7 @@ def cut_short(reason: str) -> str:
     """
     if reason == TIME or reason.startswith(DRIVABILITY):
         return ''
-    return _CUT_SHORT.get(reason, f'the run ended: {reason or "for an unknown reason"}')
+    return _CUT_SHORT.get(reason, f'the run ended: {reason or "the reason is unknown"}')
 
 
 def outcome_of(status: RunStatus, seat: str, end_time_s: float) -> dict[str, Any]:
