@@ -8,6 +8,7 @@ import hashlib
 import hmac
 import json
 import math
+import secrets
 from types import MappingProxyType
 from typing import Any
 
@@ -44,6 +45,8 @@ class Hub:
     def __init__(self, mode: str, framed_by: str = '') -> None:
         self._mode = mode
         self._framed_by = framed_by
+        # Epochs of another program begin at 0 again.
+        self._program = secrets.token_hex(8)
         self._clients: dict[str, Client] = {}
         self._documents: dict[str, bytes] = {}
         self._frames: dict[str, _Frame] = {}
@@ -167,7 +170,8 @@ class Hub:
         client.address, client.heard_s = address, now_s
         client.put_event(_encode('hello', {
             'client': client.id, 'name': client.name, 'mode': self._mode,
-            'version': __version__, 'rights': _rights(client), 'framed_by': self._framed_by}))
+            'version': __version__, 'program': self._program, 'rights': _rights(client),
+            'framed_by': self._framed_by}))
         for kind, text in self._documents.items():
             client.put_document(kind, text)
         for slot, frame in self._frames.items():

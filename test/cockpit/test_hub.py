@@ -62,13 +62,16 @@ async def test_a_new_client_gets_hello_then_documents_and_the_newest_frames() ->
     hub.send_frame('state', b'old')
     hub.send_frame('state', b'new')
     sink = await received(add(hub))
+    program = sink.texts[0]['program']
     assert sink.texts == [
         {'type': 'hello', 'client': 'c1', 'name': 'Guest 1', 'mode': 'live',
-         'version': __version__, 'rights': {
+         'version': __version__, 'program': program, 'rights': {
              'role': 'director and driver', 'directs': True, 'drives': True, 'seat': '',
              'may_direct': True, 'may_drive': True}, 'framed_by': ''},
         {'type': 'scene', 'id': 2}, {'type': 'seats', 'seats': {}}]
     assert sink.frames == [b'new']
+    assert (await received(add(hub))).texts[0]['program'] == program
+    assert (await received(add(Hub('live')))).texts[0]['program'] != program
 
 
 @in_loop

@@ -203,6 +203,11 @@ test('an unknown kind is urgent and named as it is, and foreign texts stay text'
   assert.deepEqual(framed(), ['tyre_burst', 'urgent']);
 });
 
+test('a kind that names a member of all objects is a kind like others', () => {
+  show(alarm('constructor', 'av0', { text: '' }));
+  assert.equal(textOf(root), 'constructor av0');
+});
+
 test('the newest text of an alarm replaces the former one', () => {
   show(alarm('stale_plan', 'av0', { text: 'for 0.5 s' }));
   show(alarm('stale_plan', 'av0', { text: 'for 0.9 s' }));

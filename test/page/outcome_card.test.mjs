@@ -252,6 +252,20 @@ test('a closed card can be opened again, and the next run has its own', async ()
   assert.equal(phase(), 'over');
 });
 
+test('another program begins with the same epoch, and its card is open', async () => {
+  const hello = (program) => store.receive({ type: 'hello', client: 'c7', name: 'Ada',
+    mode: 'live', version: '1', rights: store.rights, program });
+  hello('first');
+  end('duration');
+  files({ epoch: 0 });
+  await click(button('close'));
+  hello('first');
+  assert.equal(phase(), 'closed', 'the same one, connected again');
+  hello('second');
+  assert.equal(phase(), 'over');
+  assert.deepEqual(links(), [], 'files of the first one');
+});
+
 test('when the program has ended the card stays and says so', () => {
   status({ run: 'ended', reason: 'duration' });
   store.setConnected(false);

@@ -157,6 +157,19 @@ test('a refusal of the server is a notice', async () => {
   assert.deepEqual(notices, [['warn', 'you are a spectator']]);
 });
 
+test('a role that was refused is not asked for again by the next connection', async () => {
+  server.reply = { ok: false, text: 'you are a spectator' };
+  await choose('direct');
+  server.take();
+  hello();
+  assert.deepEqual(server.take(), []);
+  server.reply = { ok: true, text: '' };
+  await choose('watch');
+  server.take();
+  hello();
+  assert.deepEqual(server.take(), [{ type: 'role', role: 'watch' }]);
+});
+
 test('a recording has no people, and its page asks for no role', async () => {
   await choose('drive');
   server.take();

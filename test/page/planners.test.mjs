@@ -99,6 +99,8 @@ test('the switch waits for the answer, and a refusal is said in the row', async 
   };
   await click(button('av0'));
   assert.ok(button('av0').disabled);
+  show(GOOD, GOOD);
+  assert.ok(button('av0').disabled, 'a status comes before the answer');
   await click(button('av0'));
   assert.equal(server.take().length, 1);
   answer({ ok: false, text: 'av0 is driven\nby <b>Bob</b>' });

@@ -172,6 +172,7 @@ test('a free button of a gamepad answers once for each press', async () => {
   const axis = { kind: 'axis', index: 0 };
   globalThis.window.crgame.driving.gamepads.devices = [{ index: 0, profile: { throttle: axis,
     brake: axis, steering: axis, reverse: { on: [], off: [], toggle: [], held: [] },
+    put_back: [],
     lights: { left_indicator: [1], right_indicator: [], hazard: [], horn: [] } } }];
   await shine();
   sent();

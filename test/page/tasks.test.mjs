@@ -64,15 +64,16 @@ test('pauses count neither for the light nor for the response', () => {
     { delay_ms: 40, picture_ms: 16, response_ms: 300, paused_ms: 50_000 });
 });
 
-test('all buttons answer but those that steer, shift or blink', () => {
+test('all buttons answer but those that steer, shift, blink or put back', () => {
   /** @type {(index: number) => object} */
   const axis = (index) => ({ kind: 'axis', index, min: 0, max: 1, deadzone: 0 });
   /** @type {any} */
   const profile = { throttle: { ...axis(7), kind: 'button' }, brake: axis(2),
     steering: axis(0), reverse: { on: [3], off: [], toggle: [], held: [4] },
-    lights: { left_indicator: [5], right_indicator: [6], hazard: [], horn: [0] } };
+    lights: { left_indicator: [5], right_indicator: [6], hazard: [], horn: [0] },
+    put_back: [8] };
   assert.deepEqual(Array.from({ length: 10 }, (_, i) => i).filter((i) => !isTaken(profile, i)),
-    [1, 2, 8, 9]);
+    [1, 2, 9]);
 });
 
 test('the language is that of the address, else of the game, else English', () => {

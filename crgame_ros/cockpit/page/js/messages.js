@@ -306,7 +306,7 @@ export {};
  * Messages from the server to the store.
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
- *   version: string, rights: Rights, framed_by?: string}} HelloMessage
+ *   version: string, program?: string, rights: Rights, framed_by?: string}} HelloMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage

@@ -32,6 +32,8 @@ class People {
   this.#whom, element('button', { type: 'submit', class: 'drive-button', text: 'Make a link',
     title: 'A link that lets one browser in' }), this.#link, this.#error);
   #shown = '';
+  // A role that this page may not have is asked for once.
+  #refused = '';
 
   /**
    * @param {HTMLElement} root
@@ -90,7 +92,7 @@ class People {
       input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms from hand to answer`,
     ].filter(Boolean).join(', ');
     return element('li', { 'data-client': client },
-      element('strong', { text: `${name}${me}` }),
+      element('strong', { text: `${oneLine(name)}${me}` }),
       element('span', { text: seat === null ? role : `${role} in ${seat}` }),
       element('span', { class: 'drive-note', text: delays }));
   }
@@ -106,7 +108,7 @@ class People {
   #chooseAgain() {
     const role = sessionStorage.getItem(ROLE)
       ?? new URLSearchParams(window.location.search).get('role');
-    if (this.#store.me.id !== '' && this.#store.mode === 'live'
+    if (this.#store.me.id !== '' && this.#store.mode === 'live' && role !== this.#refused
         && ROLES.some(([known]) => known === role)) {
       this.#take(/** @type {string} */ (role));
     }
@@ -116,6 +118,7 @@ class People {
   async #take(role) {
     const { ok, text } = await this.#connection.request({ type: 'role', role });
     if (!ok) {
+      this.#refused = role;
       this.#store.receive({ type: 'notice', level: 'warn', text });
     }
   }

@@ -2,17 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Texts that say what drives a seat. */
 
+import { oneLine } from '../panels/format.js';
+
 /** @import { Seat } from '../messages.js' */
 
-/** @type {Record<string, (rest: string) => string>} */
-const GAME_DRIVERS = {
-  auto: () => 'Driven by a device on the simulation machine, if one is there',
-  evdev: (name) => (name ? `Driven by the device ${name}` : 'Driven by a device'),
-  idle: () => 'Not driven',
-  joy: (file) => (file ? `Driven by the script ${file}` : 'Driven by a ROS joy node'),
-  keys: (file) => `Driven by the script ${file}`,
-  replay: (bag) => `Replays the recording ${bag}`,
-};
+const GAME_DRIVERS = new Map(/** @type {[kind: string, text: (rest: string) => string][]} */ ([
+  ['auto', () => 'Driven by a device on the simulation machine, if one is there'],
+  ['evdev', (name) => (name ? `Driven by the device ${name}` : 'Driven by a device')],
+  ['idle', () => 'Not driven'],
+  ['joy', (file) => (file ? `Driven by the script ${file}` : 'Driven by a ROS joy node')],
+  ['keys', (file) => `Driven by the script ${file}`],
+  ['policy', (file) => `Driven by the policy ${file}`],
+  ['replay', (bag) => `Replays the recording ${bag}`],
+]));
 
 /**
  * Return a text that says what drives a seat.
@@ -26,10 +28,10 @@ const GAME_DRIVERS = {
 export function describeSeat(seat, role, planner, me) {
   if (seat.holder !== null) {
     return seat.holder === me && me !== '' ? 'You drive'
-      : `Driven by ${seat.holder_name || seat.holder} in a cockpit`;
+      : `Driven by ${oneLine(seat.holder_name || seat.holder)} in a cockpit`;
   }
   if (seat.source === 'cockpit' && seat.kept) {
-    return `Kept for ${seat.kept.name || 'its driver'} for ${seat.kept.for_s} s`;
+    return `Kept for ${oneLine(seat.kept.name) || 'its driver'} for ${seat.kept.for_s} s`;
   }
   if (seat.source === 'cockpit') {
     return seat.driver === 'cockpit' ? 'Waits for a driver in a cockpit'
@@ -45,5 +47,5 @@ export function describeSeat(seat, role, planner, me) {
     return planner ? `Driven by the planner ${planner}` : 'Driven by its planner';
   }
   const [kind, ...rest] = (seat.driver ?? '').split(':');
-  return GAME_DRIVERS[kind]?.(rest.join(':')) ?? 'Driven as the game says';
+  return GAME_DRIVERS.get(kind)?.(rest.join(':')) ?? 'Driven as the game says';
 }

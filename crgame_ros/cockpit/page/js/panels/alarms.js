@@ -10,17 +10,17 @@ import { icon } from './icons.js';
 /** @import { Store } from '../store.js' */
 
 // kind: [word for the header, urgent]. Urgent ones frame the whole world, others mark its top.
-/** @type {Record<string, [word: string, urgent: boolean]|undefined>} */
-const KINDS = {
-  collision: ['Collision', true],
-  off_road: ['Off road', true],
-  lost_device: ['Input lost', true],
-  connection: ['No connection', true],
-  stale_plan: ['Plan stale', false],
-  recording: ['Recording failed', false],
-  late: ['Running late', false],
-  late_traffic: ['Traffic late', false],
-};
+/** @type {Map<string, [word: string, urgent: boolean]>} */
+const KINDS = new Map([
+  ['collision', ['Collision', true]],
+  ['off_road', ['Off road', true]],
+  ['lost_device', ['Input lost', true]],
+  ['connection', ['No connection', true]],
+  ['stale_plan', ['Plan stale', false]],
+  ['recording', ['Recording failed', false]],
+  ['late', ['Running late', false]],
+  ['late_traffic', ['Traffic late', false]],
+]);
 // In a pause, nothing is late.
 const WHILE_RUNNING = ['late', 'late_traffic'];
 // How long an alarm stays visible after it has ended [ms].
@@ -151,7 +151,7 @@ function makeChip(alarm) {
  * @param {Scene|null} scene
  */
 function describe(entry, scene) {
-  const [word, urgent] = KINDS[entry.kind] ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
+  const [word, urgent] = KINDS.get(entry.kind) ?? [oneLine(entry.kind).replaceAll('_', ' '), true];
   entry.urgent = urgent;
   entry.chip.className = `alarm ${urgent ? 'urgent' : 'minor'}${entry.ended ? ' ended' : ''}`
     + `${entry.known ? ' known' : ''}`;

@@ -12,9 +12,8 @@ import { icon } from './icons.js';
 /** @import { FiredEvent, GameEvent } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 
-/** @type {Record<string, string>} */
-const BY = { trigger: 'by button', condition: 'by its condition', driver: 'by its driver',
-  contact: 'stopped by it' };
+const BY = new Map([['trigger', 'by button'], ['condition', 'by its condition'],
+  ['driver', 'by its driver'], ['contact', 'stopped by it']]);
 
 /**
  * Make the panel.
@@ -45,7 +44,7 @@ export function createEvents(root, store, connection) {
     log.replaceChildren(...[...store.fired].reverse().map((entry) => element('li', {},
       element('span', { class: 'time', text: clockTime(timeOf(entry, store)) }),
       element('span', { text: cards.get(entry.name)?.label ?? entry.name }),
-      element('span', { class: 'dim', text: BY[entry.by] ?? entry.by }))));
+      element('span', { class: 'dim', text: BY.get(entry.by) ?? entry.by }))));
   };
   const rebuild = () => {
     asked.clear();
@@ -140,7 +139,7 @@ function makeCard(event, press) {
         button.replaceChildren(icon(fired ? 'check' : 'bolt'), text);
       }
       setText(state, fired
-        ? `${clockTime(timeOf(fired, store))}, ${BY[fired.by] ?? fired.by}` : '');
+        ? `${clockTime(timeOf(fired, store))}, ${BY.get(fired.by) ?? fired.by}` : '');
     },
   };
 }

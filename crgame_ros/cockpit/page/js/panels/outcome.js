@@ -48,6 +48,7 @@ class Outcome {
   #result;
   #shown = '';
   #closedEpoch = -1;
+  #program = '';
   // Whether the run is held for inspection; mishaps of this run that have been shown.
   #held = false;
   #told = 0;
@@ -63,6 +64,13 @@ class Outcome {
     this.#store = store;
     this.#connection = connection;
     this.#result = new RunResult(store, () => this.#show());
+    store.on('hello', ({ program = '' }) => {
+      if (program !== this.#program) {
+        this.#program = program;
+        this.#closedEpoch = -1;
+        this.#result.clearFiles();
+      }
+    });
     for (const name of /** @type {const} */ (
       ['hello', 'you', 'scene', 'seats', 'status', 'connection'])) {
       store.on(name, () => this.#show());

@@ -98,14 +98,16 @@ function makeRow(av, connection) {
   const tracking = element('p', { class: 'dim tracking', title: TRACKING_TITLE });
   const seen = element('p', { class: 'dim seen' });
   const cells = COLUMNS.map(() => element('td', {}));
-  const wanted = { run: true };
+  const wanted = { run: true, waits: false };
   const button = element('button', {
     type: 'button', class: 'planner-switch',
     on: {
       click: async () => {
+        wanted.waits = true;
         button.disabled = true;
         const reply = await connection.request({ type: 'planner', av, run: wanted.run });
         setText(error, reply.ok ? '' : oneLine(reply.text));
+        wanted.waits = false;
         button.disabled = false;
       },
     },
@@ -135,7 +137,7 @@ function makeRow(av, connection) {
         button.setAttribute('aria-label', label);
       }
       setAttribute(button, 'hidden', store.mode === 'replay');
-      setAttribute(button, 'disabled', !store.rights.directs);
+      setAttribute(button, 'disabled', wanted.waits || !store.rights.directs);
       button.title = reasonAgainst(store, 'direct', 'stop planners') || label;
       cells.forEach((cell, at) => setText(cell, COLUMNS[at][2](planner)));
       setAttribute(cells[1], 'data-late', Boolean(planner.stale) && !stopped);

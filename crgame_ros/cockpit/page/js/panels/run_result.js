@@ -39,6 +39,11 @@ export class RunResult {
     });
   }
 
+  /** Remove the files of another program's run. */
+  clearFiles() {
+    this.#files = null;
+  }
+
   /**
    * Return the result.
    *

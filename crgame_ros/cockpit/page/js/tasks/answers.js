@@ -20,9 +20,9 @@ const FRESH_MS = 200;
  * @returns {boolean}
  */
 export function isTaken(profile, index) {
-  const { reverse, lights } = profile;
+  const { reverse, lights, put_back } = profile;
   return [reverse.on, reverse.off, reverse.toggle, reverse.held,
-    ...LIGHT_BUTTONS.map((name) => lights[name])].some((list) => list.includes(index))
+    put_back, ...LIGHT_BUTTONS.map((name) => lights[name])].some((list) => list.includes(index))
     || [profile.throttle, profile.brake, profile.steering].some(
       (control) => control.kind === 'button' && control.index === index);
 }
