@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from crgame_ros.python_interface.recorded_runs import read_run
     from crgame_ros.python_interface.replays import replay
     from crgame_ros.python_interface.run_functions import export, measure, report
-    from crgame_ros.version import __version__ as __version__
+    from crgame_ros.version import __version__ as __version__  # noqa: F401
 else:
     # Hidden from type checkers, for which a name that is not imported above is then an error.
     def __getattr__(name: str) -> object:

@@ -79,7 +79,7 @@ class MessageFrames:
         return None if n < 0 else self.place(n)
 
     def states(self, message: Any) -> FloatArray:
-        """Return the states (V, 8) of the vehicles, and keep them for scans."""
+        """Return the vehicles' states, (V, 8), and keep them for scans."""
         states = self._world.vehicle_states(message)
         self.mounts.add_states(self._game.scheduler.step_of_stamp(stamp_of(message)), states)
         return states

@@ -116,8 +116,7 @@ class LqrTracker(Tracker):
 
     def largest_correction(self, speed: float) -> float:
         """
-        Return the bound of the feedback, so that the limited steering rate can undo it in time
-        [rad].
+        Return the bound of the feedback [rad] that the limited steering rate can undo in time.
 
         Large errors would otherwise end in a limit cycle. Turning the wheels back from delta at
         the rate r takes delta / r, in which the heading goes on by v delta^2 / (2 r L). The

@@ -138,8 +138,9 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
 
 def _unique_names(scenes: Sequence[CellScene], paths: Sequence[Path]) -> tuple[CellScene, ...]:
     """
-    Return scenes with unique names: equal names are extended, by the file's name for scenarios
-    and by parent folders for runs.
+    Return scenes with unique names.
+
+    Equal names are extended: by the file's name for scenarios, by parent folders for runs.
 
     :raises InputError: if names are still equal.
     """

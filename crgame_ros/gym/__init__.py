@@ -10,6 +10,6 @@ except ImportError as _error:
     raise ImportError('crgame_ros.gym needs the package gymnasium, which is not installed: '
                       f'{extra_install("gym")}', name='gymnasium') from _error
 
-from crgame_ros.gym.shipped_environments import register_all
+from crgame_ros.gym.shipped_environments import register_all  # noqa: I100 - needs gymnasium
 
 register_all()

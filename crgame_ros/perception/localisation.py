@@ -77,7 +77,7 @@ class Localisation:
 
     @property
     def covariance(self) -> Array:
-        """Return the covariance (4, 4) of the estimated x, y [m], yaw [rad], speed [m/s]."""
+        """Return the covariance of the estimated x, y [m], yaw [rad], speed [m/s]; (4, 4)."""
         return self._covariance.copy()
 
     @property

@@ -182,7 +182,7 @@ class Perception:
 
     @property
     def covariance(self) -> Array:
-        """Return the covariance (4, 4) of the estimated x, y, yaw and speed; zero if exact."""
+        """Return the covariance of the estimated x, y, yaw and speed, (4, 4); zero if exact."""
         return np.zeros((4, 4)) if self._localisation is None else self._localisation.covariance
 
     @property

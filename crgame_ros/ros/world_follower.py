@@ -46,7 +46,7 @@ class WorldStep:
 
     @property
     def states(self) -> FloatArray:
-        """Return the states (V, 8) of the driven vehicles."""
+        """Return the driven vehicles' states, (V, 8)."""
         return vehicles_from_joints(self.positions, self.velocities, self.accelerations)
 
 

@@ -38,7 +38,7 @@ class ObjectSurroundings:
 
     @property
     def speeds(self) -> FloatArray:
-        """Return the speeds (O,) [m/s]."""
+        """Return the speeds [m/s], (O,)."""
         return np.hypot(self.velocities[:, 0], self.velocities[:, 1])
 
 

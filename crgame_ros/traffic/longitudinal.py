@@ -205,7 +205,7 @@ class Longitudinal:
     def speeds(self, way: Ways, agents: Agents,
                slots: IntArray) -> tuple[FloatArray, FloatArray]:
         """
-        Return the speeds (A) that limits and curves allow now, and the accelerations (A).
+        Return the speeds that limits and curves allow now (A), and the accelerations (A).
 
         :return: [m/s]; with the accelerations agents slow down in time for lower speeds ahead
             [m/s^2]

@@ -68,7 +68,7 @@ class Powertrain:
 
     def lag(self, acceleration: float, commanded: float, dt_s: float) -> float:
         """
-        Filter the commanded acceleration by a first-order lag (CRG 25).
+        Filter the commanded acceleration by a lag of first order (CRG 25).
 
         :param acceleration: delivered acceleration a_n [m/s^2]
         :param commanded: a_cmd [m/s^2]

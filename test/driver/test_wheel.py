@@ -58,7 +58,7 @@ def test_values_beyond_the_range_are_clipped() -> None:
 
 
 def test_values_that_are_no_numbers_count_as_rest() -> None:
-    """NaN and infinity must not press a pedal."""
+    """A NaN or an infinity must not press a pedal."""
     assert normalize(raw(math.nan, math.inf, -math.inf), WHEEL) == (0.0, 0.0, 0.0, False, 0, False)
 
 

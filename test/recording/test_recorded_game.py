@@ -79,7 +79,7 @@ def test_replay_alone_is_the_recorded_run(
 
 
 def test_all_in_the_recording_drive_again(record: Any,
-                                                 capsys: pytest.CaptureFixture[str]) -> None:
+                                          capsys: pytest.CaptureFixture[str]) -> None:
     """Two humans, one on the dynamic bicycle, and an AV with options, seed and perception."""
     game = replace(load_game(scenarios_directory() / 'occluded_pedestrian.yaml'), duration=1.5)
     first = game.humans[0]

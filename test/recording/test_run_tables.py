@@ -68,7 +68,7 @@ def tables(recorded: Recorded) -> dict[str, polars.DataFrame]:
 
 @pytest.mark.slow
 def test_states_are_the_true_places(recorded: Recorded,
-                                        tables: dict[str, polars.DataFrame]) -> None:
+                                    tables: dict[str, polars.DataFrame]) -> None:
     """Centres from rear axles by hand, commands as they were consumed, objects as they moved."""
     result, every = recorded.result, recorded.result.setup.scheduler.steps_per_tick
     states = tables['states'].filter(polars.col('id') == 'hv0')

@@ -96,8 +96,9 @@ def test_the_law_has_the_slopes_of_fs_3() -> None:
 @pytest.mark.parametrize('gain', [0.1, 0.4, 1.0])
 def test_a_platoon_is_string_stable_up_to_the_bound(gain: float) -> None:
     """
-    The model's gain from leader to follower, of its slopes, is nowhere above 1 up to
-    h = T + lambda T^2 / 2; for h = T it is 1 / sqrt(1 + T^2 w^2).
+    The model's gain from leader to follower, of its slopes, is nowhere above 1 up to the bound.
+
+    The bound is h = T + lambda T^2 / 2; for h = T the gain is 1 / sqrt(1 + T^2 w^2).
     """
     time_gap = 1.5
     w = np.logspace(-4, 2, 4000)

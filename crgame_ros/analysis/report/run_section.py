@@ -24,7 +24,7 @@ def run_section(run: ReportRun) -> Section:
     people = list(_people(run))
     if people:
         html += table('Drivers', ('vehicle', 'driver', 'took part as', 'device', 'browser',
-                                    'steps', 'input delay [ms]'), people, 'people')
+                                  'steps', 'input delay [ms]'), people, 'people')
     if run.notices:
         items = ''.join(f'<li>{free(text)}</li>' for text in run.notices)
         html += f'<div class="notices"><p>Of the recording:</p><ul>{items}</ul></div>'

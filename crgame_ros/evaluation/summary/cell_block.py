@@ -39,7 +39,7 @@ class FactorLabels:
         return np.asarray(found.to_numpy(), np.int32)
 
     def digests(self, numbers: NDArray[np.int32]) -> NDArray[np.uint64]:
-        """Return digests (N) of the labels, which do not depend on the other labels."""
+        """Return the digests of the labels (N), which do not depend on the other labels."""
         return np.asarray(self._digests[numbers])
 
 

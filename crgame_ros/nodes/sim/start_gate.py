@@ -24,8 +24,9 @@ DRIVER_PATIENCE_NS = 3 * NS_PER_S
 
 class StartGate:
     """
-    The gate that publishes step 0 once all companions are connected, then awaits plans and
-    commands.
+    The gate that publishes step 0 once all companions are connected, then awaits their answers.
+
+    Answers are plans and commands.
 
     Discovery is not the same on both sides: a subscription that the publisher knows may itself
     not know the publisher yet, for up to a second. Answers prove that both do. The recorder itself
