@@ -15,7 +15,8 @@ from page_tools import installed_tools  # noqa: E402, I100
 
 TAGS = ('wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa')
 _RUN = """
-const found = await axe.run(document, { runOnly: { type: 'tag', values: arguments[0] },
+const [tags, within] = arguments;
+const found = await axe.run(within ?? document, { runOnly: { type: 'tag', values: tags },
   resultTypes: ['violations'] });
 const words = ({ html, any, all, none }) => `${html.slice(0, 200)}: ${
   [...any, ...all, ...none].map(({ message }) => message).join('; ')}`;
@@ -28,9 +29,10 @@ def _axe() -> str:
     return (installed_tools() / 'axe-core' / 'axe.min.js').read_text(encoding='utf-8')
 
 
-def barriers(browser: Browser) -> list[str]:
-    """Return the barriers of the page in its present state."""
+def barriers(browser: Browser, within: str | None = None) -> list[str]:
+    """Return the barriers of the page in its present state, or of one of its elements."""
     if not browser.run('return "axe" in window'):
         # The page's own policy refuses scripts from elsewhere.
         browser.driver.execute_cdp_cmd('Runtime.evaluate', {'expression': _axe()})
-    return [f'{rule}: {node}' for rule, nodes in browser.run_async(_RUN, TAGS) for node in nodes]
+    return [f'{rule}: {node}' for rule, nodes in browser.run_async(_RUN, TAGS, within)
+            for node in nodes]
