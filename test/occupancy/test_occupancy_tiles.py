@@ -88,6 +88,8 @@ def test_near_equals_the_whole_map(tmp_path: Path, kind: str) -> None:
     assert 0 < empty < 200
 
 
+# Coverage allocates, too.
+@pytest.mark.no_cover
 @pytest.mark.exhaustive
 def test_ten_kilometres_stay_on_disk(tmp_path: Path) -> None:
     """

@@ -114,7 +114,8 @@ def comes_round(roads: RoadNetwork, lanelet: int) -> bool:
 def test_turns_are_those_that_published_maps_name(shared_scenarios: Path) -> None:
     """Intersections name the ways to the left, to the right, and straight on."""
     wrong, count = [], 0
-    for path in sorted(shared_scenarios.rglob('*.xml')):
+    for path in sorted((*shared_scenarios.glob('*.xml'),
+                        *(shared_scenarios / 'more').rglob('*.xml'))):
         if '<planningProblem' not in path.read_text():
             continue
         roads, indicator = read(path)
