@@ -8,6 +8,7 @@ import math
 from math import cos, sin
 
 from commonroad.planning.planning_problem import PlanningProblem
+from crgame_ros.control.progress_tracker import ProgressTracker
 from crgame_ros.control.tracked_execution import TrackedExecution
 from crgame_ros.control.tracker import Reference
 from crgame_ros.errors import InputError
@@ -23,7 +24,6 @@ from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.simulation.setup import AvSetup
-from crgame_ros.timing.progress_tracker import ProgressTracker
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.human_vehicle import HumanVehicle
 from crgame_ros.vehicle.state import VehicleState
@@ -126,7 +126,8 @@ class AutonomousVehicle:
         self.counters = AvCounters()
         self.plan: Plan | None = None
         self._scheduler = scheduler
-        self._tracker = ProgressTracker(scheduler.steps_per_tick, timing.realign, timing.sample)
+        self._tracker = ProgressTracker(scheduler.steps_per_tick, scheduler.time_step_s,
+                                        setup.vehicle, timing.realign, timing.sample)
         self._asked: OrderedDict[int, _Asked] = OrderedDict()
         self._early: JointSeries | None = None
         self.execution = execution
@@ -142,6 +143,8 @@ class AutonomousVehicle:
         self.planner_running = True
         self._driven: HumanVehicle | None = None
         self._given_back_n: int | None = None
+        # With which it moved in the last step, signed along its heading [m/s^2].
+        self._acceleration = 0.0
 
     @property
     def driven(self) -> bool:
@@ -259,14 +262,21 @@ class AutonomousVehicle:
             reason = self._road_limit.refusal(plan.states)
         if reason is not None:
             return reason
+        states = self._in_simulation(plan.states, asked.true, asked.told)
+        if self.execution is not None:
+            realigned = self._tracker.align(states, request_n, n, self.state)
+            self._reference = Reference(states, self._scheduler.time_step_s)
+        else:
+            try:
+                realigned = self._tracker.adopt(
+                    states, request_n, n, self.state, self._acceleration)
+            except InputError as error:
+                return str(error)
+        self.counters.realigned += realigned
         self.plan = plan
         self._followed_request_n = request_n
         self.counters.accepted += 1
         self.counters.last_latency_steps = n - request_n
-        states = self._in_simulation(plan.states, asked.true, asked.told)
-        if self.execution is not None:
-            self._reference = Reference(states, self._scheduler.time_step_s)
-        self.counters.realigned += self._tracker.adopt(states, request_n, n, self.state)
         return None
 
     def _answered(self, request_n: int | None) -> None:
@@ -326,6 +336,12 @@ class AutonomousVehicle:
         After the driver hands the vehicle back, it keeps speed and steering until the first plan
         requested since then: an older plan starts elsewhere.
         """
+        before = self.state.speed
+        self.state = self._moved(n)
+        self._acceleration = (self.state.speed - before) / self._scheduler.dt_s
+        return self.state
+
+    def _moved(self, n: int) -> VehicleState:
         if self._driven is not None:
             self._driven, self._given_back_n = None, n - 1
         if self._given_back_n is not None and self._followed_request_n >= self._given_back_n:
@@ -336,24 +352,20 @@ class AutonomousVehicle:
         planned = None if self._given_back_n is not None else self._tracker.sample(n)
         self._without_plan = planned is None and not rolls
         if rolls:
-            self.state = self._held(0.0)
-        elif planned is None:
+            return self._held(0.0)
+        if planned is None:
             self.counters.steps_without_plan += 1
-            self.state = self._braking()
-        else:
-            self.state = self._never_back(planned)
-        return self.state
+            return self._braking()
+        return planned
 
     def _tracked(self, execution: TrackedExecution, n: int) -> VehicleState:
         """Move one step by the tracking controller."""
         reference = None
         if self._given_back_n is None and self._reference is not None:
-            since_s = (n - 1 - self._followed_request_n) * self._scheduler.dt_s
-            reference = self._reference.at(since_s)
+            reference = self._reference.at(self._tracker.time_s(n - 1))
         self._without_plan = reference is None or reference.used_up
         self.counters.steps_without_plan += self._without_plan
-        self.state = execution.step(self.state, reference, self.believed)
-        return self.state
+        return execution.step(self.state, reference, self.believed)
 
     def _rolls_on(self, n: int) -> bool:
         return self._given_back_n is not None \
@@ -367,15 +379,6 @@ class AutonomousVehicle:
             moving_time(state.speed, acceleration, dt_s), dt_s)
         return VehicleState(x, y, wrap_pi(yaw), speed, angle, acceleration,
                             speed * math.tan(angle) / wheelbase, 0.0)
-
-    def _never_back(self, planned: VehicleState) -> VehicleState:
-        """Return a standstill if a late plan that brakes harder lies behind the vehicle."""
-        state = self.state
-        along = (planned.x - state.x) * math.cos(state.yaw) \
-            + (planned.y - state.y) * math.sin(state.yaw)
-        if along < 0.0 <= planned.speed and state.speed >= 0.0:
-            return planned._replace(x=state.x, y=state.y, yaw=state.yaw)
-        return planned
 
     def _braking(self) -> VehicleState:
         state = self.state

@@ -10,7 +10,8 @@ at the tick; it answers a stated number of steps later.
 import math
 from typing import Any
 
-from crgame_ros.timing.progress_tracker import ProgressTracker
+from crgame_ros.control.progress_tracker import ProgressTracker
+from crgame_ros.vehicle.parameters import load_vehicle_parameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ import pytest
 N = 10
 DT_C = 0.1
 SPEED = 10.0
+CAR = load_vehicle_parameters()
 
 
 def straight_plan(start: VehicleState, length: int = 40) -> NDArray[np.float64]:
@@ -31,7 +33,7 @@ def straight_plan(start: VehicleState, length: int = 40) -> NDArray[np.float64]:
 
 def closed_loop(latency: int, steps: int, **modes: Any) -> NDArray[np.float64]:
     """Follow an ideal planner that is asked at every tick while it isn't busy; return x."""
-    tracker = ProgressTracker(N, **modes)
+    tracker = ProgressTracker(N, DT_C, CAR, **modes)
     state = VehicleState(0.0, 0.0, 0.0, SPEED)
     tracker.adopt(straight_plan(state), 0, 1, state)
     due: tuple[int, int, NDArray[np.float64]] | None = None
@@ -85,7 +87,7 @@ def test_floor_holds_each_plan_state_for_a_tick() -> None:
 
 def test_progress_is_counted_in_integers() -> None:
     """Ten steps are exactly one plan state; ten additions of 0.1 would floor to 0."""
-    tracker = ProgressTracker(N, sample='floor')
+    tracker = ProgressTracker(N, DT_C, CAR, sample='floor')
     start = VehicleState(0.0, 0.0, 0.0, SPEED)
     tracker.adopt(straight_plan(start), 0, 1, start)
     added = 0.0
@@ -98,23 +100,29 @@ def test_progress_is_counted_in_integers() -> None:
 
 
 def test_states_between_plan_states_are_interpolated() -> None:
-    """Linear in every column, the heading by the shortest way across pi."""
-    tracker = ProgressTracker(4)
+    """At constant acceleration; the heading by the shortest way across pi, the others linear."""
+    tracker = ProgressTracker(4, DT_C, CAR)
     states = np.array([[0.0, 0.0, 3.1, 8.0, 0.1, 1.0, 0.2, 0.01],
-                       [-2.0, 1.0, -3.1, 9.0, 0.3, 2.0, 0.4, 0.05]])
+                       [-0.85, 0.0, -3.1, 9.0, 0.3, 2.0, 0.4, 0.05]])
     tracker.adopt(states, 20, 21, VehicleState(*states[0]))
     quarter = tracker.sample(21)
     assert quarter is not None
     turn = 2.0 * math.pi - 6.2
-    assert quarter == pytest.approx((-0.5, 0.25, 3.1 + 0.25 * turn, 8.25, 0.15, 1.25, 0.25, 0.02))
+    assert quarter[4:] == pytest.approx((0.15, 1.25, 0.25, 0.02))
+    assert quarter.speed == pytest.approx(8.25, abs=0.01)
+    # The heading goes with the way: after a quarter of the time 24 % of it.
+    assert quarter.yaw == pytest.approx(3.1 + 0.24 * turn, abs=1e-3)
+    # From 8 to 9 m/s in 0.1 s: s = 8 t + 5 t^2, but for headings of 0.04 rad off the way.
+    assert quarter.x == pytest.approx(-(8.0 * 0.025 + 5.0 * 0.025**2), abs=1e-3)
+    assert quarter.y == pytest.approx(0.0, abs=0.01)
     last = tracker.sample(23)
     assert last is not None
-    assert last.yaw == pytest.approx(-3.1 - 0.25 * turn)
+    assert last.yaw == pytest.approx(-3.1 - 0.26 * turn, abs=1e-3)
 
 
 def test_plan_ends_at_its_last_state() -> None:
     """40 states reach to step 390; after it, or without a plan, there is nothing to follow."""
-    tracker = ProgressTracker(N)
+    tracker = ProgressTracker(N, DT_C, CAR)
     assert tracker.sample(5) is None
     start = VehicleState(0.0, 0.0, 0.0, SPEED)
     tracker.adopt(straight_plan(start), 0, 1, start)
@@ -124,22 +132,28 @@ def test_plan_ends_at_its_last_state() -> None:
 
 def test_overdue_plan_is_entered_where_the_vehicle_is() -> None:
     """A plan for 10 m/s arrives 5 s late; the vehicle has braked to a stop after 12.3 m."""
-    tracker = ProgressTracker(N)
+    tracker = ProgressTracker(N, DT_C, CAR)
     vehicle = VehicleState(12.34, 0.0, 0.0, 0.0)
     plan = straight_plan(VehicleState(0.0, 0.0, 0.0, SPEED), 100)
     assert tracker.adopt(plan, 100, 601, vehicle)
-    entered = tracker.sample(601)
-    assert entered is not None
-    assert entered.x == pytest.approx(12.34 + 0.1)
-    later = tracker.sample(611)
-    assert later is not None
-    assert later.x == pytest.approx(12.34 + 1.1)
+    speeds, places = [], []
+    for n in range(600, 1200):
+        entered = tracker.sample(n)
+        assert entered is not None
+        speeds.append(entered.speed)
+        places.append(entered.x)
+    # It starts from rest, with up to 4 m/s^2, and is as fast as the plan in the end.
+    assert (speeds[0], places[0]) == (0.0, 12.34)
+    assert 100.0 * np.diff(speeds).max() == pytest.approx(4.0, abs=0.05)
+    assert speeds[-1] == pytest.approx(SPEED)
+    np.testing.assert_allclose(100.0 * np.diff(places), 0.5 * (np.add(speeds[1:], speeds[:-1])),
+                               atol=1e-6)
 
 
 @pytest.mark.parametrize('steps_per_tick', [1, 2, 10])
 def test_fast_vehicle_with_long_steps_is_not_taken_for_elsewhere(steps_per_tick: int) -> None:
     """At 10 Hz and 30 m/s a step covers 3 m; the plan still fits and is followed in time."""
-    tracker = ProgressTracker(steps_per_tick)
+    tracker = ProgressTracker(steps_per_tick, DT_C, CAR)
     start = VehicleState(0.0, 0.0, 0.0, 30.0)
     assert not tracker.adopt(straight_plan(start), 0, 1, start)
     first = tracker.sample(1)
