@@ -77,14 +77,14 @@ def limit_events(game: GameDocument, fired: Sequence[FiredEvent],
 
 def time_above(speed: FloatArray, limits: FloatArray, step_s: float) -> float:
     """
-    Return the time above the limit [s]; each step counts as one step of time.
+    Return the time above the limit [s]; each state counts until the next one.
 
     :return: NaN where there was no limit at all
     """
-    limited = np.isfinite(limits)
+    limited = np.isfinite(limits[:-1])
     if not limited.any():
         return math.nan
-    return step_s * int(np.count_nonzero(np.abs(speed[limited]) > limits[limited]))
+    return step_s * int(np.count_nonzero(np.abs(speed[:-1][limited]) > limits[:-1][limited]))
 
 
 # Sources of seat orders that return the vehicle to its planner or the game.
@@ -186,7 +186,7 @@ def _motion(everybody: _Everybody, states: FloatArray, keeping: LaneKeeping) -> 
         **_named('speed', spread_of(speed)), **_named('acceleration', spread_of(acceleration)),
         **_named('jerk', spread_of(np.diff(acceleration) / everybody.step_s)),
         'time_above_limit': time_above(speed, limits, everybody.step_s),
-        'time_with_limit': everybody.step_s * int(np.count_nonzero(np.isfinite(limits))),
+        'time_with_limit': everybody.step_s * int(np.count_nonzero(np.isfinite(limits[:-1]))),
         'sdlp': sdlp(keeping.offset, kept, speed),
         'lane_offset_mean': spread_of(driven_offsets(keeping.offset, kept, speed)).mean,
         'lane_changes': float(len(keeping.changes)),

@@ -132,7 +132,8 @@ MEASURES = {
         f'from {USUAL_LIMITS.brake_press:g} of its travel on; {_EVENT}', 'brake', 'event'),
     'reaction_steering': BehaviourMeasure(
         's', 'time from the event until the steering wheel is turned',
-        f'at {USUAL_LIMITS.wheel_rate_deg:g} degrees/s or more; {_EVENT}', 'steering wheel',
+        f'at {USUAL_LIMITS.wheel_rate_deg:g} degrees/s or more over the last '
+        f'{USUAL_LIMITS.rate_time_s:g} s; {_EVENT}', 'steering wheel',
         'event'),
     'gap_to_leader': BehaviourMeasure(
         'm', 'gap to the leader in the lane entered', _GAP, 'bumper to bumper', 'lane change'),

@@ -18,12 +18,15 @@ class ResponseLimits(NamedTuple):
     :param throttle_release: decrease of the throttle from its value at the event [share]
     :param brake_press: brake travel from which on the brake counts as pressed [share]
     :param wheel_rate_deg: rate of the steering wheel in either direction [degrees/s]
+    :param rate_time_s: time over which that rate is measured, so that it depends neither on the
+        simulation's rate nor on the resolution of a wheel [s]
     """
 
     window_s: float = 5.0
     throttle_release: float = 0.1
     brake_press: float = 0.05
     wheel_rate_deg: float = 20.0
+    rate_time_s: float = 0.1
 
 
 USUAL_LIMITS = ResponseLimits()
@@ -60,13 +63,14 @@ def reaction_to(event_s: float, controls: DriverControls,
     if not len(times_s) or abs(times_s[at] - event_s) > 1.5 * controls.dt_s:
         return Reaction(math.nan, math.nan, math.nan)
     end = int(np.searchsorted(times_s, event_s + limits.window_s + 1e-9))
-    turned = np.abs(np.diff(controls.wheel_deg[:end])) / np.diff(times_s[:end])
-    rates = np.concatenate(([0.0], turned))[at:]
+    wheel, until = controls.wheel_deg[:end], times_s[at:end]
+    rates = np.abs(wheel[at:] - np.interp(until - limits.rate_time_s, times_s[:end], wheel)) \
+        / limits.rate_time_s
     throttle = controls.throttle[at:end]
     low = throttle[0] - limits.throttle_release
     released = throttle <= low + 1e-9 if low >= -1e-9 else np.zeros(len(throttle), dtype=bool)
     return Reaction(*(
-        _first_onset(responds, times_s[at:end]) - event_s for responds in (
+        _first_onset(responds, until) - event_s for responds in (
             released, controls.brake[at:end] >= limits.brake_press,
             rates >= limits.wheel_rate_deg)))
 

@@ -49,10 +49,15 @@ def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArra
 
 
 def stationary_points(angles_deg: FloatArray) -> FloatArray:
-    """Return the angles at which the difference changes sign, or the previous one is zero."""
+    """
+    Return the angles at which the difference changes sign, or the previous one is zero.
+
+    The first sample counts as one, as in the code of the authors.
+    """
     steps = np.diff(angles_deg)
     before, after = steps[:-1], steps[1:]
-    return angles_deg[1:-1][(np.sign(before) * np.sign(after) < 0.0) | (before == 0.0)]
+    turns = (np.sign(before) * np.sign(after) < 0.0) | (before == 0.0)
+    return np.concatenate((angles_deg[:1], angles_deg[1:-1][turns]))
 
 
 def count_reversals(points_deg: FloatArray, gap_deg: float) -> int:
@@ -84,4 +89,4 @@ def reversal_rate(pieces: Sequence[FloatArray], dt_s: float, setting: ReversalSe
         return math.nan
     count = sum(count_reversals(stationary_points(smoothed(piece, dt_s, setting.cutoff_hz)),
                                 setting.gap_deg) for piece in long)
-    return 60.0 * count / (dt_s * sum(map(len, long)))
+    return 60.0 * count / (dt_s * sum(len(piece) - 1 for piece in long))

@@ -153,13 +153,28 @@ def deceleration_to_avoid_crash(gap: float, speed: float, leader_speed: float) -
 def required_acceleration(gap: float, speed: float, leader_speed: float,
                           leader_acceleration: float) -> float:
     """
-    Return the constant acceleration that just avoids contact, min(a_o - DRAC, 0) [m/s²].
+    Return the constant acceleration, held from now on, that just avoids contact [m/s²].
 
-    :return: 0 where the subject is not faster or without a leader, -inf where they touch.
+    The leader keeps its acceleration until it stands, and then stands. With DRAC the subject is as
+    slow as the leader where both meet, 2 gap / (v_s - v_o) from now: a_o - DRAC. If the leader
+    stands by then, or brakes and is as fast as the subject, the subject stops behind it.
+
+    :return: at most 0; 0 where no braking is needed or without a leader, -inf where they touch.
     """
-    if math.isnan(gap) or not speed > leader_speed:
+    if math.isnan(gap):
         return 0.0
-    return min(leader_acceleration - deceleration_to_avoid_crash(gap, speed, leader_speed), 0.0)
+    closing = speed - leader_speed
+    if closing > 0.0 and gap <= 0.0:
+        return -math.inf
+    stands = 0.0 if leader_speed == 0.0 and leader_acceleration <= 0.0 \
+        else _standstill(leader_speed, leader_acceleration)
+    if closing > 0.0 and 2.0 * gap / closing <= stands:
+        return min(
+            leader_acceleration - deceleration_to_avoid_crash(gap, speed, leader_speed), 0.0)
+    if not speed > 0.0 or stands == math.inf:
+        return 0.0
+    room = gap + 0.5 * leader_speed * stands
+    return -0.5 * speed ** 2 / room if room > 0.0 else -math.inf
 
 
 def _standstill(speed: float, acceleration: float) -> float:

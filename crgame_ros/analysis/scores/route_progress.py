@@ -13,8 +13,8 @@ import shapely
 FloatArray = NDArray[np.float64]
 
 # Shorter progress counts as this, and a drive backwards by more has a ratio of 0 (nuplan-devkit,
-# docs/metrics_description.md) [m].
-NOISE = 0.1
+# ego_progress_along_expert_route.py: score_progress_threshold) [m].
+LEAST_M = 2.0
 # In the free drive a vehicle accelerates at nuPlan's limit of comfort [m/s^2]. Where no limit is
 # known, it drives at this speed [m/s], 50 km/h.
 FREE_ACCELERATION, UNLIMITED = 2.40, 50.0 / 3.6
@@ -128,4 +128,4 @@ def route_of(roads: RoadNetwork, poses: FloatArray) -> ComparedRoute:
 
 def progress_ratio(own: float, expert: float) -> float:
     """Return progress as a share of the expert's, 0 to 1 (nuplan-devkit)."""
-    return 0.0 if own < -NOISE else min(1.0, max(own, NOISE) / max(expert, NOISE))
+    return 0.0 if own < -LEAST_M else min(1.0, max(own, LEAST_M) / max(expert, LEAST_M))

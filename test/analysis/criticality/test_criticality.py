@@ -135,7 +135,7 @@ def test_two_cars_at_any_heading(cut_in: LoadedScenario) -> None:
         assert found == pytest.approx({
             'gap': 45.5, 'time_gap': 2.275, 'thw': 2.275, 'ttc': 4.55,
             'ttc_a': (math.sqrt(373.0) - 10.0) / 3.0, 'drac': 100.0 / 91.0,
-            'a_req': -3.0 - 100.0 / 91.0, 'ttc_2d': 4.55, 'min_distance': 45.5}, rel=1e-9)
+            'a_req': -200.0 / (45.5 + 50.0 / 3.0), 'ttc_2d': 4.55, 'min_distance': 45.5}, rel=1e-9)
         # In the lane beside, at the same speed: only a distance.
         assert np.isnan(beside[COLUMN['gap']]) and beside[COLUMN['drac']] == 0.0
         assert np.isinf(beside[[COLUMN[name] for name in ('ttc', 'ttc_a', 'ttc_2d')]]).all()

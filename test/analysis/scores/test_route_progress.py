@@ -53,9 +53,10 @@ def test_free_way(roads: RoadNetwork, duration_s: float) -> None:
 
 
 @pytest.mark.parametrize(('own', 'expert', 'expected'), [
-    (-0.2, 10.0, 0.0), (0.0, 0.0, 1.0), (5.0, 10.0, 0.5), (20.0, 10.0, 1.0), (-0.05, 10.0, 0.01)])
+    (-2.1, 10.0, 0.0), (0.0, 0.0, 1.0), (5.0, 10.0, 0.5), (20.0, 10.0, 1.0), (-1.9, 10.0, 0.2),
+    (0.5, 1.5, 1.0)])
 def test_progress_ratio(own: float, expert: float, expected: float) -> None:
-    """min(1, max(own, 0.1) / max(expert, 0.1)); backwards by more than 0.1 m nothing."""
+    """min(1, max(own, 2) / max(expert, 2)); backwards by more than 2 m nothing."""
     assert progress_ratio(own, expert) == pytest.approx(expected)
 
 
