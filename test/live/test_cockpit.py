@@ -217,7 +217,8 @@ def test_run_control(graph: Graph, page: PageClient) -> None:
     epoch = page.documents['status']['epoch']
     assert page.request('control', action='reset')['ok']
     wait_until(lambda: page.documents['scene']['time']['epoch'] == epoch + 1, 'the next epoch')
-    wait_until(lambda: page.documents['status']['run'] == 'running', 'the run of it')
+    wait_until(lambda: page.documents['status']['epoch'] == epoch + 1
+               and page.documents['status']['run'] == 'running', 'the run of it')
 
 
 @pytest.mark.exhaustive

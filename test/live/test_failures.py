@@ -7,6 +7,7 @@ from pathlib import Path
 import resource
 
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.messages import from_time
 from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
@@ -73,6 +74,30 @@ def test_killed_driver_is_started_again_and_drives(run: Run) -> None:
     wait_until(lambda: len(launcher.started) > starts, 'another driver')
     peer.wait_until(lambda: peer.cycles().commands('hv0')[-1, 0] == THROTTLE, 'the driver again')
     assert peer.cycles().commands('hv0')[-1, 1] == 0.0
+
+
+def test_a_recorder_that_stood_still_through_a_reset_finds_the_run_of_each_message(
+        run: Run) -> None:
+    """The first command of the new run is in its own bag, and the run does not wait in vain."""
+    launcher, peer = run
+    before = peer.games[-1]
+    launcher.freeze('recorder_node')
+    assert peer.call('/sim/reset').success
+    peer.wait_until(lambda: peer.games[-1] is not before, 'another run')
+    game = peer.games[-1]
+    first_ns = game.scheduler.clock_offset_ns
+    peer.wait_until(lambda: from_time(peer.messages['/<v>/driver_command'][-1].header.stamp)
+                    == first_ns, 'its first command')
+    launcher.thaw('recorder_node')
+    peer.wait_until(lambda: peer.n > 30, 'n = 30')
+    assert not launcher.says('starting without a record')
+    assert peer.call('/sim/reset').success
+    launcher.wait_for(rf'recording into .*/run_{game.epoch + 2}/bag$')
+    for epoch, is_own in ((before.epoch, False), (game.epoch, True)):
+        with BagReader(run_folder(launcher.out, epoch) / 'bag') as reader:
+            stamps = {from_time(item.message.header.stamp)
+                      for item in reader.decoded(['/hv0/driver_command'])}
+        assert (first_ns in stamps) is is_own
 
 
 @pytest.mark.exhaustive
