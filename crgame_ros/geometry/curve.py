@@ -3,6 +3,7 @@
 """A curve in the plane, and the curvilinear coordinates (s, d) along it (CRG 1)."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from functools import cached_property
 import math
 
@@ -16,6 +17,8 @@ FloatArray = NDArray[np.float64]
 _CHUNK = 2_000_000
 # Up to this many points are refined one by one: numpy calls cost more than the arithmetic.
 _FEW = 12
+# Beyond the centre of a bend, s does not run on faster than this allows.
+_LEAST_STRETCH = 0.3
 
 
 class Curve:
@@ -96,6 +99,23 @@ class Curve:
             heading = slope * beyond + heading
         return s, x + beyond * along_x, y + beyond * along_y, heading, bends[after]
 
+    def rate(self, s: float, d: float, velocity: Sequence[float]) -> float:
+        """
+        Return ds/dt of a moving point that is projected on the curve [m/s].
+
+        :param s: its arc length [m]
+        :param d: its offset to the left [m]
+        :param velocity: (2) [m/s]
+        """
+        _, _, _, heading, bend = self.place(s)
+        cos, sin = math.cos(heading), math.sin(heading)
+        after = bisect_right(self._spans[0], s)
+        segment = min(max(after - 1, 0), len(self.steps) - 1)
+        along_x, along_y = self._spans[1][segment][2:4]
+        # The point stays on the normal of the heading, which turns along s.
+        stretch = cos * along_x + sin * along_y - bend * d
+        return (velocity[0] * cos + velocity[1] * sin) / max(stretch, _LEAST_STRETCH)
+
     def heading_at(self, s: FloatArray) -> FloatArray:
         """Return the headings at arc lengths of any shape, not wrapped [rad]."""
         return np.asarray(np.interp(s, self.s, self.heading), dtype=np.float64)
@@ -174,7 +194,7 @@ class Curve:
             if exact and np.abs(along).max() < exact:
                 break
             # Beyond the centre of curvature Newton's step would point the wrong way.
-            stretch = np.maximum(1.0 - pose[:, 3] * aside, 0.3)
+            stretch = np.maximum(1.0 - pose[:, 3] * aside, _LEAST_STRETCH)
             s = s + along / (stretch if left or exact else 1.0)
         return s, aside
 
@@ -190,7 +210,8 @@ class Curve:
                 along, d = dx * cos + dy * sin, dy * cos - dx * sin
                 near = near and abs(along) < exact
                 stretch = 1.0 - bend * d if left or exact else 1.0
-                aside[i], steps[i] = d, along / (stretch if not stretch < 0.3 else 0.3)
+                aside[i], steps[i] = d, along / (
+                    stretch if not stretch < _LEAST_STRETCH else _LEAST_STRETCH)
             if near:
                 break
             for i, step in enumerate(steps):

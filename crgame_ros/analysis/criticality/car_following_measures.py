@@ -29,14 +29,28 @@ class Ahead(NamedTuple):
     :param number: its index among the others.
     :param gap: from the subject's front to the leader's rear, along the path [m]; negative where
         they overlap along it
-    :param own_heading: heading of the path at the subject's centre [rad]
-    :param heading: heading of the path at the leader's centre [rad]
+    :param front: the subject's corner that is furthest along the path.
+    :param rear: the leader's corner that is least far along it.
     """
 
     number: int
     gap: float
-    own_heading: float
-    heading: float
+    front: 'Corner'
+    rear: 'Corner'
+
+
+class Corner(NamedTuple):
+    """
+    A corner of a footprint, relative to a path.
+
+    :param number: its index in the footprint.
+    :param s: arc length [m]
+    :param d: offset to the left [m]
+    """
+
+    number: int
+    s: float
+    d: float
 
 
 def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
@@ -71,9 +85,10 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
         return None
     rear = np.where(ahead, rears, np.inf)
     nearest = int(np.argmin(rear))
-    own_heading, heading = (path.line.place(at)[3]
-                            for at in (s[0], float(along[nearest, 0])))
-    return Ahead(int(candidates[nearest]), float(rear[nearest] - front), own_heading, heading)
+    own_corner, corner = s.index(front, 1), int(np.argmin(along[nearest, 1:])) + 1
+    return Ahead(int(candidates[nearest]), float(rear[nearest] - front),
+                 Corner(own_corner - 1, front, d[own_corner]),
+                 Corner(corner - 1, float(along[nearest, corner]), float(aside[nearest, corner])))
 
 
 def time_gap(gap: float, speed: float) -> float:

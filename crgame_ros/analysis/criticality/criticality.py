@@ -7,11 +7,12 @@ The same code observes offline runs and measures recordings. All definitions are
 `docs/criticality.md`. Distances are bumper to bumper, along the subject's own path.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any, NamedTuple
 
 from crgame_ros.analysis.criticality.car_following_measures import (
+    Corner,
     deceleration_to_avoid_crash,
     find_leader,
     required_acceleration,
@@ -24,6 +25,7 @@ from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, 
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.objects import ObjectStates
+from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
@@ -150,7 +152,7 @@ class Criticality:
     :ivar ids: ids of driven vehicles, then of objects.
     :ivar n: simulation step that was measured last; -1 before the first.
     :ivar latest: measures of each vehicle at that step.
-    :ivar new_crossings: crossings that were detected at that step.
+    :ivar new_crossings: estimates of the crossings in which the second entered at that step.
     """
 
     def __init__(self, run: ObservedRun, thresholds: Thresholds = USUAL) -> None:
@@ -173,19 +175,25 @@ class Criticality:
         self.latest: tuple[TickMeasures, ...] = ()
         self.new_crossings: tuple[WayCrossed, ...] = ()
 
+    @property
+    def crossings(self) -> tuple[WayCrossed, ...]:
+        """Return all crossings so far; those whose second is still inside are estimates."""
+        return tuple(self._crossings.crossings)
+
     def observe(self, n: int, since_tick_s: float, vehicle_states: FloatArray,
                 objects: ObjectStates | None) -> None:
         """Measure a published state, if it belongs to a tick (`RunObserver`)."""
-        if objects is None or since_tick_s != 0.0:
+        # A state that is published again, such as that of step 0 before a run starts, counts once.
+        if objects is None or since_tick_s != 0.0 or n == self.n:
             return
         self.n, time_s = n, n * self._scheduler.dt_s
         centers = shifted(vehicle_states[:, :3], self._rear_to_center)
         velocities = shifted_velocities(centers[:, 2], pose_rates(vehicle_states),
-                                        self._rear_to_center)[:, :2]
+                                        self._rear_to_center)
         poses = np.concatenate((centers, objects.poses))
-        moves = np.concatenate((velocities, objects.velocities[:, :2]))
-        accelerations = self._accelerations(time_s, vehicle_states, poses, moves)
-        scene = self._footprints.scene(poses, moves, accelerations)
+        rates = np.concatenate((velocities, objects.velocities))
+        accelerations = self._accelerations(time_s, vehicle_states, poses, rates[:, :2])
+        scene = self._footprints.scene(poses, rates, accelerations)
         self.latest = self._measure(scene)
         self.new_crossings = tuple(self._crossings.observe(
             time_s, scene.outlines, poses[:, :2]))
@@ -193,7 +201,11 @@ class Criticality:
 
     def report(self) -> tuple[VehicleCriticality, ...]:
         """Return the criticality of each vehicle over all ticks so far."""
-        return tuple(self._found)
+        crossings = self._crossings.crossings
+        return tuple(
+            replace(vehicle, crossings=[each for each in crossings
+                                        if number in (each.first, each.second)])
+            for number, vehicle in enumerate(self._found))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the results as a JSON-compatible dictionary: SI units, times since the start."""
@@ -208,9 +220,10 @@ class Criticality:
                     'tet_s': vehicle.tet_s, 'tit_s2': vehicle.tit,
                     'crossings': [{'first': self.ids[each.first],
                                    'second': self.ids[each.second],
-                                   'entered_s': each.entered_s, 'pet_s': each.pet_s}
+                                   'entered_s': each.entered_s, 'pet_s': each.pet_s,
+                                   'is_estimate': each.is_estimate}
                                   for each in vehicle.crossings]}
-                for vehicle in self._found}}
+                for vehicle in self.report()}}
 
     def _accelerations(self, time_s: float, states: FloatArray, poses: FloatArray,
                        moves: FloatArray) -> FloatArray:
@@ -254,12 +267,11 @@ class Criticality:
                              values[:, COLUMN['min_distance']] == 0.0)
         if leader is None:
             return
-        other, moves, accelerations = int(others[leader.number]), scene.moves, scene.accelerations
-        here, there = (np.array((math.cos(yaw), math.sin(yaw)))
-                       for yaw in (leader.own_heading, leader.heading))
+        (speed, acceleration), (leader_speed, leader_acceleration) = (
+            _rates_along(seen.path.line, corner, scene, number) for corner, number in (
+                (leader.front, subject), (leader.rear, int(others[leader.number]))))
         values[leader.number, :_OF_LEADER] = _compute_leader_measures(
-            leader.gap, float(moves[subject] @ here), float(moves[other] @ there),
-            float(accelerations[subject] @ here), float(accelerations[other] @ there))
+            leader.gap, speed, leader_speed, acceleration, leader_acceleration)
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s
@@ -275,10 +287,14 @@ class Criticality:
             if short > 0.0:
                 found.tet_s += step_s
                 found.tit += step_s * short
-        for crossing in self.new_crossings:
-            for number in (crossing.first, crossing.second):
-                if number < self.vehicles:
-                    self._found[number].crossings.append(crossing)
+
+
+def _rates_along(path: Curve, corner: Corner, scene: Scene, number: int) -> tuple[float, float]:
+    """Return how fast the s of a footprint's corner grows [m/s], and its acceleration [m/s^2]."""
+    x, y = (scene.outlines[number, corner.number] - scene.poses[number, :2]).tolist()
+    vx, vy, yaw_rate = scene.rates[number].tolist()
+    return (path.rate(corner.s, corner.d, (vx - yaw_rate * y, vy + yaw_rate * x)),
+            path.rate(corner.s, corner.d, scene.accelerations[number].tolist()))
 
 
 def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acceleration: float,

@@ -3,6 +3,7 @@
 """Post-encroachment time (PET): from when one leaves a conflict area to when another enters."""
 
 from collections import deque
+from collections.abc import Sequence
 from itertools import pairwise
 import math
 from typing import NamedTuple
@@ -18,11 +19,16 @@ FloatArray = NDArray[np.float64]
 MEMORY_S = 10.0
 # Paths cross at an angle between this and pi less this; else one follows or meets the other [rad].
 LEAST_ANGLE = math.radians(20.0)
-# The second one's path through the conflict area is extended straight ahead by this [m].
+# As long as the second is in the conflict area, the rest of its path is taken as this far straight
+# ahead [m].
 AHEAD = 15.0
 # A shorter movement in a step has no direction [m].
 STANDING = 1e-3
-ROUNDING_S = 1e-9
+# The shares of a step at which a first contact is looked for, before it is bisected. The last is
+# a rounding error later, for a contact exactly at a tick belongs to the step that ends there.
+_SHARES = np.linspace(0.0, 1.0, 9) * (1.0 + 1e-9)
+_BISECTIONS = 30
+_STILL = np.zeros(2)
 
 
 class WayCrossed(NamedTuple):
@@ -33,12 +39,15 @@ class WayCrossed(NamedTuple):
     :param second: number of the other.
     :param entered_s: time at which the second entered the area [s]
     :param pet_s: time since the first had left it [s]; 0 if it had not
+    :param is_estimate: whether the second has not left it yet: the rest of its path is taken as
+        straight ahead.
     """
 
     first: int
     second: int
     entered_s: float
     pet_s: float
+    is_estimate: bool
 
 
 class _Moment(NamedTuple):
@@ -49,13 +58,27 @@ class _Moment(NamedTuple):
     centers: FloatArray
 
 
+class _Passage(NamedTuple):
+    """
+    The way of a second one through the conflict area, until it has left it.
+
+    :param number: of the crossing.
+    :param before: the moments at which the first one may have been in the area.
+    :param swept: outlines of the second since it entered.
+    """
+
+    number: int
+    before: tuple[_Moment, ...]
+    swept: list[FloatArray]
+
+
 class EncroachmentDetector:
     """
     Detector of crossing paths, from footprints at successive ticks.
 
     The conflict area is the intersection of the areas that both footprints sweep. Between two
-    ticks they move evenly. Only crossing paths count, not those of followers or oncoming traffic:
-    the table of definitions leaves a measure without crossing undefined.
+    ticks their corners move evenly. Only crossing paths count, not those of followers or oncoming
+    traffic: the table of definitions leaves a measure without crossing undefined.
 
     :param watched: number of vehicles, from the first on, that are checked against all; pairs
         among the others are not checked.
@@ -74,11 +97,15 @@ class EncroachmentDetector:
         self._unwatched = everybody[watched:]
         self._others = [np.delete(everybody, i) for i in range(watched)]
         self._inside: set[tuple[int, int]] = set()
+        self._passages: dict[tuple[int, int], _Passage] = {}
+        self.crossings: list[WayCrossed] = []
 
     def observe(self, time_s: float, outlines: FloatArray,
                 centers: FloatArray) -> list[WayCrossed]:
         """
-        Add the positions of a tick, and return the crossings that it completes.
+        Add the positions of a tick, and return the crossings in which the second enters in it.
+
+        They are estimates, which `crossings` replaces as soon as the second has left.
 
         :param time_s: time of this tick, later than the previous one [s]
         :param outlines: (N, C, 2) corners of convex footprints [m]; NaN where absent
@@ -98,6 +125,7 @@ class EncroachmentDetector:
                     crossing = self._enters(*pair, segments, now)
                     if crossing is not None:
                         found.append(crossing)
+                self._follow_passages(outlines)
             self._begins = np.concatenate((self._begins, before[None]))
             self._moves = np.concatenate((self._moves, ways[None]))
             self._lengths = np.concatenate((self._lengths, lengths[None]))
@@ -150,39 +178,88 @@ class EncroachmentDetector:
                 now: _Moment) -> WayCrossed | None:
         """Return the crossing if the second enters in this step the area swept by the first."""
         before = self._past[-1]
-        way = now.centers[second] - before.centers[second]
-        lapse = now.time_s - before.time_s
         begins, ends = (np.stack([self._past[step + late].outlines[first] for step in segments])
                         for late in (0, 1))
-        contact = float(time_to_contact(_hulls(begins, ends), before.outlines[second],
-                                        np.zeros(2), way / lapse).min())
+        begin, end = before.outlines[second], now.outlines[second]
+        share = _first_contact(_hulls(begins, ends), begin, end)
         pair = (first, second)
-        # A contact exactly at a tick belongs to the step that ends there.
-        if contact > lapse + ROUNDING_S:
+        if share is None:
             self._inside.discard(pair)
             return None
         known = pair in self._inside or (second, first) in self._inside
         self._inside.add(pair)
-        if known or contact == 0.0:
+        if known or share == 0.0:
             return None
-        entered_s = before.time_s + contact
-        left_s = self._left(first, before.outlines[second] + way * contact / lapse, way, now)
-        return WayCrossed(first, second, entered_s, max(entered_s - left_s, 0.0))
+        entered_s = before.time_s + share * (now.time_s - before.time_s)
+        passage = _Passage(len(self.crossings), (*self._past, now),
+                           [begin + share * (end - begin)])
+        ahead = AHEAD * _direction(now.centers[second] - before.centers[second])
+        left_s = _time_left(first, passage.before, _hulls(
+            passage.swept[0][None], passage.swept[0][None] + ahead))
+        crossing = WayCrossed(first, second, entered_s, max(entered_s - left_s, 0.0), True)
+        self.crossings.append(crossing)
+        self._passages[pair] = passage
+        return crossing
 
-    def _left(self, first: int, outline: FloatArray, way: FloatArray, now: _Moment) -> float:
-        """Return when the first one left the area that the second one is about to cross [s]."""
-        through = _hulls(outline[None], outline[None] + AHEAD * way / np.hypot(*way))[0]
-        latest = -math.inf
-        for begin, end in pairwise((*self._past, now)):
-            if not np.isfinite(begin.centers[first] + end.centers[first]).all():
+    def _follow_passages(self, outlines: FloatArray) -> None:
+        """Follow the second ones through their areas; measure the crossings that are complete."""
+        for pair, passage in list(self._passages.items()):
+            if pair in self._inside:
+                passage.swept.append(outlines[pair[1]])
                 continue
-            lapse = end.time_s - begin.time_s
-            back = (begin.centers[first] - end.centers[first]) / lapse
-            # Backwards in time, it enters the area at the moment at which it left it.
-            contact = float(time_to_contact(through, end.outlines[first], np.zeros(2), back))
-            if contact <= lapse + ROUNDING_S:
-                latest = max(latest, end.time_s - contact)
-        return latest
+            del self._passages[pair]
+            swept = np.stack(passage.swept)
+            estimate = self.crossings[passage.number]
+            left_s = _time_left(pair[0], passage.before, _hulls(swept[:-1], swept[1:]))
+            self.crossings[passage.number] = estimate._replace(
+                pet_s=max(estimate.entered_s - left_s, 0.0), is_estimate=False)
+
+
+def _direction(way: FloatArray) -> FloatArray:
+    return np.asarray(way / np.hypot(*way))
+
+
+def _first_contact(area: FloatArray, begin: FloatArray, end: FloatArray) -> float | None:
+    """
+    Return at which share of its movement a footprint first touches an area.
+
+    :param area: (S, K, 2) corners of the convex parts of the area [m]
+    :param begin: (C, 2) corners of the footprint at the begin of its movement [m]
+    :param end: (C, 2) the same corners at its end.
+    """
+    def touches(shares: FloatArray) -> NDArray[np.bool_]:
+        outlines = begin + shares[:, None, None] * (end - begin)
+        times = time_to_contact(parts[:, None], outlines[None], _STILL, _STILL)
+        return np.asarray((times == 0.0).any(axis=0))
+
+    # Most parts are far away from the movement.
+    way = _hulls(begin[None], end[None])
+    parts = area[time_to_contact(area, way, _STILL, _STILL) == 0.0]
+    if not len(parts):
+        return None
+    touching = np.flatnonzero(touches(_SHARES))
+    if not len(touching):
+        return None
+    first = int(touching[0])
+    if first == 0:
+        return 0.0
+    low, high = _SHARES[first - 1], _SHARES[first]
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if touches(np.array([middle]))[0] else (middle, high)
+    return min(float(high), 1.0)
+
+
+def _time_left(first: int, moments: Sequence[_Moment], area: FloatArray) -> float:
+    """Return when the first one was in an area (S, K, 2) for the last time [s]; else -inf."""
+    for begin, end in reversed(list(pairwise(moments))):
+        if not np.isfinite(begin.centers[first] + end.centers[first]).all():
+            continue
+        # Backwards in time, it enters the area at the moment at which it left it.
+        share = _first_contact(area, end.outlines[first], begin.outlines[first])
+        if share is not None:
+            return end.time_s - share * (end.time_s - begin.time_s)
+    return -math.inf
 
 
 def _within(offsets: FloatArray, reach: FloatArray) -> NDArray[np.bool_]:

@@ -31,13 +31,13 @@ class Scene(NamedTuple):
     The scene at a tick: N vehicles and objects, driven vehicles first.
 
     :param poses: (N, 3) poses of the centres.
-    :param moves: (N, 2) velocities.
+    :param rates: (N, 3) derivatives of the poses.
     :param accelerations: (N, 2)
     :param outlines: (N, C, 2) corners of the footprints; a shorter one repeats its last corner.
     """
 
     poses: FloatArray
-    moves: FloatArray
+    rates: FloatArray
     accelerations: FloatArray
     outlines: FloatArray
 
@@ -60,16 +60,17 @@ class NearbyFootprints:
             for corners in outlines]).reshape(-1, self._most, 2)
         self._corners = np.array([len(corners) for corners in outlines], dtype=np.int64)
 
-    def scene(self, poses: FloatArray, moves: FloatArray, accelerations: FloatArray) -> Scene:
+    def scene(self, poses: FloatArray, rates: FloatArray, accelerations: FloatArray) -> Scene:
         """Return the scene; parameters as for `Scene`."""
-        return Scene(poses, moves, accelerations, placed(self._outlines, poses))
+        return Scene(poses, rates, accelerations, placed(self._outlines, poses))
 
     def on_road(self, scene: Scene, transform: RigidTransform) -> Scene:
         """Return a scene in the coordinates of a vehicle's road."""
         if transform.is_identity:
             return scene
+        moves = transform.turn_to_scenario(scene.rates[:, :2])
         return self.scene(transform.to_scenario(scene.poses),
-                          transform.turn_to_scenario(scene.moves),
+                          np.column_stack((moves, scene.rates[:, 2])),
                           transform.turn_to_scenario(scene.accelerations))
 
     def near(self, subject: int, scene: Scene) -> Numbers:
@@ -95,7 +96,7 @@ class NearbyFootprints:
         rows, others = np.repeat(np.arange(len(subjects)), counts), np.concatenate(near)
         own = np.repeat(subjects, counts)
         outlines = np.stack([scene.outlines for scene in scenes])
-        moves = np.stack([scene.moves for scene in scenes])
+        moves = np.stack([scene.rates[:, :2] for scene in scenes])
         corners = np.maximum(self._corners[own], self._corners[others])
         result = np.empty((len(others), 2))
         for count in set(corners.tolist()):
@@ -111,7 +112,7 @@ class NearbyFootprints:
         own = scene.outlines[subject, :self._corners[subject]].tolist()
         return np.array([approach(
             own, scene.outlines[other, :self._corners[other]].tolist(),
-            (scene.moves[other] - scene.moves[subject]).tolist()) for other in others]
+            (scene.rates[other, :2] - scene.rates[subject, :2]).tolist()) for other in others]
         ).reshape(-1, 2)
 
 

@@ -78,7 +78,8 @@ def _crossings(run: ReportRun, vehicle: VehicleCriticality,
     for each in vehicle.crossings:
         yield (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
                named(run, ids[each.second]), moment(run, each.entered_s),
-               marked(number(each.pet_s), each.pet_s < limits.pet_s))
+               marked(('≈ ' if each.is_estimate else '') + number(each.pet_s),
+                      each.pet_s < limits.pet_s))
 
 
 def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:

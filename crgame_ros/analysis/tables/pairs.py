@@ -15,6 +15,7 @@ from crgame_ros.analysis.criticality.nearby_footprints import NEAR
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.tables.column import (
     Column,
+    FLAG,
     NUMBER,
     RUN,
     step_columns,
@@ -64,7 +65,9 @@ CROSSINGS = TableDeclaration(
         Column('entered_s', NUMBER, 's', "time at which the second entered it, since the run's "
                'start', FOOTPRINTS),
         Column('pet_s', NUMBER, 's', 'post-encroachment time: from when the first had left it; '
-               '0 if it had not', FOOTPRINTS)))
+               '0 if it had not', FOOTPRINTS),
+        Column('is_estimate', FLAG, '', 'whether the second was still in the area at the end of '
+               'the run: the rest of its path is taken as straight ahead')))
 
 
 def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
@@ -74,18 +77,25 @@ def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
 
     :raises InputError: if its scenario cannot be used.
     """
-    collected = _Collected(run, pairs, crossings)
-    criticality = measure_log(run.record.log, progress=progress,
-                              on_tick=collected.add)
+    collected = _Collected(run, pairs)
+    criticality = measure_log(run.record.log, progress=progress, on_tick=collected.add)
     collected.flush()
+    found = criticality.crossings
+    if found:
+        crossings.add({
+            'run': run.id, 'first': [criticality.ids[each.first] for each in found],
+            'second': [criticality.ids[each.second] for each in found],
+            'entered_s': [each.entered_s for each in found],
+            'pet_s': [each.pet_s for each in found],
+            'is_estimate': [each.is_estimate for each in found]})
     run.criticality = {found.vehicle_id: found for found in criticality.report()}
 
 
 class _Collected:
     """A buffer of rows of pairs, written in larger pieces."""
 
-    def __init__(self, run: TableRun, pairs: TableRows, crossings: TableRows) -> None:
-        self._run, self._pairs, self._crossings = run, pairs, crossings
+    def __init__(self, run: TableRun, pairs: TableRows) -> None:
+        self._run, self._pairs = run, pairs
         self._ids: pa.Array | None = None
         self._steps: list[tuple[int, int, int]] = []
         self._others: list[Any] = []
@@ -102,13 +112,6 @@ class _Collected:
             self._others.append(others)
             self._values.append(values)
             self._rows += len(others)
-        if criticality.new_crossings:
-            found = criticality.new_crossings
-            self._crossings.add({
-                'run': self._run.id, 'first': [criticality.ids[each.first] for each in found],
-                'second': [criticality.ids[each.second] for each in found],
-                'entered_s': [each.entered_s for each in found],
-                'pet_s': [each.pet_s for each in found]})
         if self._rows >= _BUFFERED_ROWS:
             self.flush()
 

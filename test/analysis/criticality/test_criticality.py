@@ -141,6 +141,42 @@ def test_two_cars_at_any_heading(cut_in: LoadedScenario) -> None:
         assert np.isinf(beside[[COLUMN[name] for name in ('ttc', 'ttc_a', 'ttc_2d')]]).all()
 
 
+@pytest.mark.parametrize('radius', [15.0, -15.0, 40.0])
+def test_two_cars_on_a_bend(cut_in: LoadedScenario, radius: float) -> None:
+    """
+    Along the path both drive at their speeds, wherever their corners are.
+
+    On a circle every corner of a car keeps its angular velocity. The inner front corner is the
+    furthest along the path, the inner rear corner the least far.
+    """
+    angles = np.linspace(0.0, np.pi, 400)
+    sides = [np.column_stack((abs(radius) * np.sin(angles), radius - np.sign(radius)
+                              * (abs(radius) - np.sign(radius) * d) * np.cos(angles)))
+             for d in (1.75, 0.0, -1.75)]
+    # d is to the left: towards the centre of a left bend.
+    network = LaneletNetwork.create_from_lanelet_list([Lanelet(*sides, 7)])
+    criticality = Criticality(_run(_with_network(cut_in, network), [_car('av0', Role.AUTONOMOUS)],
+                                   [_car('o1', Role.RECORDED)]))
+    speeds = (9.0, 5.0)
+    for n, lapse_s in ((0, 0.0), (10, 0.1)):
+        turned = np.array([(0.4 * abs(radius) + 2.0 + speeds[0] * lapse_s) / abs(radius),
+                           (0.4 * abs(radius) + 18.0 + speeds[1] * lapse_s) / abs(radius)])
+        poses = np.column_stack((abs(radius) * np.sin(turned), radius * (1.0 - np.cos(turned)),
+                                 np.sign(radius) * turned))
+        state = _state(poses[0], speeds[0], 0.0)
+        state[StateColumn.YAW_RATE] = speeds[0] / radius
+        rates = np.array([(speeds[1] * np.cos(poses[1, 2]), speeds[1] * np.sin(poses[1, 2]),
+                           speeds[1] / radius)])
+        criticality.observe(n, 0.0, state[None], ObjectStates(poses[1:], rates))
+    tick, = criticality.latest
+    found = {name: tick.values[0, column] for name, column in COLUMN.items()}
+    gap = abs(radius) * (turned[1] - turned[0] - 2.0 * math.atan2(2.25, abs(radius) - 0.9))
+    assert found['gap'] == pytest.approx(gap, rel=1e-3)
+    assert found['thw'] == pytest.approx(gap / 9.0, rel=2e-3)
+    assert found['ttc'] == pytest.approx(gap / 4.0, rel=2e-3)
+    assert found['drac'] == pytest.approx(8.0 / gap, rel=4e-3)
+
+
 def test_the_nearest_in_the_corridor_leads(cut_in: LoadedScenario) -> None:
     """A cone that stands 10 cm into the corridor, not the car behind it, nor a wall beside."""
     cone = ObjectDescription('cone', 'unknown', Role.STATIC, Shape('circle', 0.4, 0.4))

@@ -7,6 +7,7 @@ from crgame_ros.geometry.outline import placed
 import numpy as np
 from numpy.typing import NDArray
 import pytest
+import shapely
 
 Array = NDArray[np.float64]
 LENGTH, WIDTH = 4.0, 2.0
@@ -25,6 +26,9 @@ def _crossings(starts: Array, velocities: Array, seconds: float = 12.0, dt: floa
         centers = (starts + k * dt * velocities) @ rotation + (500.0, -300.0)
         poses = np.column_stack((centers, yaw))
         found += crossings.observe(k * dt, placed(BOX, poses), centers)
+    # On straight paths the estimate at the entry is right.
+    assert [each.pet_s for each in found] == pytest.approx(
+        [each.pet_s for each in crossings.crossings], abs=1e-6)
     return found
 
 
@@ -84,3 +88,58 @@ def test_a_late_one_crosses_no_more() -> None:
     """A path is forgotten after ten seconds; a newcomer has no earlier path."""
     assert not _crossings(np.array([(-20.0, 0.0), (0.0, -110.0)]),
                           np.array([(10.0, 0.0), (0.0, 8.0)]), seconds=20.0)
+
+
+def _arc(time_s: float, speed: float, radius: float) -> tuple[float, float, float]:
+    """Return the pose of a car that comes from the south and turns left by 90° at the origin."""
+    s = speed * (time_s - 6.0)
+    if s < 0.0:
+        return 0.0, s, 0.5 * np.pi
+    angle = min(s / radius, 0.5 * np.pi)
+    rest = max(s - radius * 0.5 * np.pi, 0.0)
+    return (radius * (np.cos(angle) - 1.0) - rest, radius * np.sin(angle), 0.5 * np.pi + angle)
+
+
+def _straight(time_s: float, speed: float, offset: float) -> tuple[float, float, float]:
+    """Return the pose of a car that comes from the north and crosses that turn."""
+    return offset, 40.0 - speed * time_s, -0.5 * np.pi
+
+
+def _outlines(poses: Array) -> Array:
+    return placed(BOX, poses)
+
+
+@pytest.mark.parametrize('dt', [0.04, 0.1, 0.2])
+@pytest.mark.parametrize(('speed', 'radius', 'offset'), [
+    (6.0, 9.0, -3.5), (4.0, 7.0, -4.0), (8.0, 14.0, -7.0), (5.0, 10.0, -8.0)])
+def test_a_second_one_that_turns(speed: float, radius: float, offset: float, dt: float) -> None:
+    """It is what the really swept areas give, at steps of 1 ms, whatever the step of the run."""
+    fine = np.arange(0.0, 14.0, 1e-3)
+    firsts, seconds = (_outlines(np.array([pose(t, *rest) for t in fine])) for pose, rest in (
+        (_straight, (12.0, offset)), (_arc, (speed, radius))))
+    first_area, second_area = (shapely.union_all(shapely.polygons(each[::20]))
+                               for each in (firsts, seconds))
+    for area in (first_area, second_area):
+        shapely.prepare(area)
+    left_s = fine[np.flatnonzero(shapely.intersects(second_area, shapely.polygons(firsts)))[-1]]
+    entered_s = fine[np.flatnonzero(shapely.intersects(first_area, shapely.polygons(seconds)))[0]]
+    detector = EncroachmentDetector(1, np.full(2, RADIUS))
+    for time_s in np.arange(0.0, 14.0, dt):
+        poses = np.array((_straight(time_s, 12.0, offset), _arc(time_s, speed, radius)))
+        detector.observe(time_s, _outlines(poses), poses[:, :2])
+    crossing, = detector.crossings
+    assert not crossing.is_estimate
+    assert crossing.entered_s == pytest.approx(entered_s, abs=0.02)
+    assert crossing.pet_s == pytest.approx(entered_s - left_s, abs=0.03)
+
+
+def test_a_second_one_still_in_the_area_is_estimated() -> None:
+    """Where the run ends before it has left, the rest of its path is taken as straight on."""
+    detector = EncroachmentDetector(1, np.full(2, RADIUS))
+    for time_s in np.arange(0.0, 4.3, 0.1):
+        poses = np.array(((-20.0 + 10.0 * time_s, 0.0, 0.0),
+                          (0.0, -35.0 + 8.0 * time_s, 0.5 * np.pi)))
+        detector.observe(time_s, _outlines(poses), poses[:, :2])
+    crossing, = detector.crossings
+    assert crossing.is_estimate
+    assert crossing.pet_s == pytest.approx(1.7, abs=1e-6)
