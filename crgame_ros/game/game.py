@@ -251,7 +251,8 @@ class TimingSpec:
     :param skip_threshold: lag above which frames are skipped [s].
     :param reset_threshold: lag above which the schedule is re-anchored [s].
     :param warm_up_steps: steps without reset at the start.
-    :param max_catch_up_steps: late steps in a row after which orders are processed anyway.
+    :param max_catch_up_steps: steps in a row without time to spare after which orders are
+        processed anyway.
     :param realign: `time` follows the request's stamp, `nearest` is CRG 16.
     :param sample: `interpolate` between plan states, `floor` is CRG 15.
     """

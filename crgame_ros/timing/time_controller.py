@@ -56,7 +56,6 @@ class TimeController:
         self._start_ns = 0
         self._error_s = 0.0
         self._carry_s = 0.0
-        self._late_in_a_row = 0
         self.n = 0
         self.resets = 0
         self.dropped_s = 0.0
@@ -65,12 +64,6 @@ class TimeController:
     def real_time_factor(self) -> float:
         """Return the simulated seconds per wall second."""
         return self._factor
-
-    @property
-    def serves_orders_now(self) -> bool:
-        """Return whether too many steps in a row were late for orders to wait longer."""
-        late = self._late_in_a_row
-        return late > 0 and late % self._spec.max_catch_up_steps == 0
 
     def start(self, now_ns: int) -> None:
         """Start the schedule: t0 is now, and step 0 has begun."""
@@ -115,7 +108,6 @@ class TimeController:
         self._start_ns = now_ns
         ideal_s = self.n * self._dt_s
         self._error_s = (now_ns - self._anchor_ns) * NS * self._factor - ideal_s
-        self._late_in_a_row = self._late_in_a_row + 1 if self._error_s > self._dt_s else 0
         moved_s = self._reset_if_due()
         effective_s = self._effective(measured_s - moved_s, interval_s)
         return Cycle(self.n, ideal_s + self.dropped_s, ideal_s + self.dropped_s + self._error_s,
@@ -132,7 +124,7 @@ class TimeController:
         self._anchor_ns += dropped / self._factor / NS
         self.dropped_s += dropped
         self.resets += 1
-        self._error_s, self._late_in_a_row = 0.0, 0
+        self._error_s = 0.0
         return dropped
 
     def _effective(self, measured_s: float, given_s: float | None) -> float:

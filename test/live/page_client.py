@@ -91,6 +91,11 @@ class PageClient:
         wait_until(answered, f'a reply to {kind}')
         return found[0]
 
+    def order(self, kind: str, **fields: Any) -> None:
+        """Send a request that must be obeyed."""
+        reply = self.request(kind, **fields)
+        assert reply['ok'], reply
+
     def hold_keys(self, seat: str, keys: list[int]) -> None:
         """Hold throttle, brake, left, right from now on."""
         self._held = {'type': 'input', 'seat': seat, 'keys': keys, 'reverse': 0}

@@ -64,7 +64,7 @@ def page(graph: Graph) -> Iterator[PageClient]:
         for name, seat in client.documents['seats']['seats'].items():
             if seat['source'] == 'cockpit':
                 client.request('release', seat=name)
-        assert client.request('control', action='start')['ok']
+        client.order('control', action='start')
 
 
 def _commands(graph: Graph) -> np.ndarray:
@@ -142,7 +142,7 @@ def test_holding_a_key_drives_and_closing_lets_go(graph: Graph, page: PageClient
 @pytest.mark.clock
 def test_silence_lets_go_too(graph: Graph, page: PageClient) -> None:
     """A page that hangs keeps its connection and its seat, but not the pedals."""
-    assert page.request('claim', seat='hv0')['ok']
+    page.order('claim', seat='hv0')
     page.hold_keys('hv0', [1, 0, 0, 0])
     graph.peer.forget()
     graph.peer.wait_until(
@@ -156,7 +156,7 @@ def test_silence_lets_go_too(graph: Graph, page: PageClient) -> None:
 @pytest.mark.clock
 def test_hands_off_is_immediate(graph: Graph, page: PageClient) -> None:
     """A page sends hands off at blur: the next cycle that gets it has the pedals released."""
-    assert page.request('claim', seat='hv0')['ok']
+    page.order('claim', seat='hv0')
     page.hold_keys('hv0', [1, 0, 1, 0])
     graph.peer.forget()
     graph.peer.wait_until(
@@ -175,14 +175,14 @@ def test_a_seat_changes_hands(graph: Graph, page: PageClient) -> None:
     """A seat is claimed by one page, refused to the other, asked for, handed over, given back."""
     with PageClient(graph.page) as other:
         other.send({'type': 'name', 'name': 'Bob <i>'})
-        assert page.request('claim', seat='hv0')['ok']
+        page.order('claim', seat='hv0')
         refused = other.request('claim', seat='hv0')
         assert not refused['ok'] and 'ask for it' in refused['text']
         assert other.request('ask', seat='hv0')['ok']
         wait_until(lambda: page.seat('hv0')['requests'], 'the request')
         assert page.seat('hv0')['requests'][0]['client'] == other.id
         assert not other.request('hand_over', seat='hv0', to=other.id)['ok']
-        assert page.request('hand_over', seat='hv0', to=other.id)['ok']
+        page.order('hand_over', seat='hv0', to=other.id)
         wait_until(lambda: page.seat('hv0')['offer'] is not None, 'the offer')
         assert page.seat('hv0')['holder'] == page.id
         assert other.request('answer', seat='hv0', accept=True)['ok']
@@ -203,19 +203,19 @@ def test_a_seat_changes_hands(graph: Graph, page: PageClient) -> None:
 
 def test_run_control(graph: Graph, page: PageClient) -> None:
     """The page can pause, step by one tick, set another pace and reset."""
-    assert page.request('control', action='pause')['ok']
+    page.order('control', action='pause')
     wait_until(lambda: page.documents['status']['run'] == 'paused', 'the pause')
     before = page.documents['status']['n']
-    assert page.request('control', action='step')['ok']
+    page.order('control', action='step')
     wait_until(lambda: page.documents['status']['n'] == before + 10, 'ten steps')
-    assert page.request('rate', factor=2.0)['ok']
-    assert page.request('control', action='start')['ok']
+    page.order('rate', factor=2.0)
+    page.order('control', action='start')
     wait_until(lambda: page.documents['status']['run'] == 'running'
                and page.documents['status']['real_time_factor'] == 2.0, 'the double pace')
-    assert page.request('rate', factor=1.0)['ok']
+    page.order('rate', factor=1.0)
     assert not page.request('planner', av='av7', run=False)['ok']
     epoch = page.documents['status']['epoch']
-    assert page.request('control', action='reset')['ok']
+    page.order('control', action='reset')
     wait_until(lambda: page.documents['scene']['time']['epoch'] == epoch + 1, 'the next epoch')
     wait_until(lambda: page.documents['status']['epoch'] == epoch + 1
                and page.documents['status']['run'] == 'running', 'the run of it')
@@ -224,9 +224,9 @@ def test_run_control(graph: Graph, page: PageClient) -> None:
 @pytest.mark.exhaustive
 def test_planner_stop_and_go(graph: Graph, page: PageClient) -> None:
     """The AV's row shows that its planner is stopped, and its plans stop coming."""
-    assert page.request('planner', av='av0', run=False)['ok']
+    page.order('planner', av='av0', run=False)
     wait_until(lambda: _planner(page).get('running') is False, 'the stop')
-    assert page.request('planner', av='av0', run=True)['ok']
+    page.order('planner', av='av0', run=True)
     wait_until(lambda: _planner(page).get('running') is True, 'the go')
 
 
@@ -241,7 +241,7 @@ def test_trigger(graph: Graph, page: PageClient) -> None:
     assert event['name'] == 'box' and event['label'] == 'A <b>box</b> falls'
     assert not page.request('trigger', event='storm')['ok']
     assert page.documents['events']['fired'] == []
-    assert page.request('trigger', event='box')['ok']
+    page.order('trigger', event='box')
     wait_until(lambda: page.documents['events']['fired'], 'the event')
     fired, = page.documents['events']['fired']
     assert (fired['name'], fired['by']) == ('box', 'trigger') and fired['n'] == 10 * fired['k']
@@ -263,16 +263,16 @@ def test_another_game_with_more_vehicles(graph: Graph, page: PageClient) -> None
     wait_until(lambda: page.documents['scene']['time']['epoch'] > before, 'the new game')
     assert [vehicle['id'] for vehicle in page.documents['scene']['vehicles']] \
         == ['hv0', 'av0', 'av1']
-    assert page.request('claim', seat='hv0')['ok']
+    page.order('claim', seat='hv0')
     page.hold_keys('hv0', [0, 0, 0, 0])
-    assert page.request('control', action='start')['ok']
+    page.order('control', action='start')
     wait_until(lambda: page.documents['status']['planners'].get('av1', {}).get('accepted', 0) > 5,
                'plans of the second AV')
     assert graph.launcher.says('planner_node_av1: process')
     assert page.documents['status']['planners']['av1']['planner'] == 'constant-velocity'
     assert page.documents['seats']['seats']['hv0']['driver'] == 'cockpit'
     page.let_go()
-    assert page.request('release', seat='hv0')['ok']
+    page.order('release', seat='hv0')
     steady = next(entry for entry in entries if entry['name'] == 'cut_in.yaml')
     _post(f'{graph.page}api/load', {'id': steady['id'], 'humans': [], 'avs': []})
     wait_until(lambda: len(page.documents['scene']['vehicles']) == 2, 'the first game')
@@ -289,7 +289,7 @@ def _post(url: str, content: dict) -> dict:
 def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
     """After a kill the run keeps its pace, and a new cockpit starts at once."""
     with PageClient(graph.page) as client:
-        assert client.request('claim', seat='hv0')['ok']
+        client.order('claim', seat='hv0')
         client.hold_keys('hv0', [1, 0, 0, 0])
         n = graph.peer.n
         graph.peer.wait_until(lambda: graph.peer.n > n + 50 or graph.peer.n < n, 'half a second')
@@ -309,8 +309,8 @@ def test_a_dead_cockpit_is_replaced_and_the_run_goes_on(graph: Graph) -> None:
         wait_until(lambda: client.seat('hv0')['source'] == 'cockpit'
                    and client.seat('hv0')['holder'] is None, 'the empty seat')
         assert client.seat('hv0')['kept']['name'].startswith('Guest')
-        assert client.request('claim', seat='hv0')['ok']
-        assert client.request('release', seat='hv0')['ok']
+        client.order('claim', seat='hv0')
+        client.order('release', seat='hv0')
 
 
 @pytest.mark.exhaustive
@@ -328,8 +328,8 @@ def test_the_next_port_is_taken_when_one_is_in_use(tmp_path: Path) -> None:
             with PageClient(page) as client:
                 wait_until(lambda: client.documents.get('status', {}).get('run') == 'paused',
                            'the run to wait')
-                assert client.request('claim', seat='hv0')['ok']
-                assert client.request('control', action='start')['ok']
+                client.order('claim', seat='hv0')
+                client.order('control', action='start')
                 client.hold_keys('hv0', [0, 0, 0, 0])
                 assert launcher.wait() == 0
     assert not launcher.says('driver_node')

@@ -49,15 +49,18 @@ class Pacer:
     :param executor: runs the services.
     :param controller: computes when cycles are due.
     :param dt_s: nominal step [s]
+    :param longest: cycles after which orders are served even if no time is left for them.
     """
 
     def __init__(self, executor: SingleThreadedExecutor, controller: TimeController,
-                 dt_s: float) -> None:
+                 dt_s: float, longest: int) -> None:
         self._executor = executor
         self._controller = controller
         # At high rates half a step must be enough, or no service could stop the run.
         self._slack_ns = min(SERVICE_SLACK_NS, 0.5 * dt_s * NS_PER_S)
         self._every = max(1, round(1.0 / dt_s / SERVICE_RATE))
+        self._longest = longest
+        self._unserved = 0
         self._awake_ns = WAKE_UP_NS + (READ_NS if dt_s >= LONG_STEP_S else 0)
         # Due time of the present cycle, and the start of the wait for it, steady clock [ns].
         self.due_ns = 0
@@ -73,9 +76,10 @@ class Pacer:
         self.due_ns = self._controller.deadline_ns()
         self.idle_from_ns = time.monotonic_ns()
         left_ns = self.due_ns - self.idle_from_ns
-        # A loop that is always late must be stoppable too.
-        if (left_ns > self._slack_ns and n % self._every == 0) \
-                or self._controller.serves_orders_now:
+        self._unserved += 1
+        # A loop that is always late, or has hardly any time left, must be stoppable too.
+        if (left_ns > self._slack_ns and n % self._every == 0) or self._unserved >= self._longest:
+            self._unserved = 0
             watch.mark(Phase.SERVICES)
             self._executor.spin_once(timeout_sec=0)
         watch.mark(Phase.WAIT)
@@ -123,7 +127,8 @@ class LiveRun:
         self._inputs.choose(self._answers, None if feed is None else feed.wants)
         self._dt_s = scheduler.dt_s
         self._controller = TimeController(setup.game.timing, self._dt_s)
-        self._pacer = Pacer(executor, self._controller, self._dt_s)
+        self._pacer = Pacer(executor, self._controller, self._dt_s,
+                            setup.game.timing.max_catch_up_steps)
         self._watch = StepWatch()
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
         self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
