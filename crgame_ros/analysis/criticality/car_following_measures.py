@@ -29,12 +29,14 @@ class Ahead(NamedTuple):
     :param number: its index among the others.
     :param gap: from the subject's front to the leader's rear, along the path [m]; negative where
         they overlap along it
+    :param headway: from the subject's front to the leader's front, along the path [m]
     :param front: the subject's corner that is furthest along the path.
     :param rear: the leader's corner that is least far along it.
     """
 
     number: int
     gap: float
+    headway: float
     front: 'Corner'
     rear: 'Corner'
 
@@ -87,6 +89,7 @@ def find_leader(seen: SeenPath, others: FloatArray, radii: FloatArray,
     nearest = int(np.argmin(rear))
     own_corner, corner = s.index(front, 1), int(np.argmin(along[nearest, 1:])) + 1
     return Ahead(int(candidates[nearest]), float(rear[nearest] - front),
+                 float(along[nearest, 1:].max() - front),
                  Corner(own_corner - 1, front, d[own_corner]),
                  Corner(corner - 1, float(along[nearest, corner]), float(aside[nearest, corner])))
 

@@ -21,6 +21,7 @@ from crgame_ros.analysis.criticality.car_following_measures import (
     time_to_collision_accelerating,
 )
 from crgame_ros.analysis.criticality.encroachment import EncroachmentDetector, WayCrossed
+from crgame_ros.analysis.criticality.headways import Following, Headways
 from crgame_ros.analysis.criticality.nearby_footprints import NearbyFootprints, Scene
 from crgame_ros.analysis.criticality.own_path import OwnPaths
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -104,11 +105,13 @@ class TickMeasures(NamedTuple):
     :param others: (P) numbers of those near: driven vehicles, then objects.
     :param values: (P, measures) columns as in `MEASURES`; measures of car following have values
         for the leader only, and are undefined for all others.
+    :param following: how it follows its leader; None without one.
     """
 
     subject: int
     others: NDArray[np.int64]
     values: FloatArray
+    following: Following | None
 
     def worst(self) -> tuple[FloatArray, NDArray[np.int64]]:
         """Return the most critical values and the others' numbers (`most_critical`)."""
@@ -132,6 +135,7 @@ class VehicleCriticality:
     :param worst: by measure; measures that were never defined are missing.
     :param tet_s: time with a ttc below its threshold (TET) [s]; each tick counts as one step
     :param tit: integral of the ttc's amount below its threshold (TIT) [s^2]
+    :param headways: gaps and headways to its leaders, at all ticks.
     :param crossings: crossings with other paths, with their PET.
     """
 
@@ -139,6 +143,7 @@ class VehicleCriticality:
     worst: dict[str, Worst]
     tet_s: float
     tit: float
+    headways: Headways
     crossings: list[WayCrossed]
 
 
@@ -170,7 +175,8 @@ class Criticality:
             for problem in run.problems or (None,) * self.vehicles])
         self._crossings = EncroachmentDetector(self.vehicles, self._footprints.radii)
         self._before: tuple[float, FloatArray] | None = None
-        self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, []) for item in run.vehicles]
+        self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, Headways(), [])
+                       for item in run.vehicles]
         self.n = -1
         self.latest: tuple[TickMeasures, ...] = ()
         self.new_crossings: tuple[WayCrossed, ...] = ()
@@ -251,27 +257,28 @@ class Criticality:
                 subjects, near, scenes, footprints.approach(subjects, near, scenes), strict=True):
             values = np.empty((len(others), len(MEASURES)))
             values[:, :_OF_LEADER], values[:, _OF_LEADER:] = WITHOUT_LEADER, pairs
-            self._follow(subject, others, place, values)
-            found.append(TickMeasures(subject, others, values))
+            following = self._follow(subject, others, place, values)
+            found.append(TickMeasures(subject, others, values, following))
         return tuple(found)
 
     def _follow(self, subject: int, others: NDArray[np.int64], scene: Scene,
-                values: FloatArray) -> None:
-        """Fill in the measures of car following for the leader of the vehicle."""
+                values: FloatArray) -> Following | None:
+        """Fill in the measures of car following for the leader of the vehicle, if there is one."""
         if not len(others):
-            return
+            return None
         poses, outlines = scene.poses, scene.outlines
         seen = self._paths.at(subject, float(poses[subject, 2]), np.concatenate((
             poses[subject, None, :2], outlines[subject], poses[others, :2])))
         leader = find_leader(seen, outlines[others], self._footprints.radii[others],
                              values[:, COLUMN['min_distance']] == 0.0)
         if leader is None:
-            return
+            return None
         (speed, acceleration), (leader_speed, leader_acceleration) = (
             _rates_along(seen.path.line, corner, scene, number) for corner, number in (
                 (leader.front, subject), (leader.rear, int(others[leader.number]))))
         values[leader.number, :_OF_LEADER] = _compute_leader_measures(
             leader.gap, speed, leader_speed, acceleration, leader_acceleration)
+        return Following(leader.gap, leader.headway, speed)
 
     def _sum_up(self, time_s: float) -> None:
         step_s = self._scheduler.time_step_s
@@ -283,6 +290,7 @@ class Criticality:
                 if other >= 0 and (known is None
                                    or MEASURES[name].worst * (value - known.value) > 0.0):
                     found.worst[name] = Worst(value, self.ids[other], time_s)
+            found.headways.add(tick.following, values[COLUMN['ttc']])
             short = self.thresholds.ttc_s - values[COLUMN['ttc']]
             if short > 0.0:
                 found.tet_s += step_s

@@ -32,7 +32,7 @@ def criticality_rows(criticality: Criticality, epoch: int, n: int) -> FloatArray
     :param n: simulation step of the tick.
     """
     blocks = []
-    for subject, others, values in criticality.latest:
+    for subject, others, values, _ in criticality.latest:
         block = np.full((len(others), len(COLUMNS)), np.nan)
         block[:, :len(PLACE_COLUMNS)] = np.column_stack((
             np.broadcast_to((epoch, n, subject), (len(others), 3)), others))

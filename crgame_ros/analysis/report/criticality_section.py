@@ -5,6 +5,7 @@
 from collections.abc import Iterator, Sequence
 
 from crgame_ros.analysis.criticality.criticality import MEASURES, VehicleCriticality
+from crgame_ros.analysis.criticality.headways import SHORT_S
 from crgame_ros.analysis.criticality.thresholds import Thresholds
 from crgame_ros.analysis.report.motion_section import dash_of
 from crgame_ros.analysis.report.run import PLOTTED, ReportRun
@@ -12,7 +13,7 @@ from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
 from crgame_ros.analysis.report.story_moments import is_told, TWICE, WORDS
 from crgame_ros.analysis.report.story_section import moment
-from crgame_ros.analysis.report.text import note, number, plain, table
+from crgame_ros.analysis.report.text import note, number, plain, share, table
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,6 +40,11 @@ def criticality_section(run: ReportRun) -> Section:
         'vehicle', f'TTC below {limits.ttc_s:g} s [s]', 'integral below it [s²]'), [
             (named(run, vehicle.vehicle_id), number(vehicle.tet_s), number(vehicle.tit))
             for vehicle in measured], 'numbers')
+    following = [row for vehicle in measured for row in _headways(run, vehicle)]
+    if following:
+        html += table('Following a leader: gaps bumper to bumper, headways front to front', (
+            'vehicle', 'value', 'mean', 'median', 'unit',
+            *(f'below {limit} s' for limit in SHORT_S)), following, 'numbers')
     crossings = [row for vehicle in measured for row in _crossings(run, vehicle, limits)]
     if crossings:
         html += table('Ways that crossed: post-encroachment time (PET)', (
@@ -70,6 +76,16 @@ def _worst(run: ReportRun, vehicle: VehicleCriticality,
         yield (word, marked(number(worst.value), is_critical(name, worst.value, limits)),
                measure.unit.replace('^2', '²'), named(run, worst.other),
                moment(run, worst.time_s))
+
+
+def _headways(run: ReportRun, vehicle: VehicleCriticality) -> Iterator[Sequence[str]]:
+    if not vehicle.headways.following:
+        return
+    for values, unit in ((vehicle.headways.distances(), 'm'), (vehicle.headways.times(), 's')):
+        for name, each in values.items():
+            shares = (share(part, 1.0) if unit == 's' else '' for part in each.below)
+            yield (named(run, vehicle.vehicle_id), name.replace('_', ' '), number(each.mean),
+                   number(each.median), unit, *shares)
 
 
 def _crossings(run: ReportRun, vehicle: VehicleCriticality,

@@ -137,8 +137,8 @@ def measured_run(name: str, bag: Path | None, record: RunRecord,
 
     def add_step(criticality: Criticality) -> None:
         nonlocal row
-        for subject, _, values in criticality.latest:
-            course[subject, :, row] = _most_critical(values)
+        for tick in criticality.latest:
+            course[tick.subject, :, row] = _most_critical(tick.values)
         row += 1
     found = measure_log(log, progress=lambda part: progress(
         _READ_SHARE + _MEASURE_SHARE * part), on_tick=add_step)

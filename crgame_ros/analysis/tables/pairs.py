@@ -107,7 +107,7 @@ class _Collected:
         if self._ids is None:
             self._ids = pa.array(criticality.ids, TEXT)
         k = self._run.record.log.game.scheduler.k(criticality.n)
-        for subject, others, values in criticality.latest:
+        for subject, others, values, _ in criticality.latest:
             self._steps.append((k, subject, len(others)))
             self._others.append(others)
             self._values.append(values)

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of driven vehicles: driver, distance, scores, and worst moments."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+import math
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
+from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
@@ -19,7 +21,10 @@ import numpy as np
 
 REAR_AXLE = 'rear axle'
 AT_STEPS = 'at the scenario steps'
+NO_LEADER = 'it followed no leader'
 NEVER_NEAR = 'it was never defined: no other was near'
+# A shorter time to collision counts as this one in 1 / ttc, which is infinite in a contact [s].
+LEAST_TTC_S = 0.1
 HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
 # Keys of `timing.json`, with the meaning of each count.
 COUNTS = {
@@ -65,12 +70,55 @@ def _criticality(run: TableRun) -> Mapping[str, Sequence[Any]]:
         columns[f'worst_{name}_of'] = [None if each is None else each.other for each in worst]
         columns[f'worst_{name}_time_s'] = [None if each is None else each.time_s
                                            for each in worst]
+    columns['max_inverse_ttc'] = [
+        None if each is None else 0.0 if (least := each.worst.get('ttc')) is None
+        else 1.0 / max(least.value, LEAST_TTC_S) for each in found]
     columns['tet_s'] = [None if each is None else each.tet_s for each in found]
     columns['tit'] = [None if each is None else each.tit for each in found]
     columns['crossings'] = [None if each is None else len(each.crossings) for each in found]
     columns['worst_pet_s'] = [None if each is None else min(
         (crossing.pet_s for crossing in each.crossings), default=None) for each in found]
     return columns
+
+
+def _following(run: TableRun) -> Mapping[str, Sequence[Any]]:
+    found = [run.criticality.get(item.id) for item in run.record.log.vehicles]
+    columns: dict[str, list[Any]] = {column.name: [] for column in FOLLOWING_COLUMNS}
+    for each in found:
+        row: dict[str, Any] = dict.fromkeys(columns)
+        if each is not None:
+            headways = each.headways
+            row['share_following'] = headways.share_following()
+            row['share_approaching'] = headways.share_approaching()
+            for name, values in headways.distances().items():
+                row[f'{name}_mean'], row[f'{name}_median'] = values.mean, values.median
+            for name, values in headways.times().items():
+                row[f'{name}_mean_s'], row[f'{name}_median_s'] = values.mean, values.median
+                for limit, share in zip(SHORT_S, values.below, strict=True):
+                    row[f'{name}_below_{limit}_s'] = share
+        for name, value in row.items():
+            columns[name].append(None if value is None or math.isnan(value) else value)
+    return columns
+
+
+def _following_columns() -> Iterator[Column]:
+    """Yield the columns on gaps (bumper to bumper) and headways (front to front)."""
+    yield Column('share_following', NUMBER, '1', 'share of its steps with a leader')
+    yield Column('share_approaching', NUMBER, '1', 'share of its steps on which it was closing '
+                 'in on its leader, with a finite ttc')
+    for name, what in (('gap', 'gap to the leader'), ('headway', 'headway: from its front to the '
+                                                      "leader's front")):
+        for kind in ('mean', 'median'):
+            yield Column(f'{name}_{kind}', NUMBER, 'm', f'{kind} {what}', FOOTPRINTS,
+                         'over the steps with a leader', NO_LEADER)
+    moving = f'over the steps with a leader at more than {LEAST_SPEED:g} m/s'
+    for name, what in (('time_gap', 'gap'), ('time_headway', 'headway, front to front,')):
+        for kind in ('mean', 'median'):
+            yield Column(f'{name}_{kind}_s', NUMBER, 's', f'{kind} {what} divided by its speed',
+                         FOOTPRINTS, moving, NO_LEADER)
+        for limit in SHORT_S:
+            yield Column(f'{name}_below_{limit}_s', NUMBER, '1', f'share of the time with a {what}'
+                         f' divided by its speed, below {limit} s', FOOTPRINTS, moving, NO_LEADER)
 
 
 def _worst_columns() -> list[Column]:
@@ -104,6 +152,7 @@ def _planning(run: TableRun) -> Mapping[str, Sequence[Any]]:
         'latency_max_s': [None if each is None else max(each) for each in latencies]}
 
 
+FOLLOWING_COLUMNS = tuple(_following_columns())
 VEHICLE_PARTS = (
     TablePart((
         RUN, Column('id', TEXT, '', 'of the vehicle'),
@@ -128,6 +177,9 @@ VEHICLE_PARTS = (
                'it drives forwards', REAR_AXLE, AT_STEPS)), _drive),
     TablePart((
         *_worst_columns(),
+        Column('max_inverse_ttc', NUMBER, '1/s', 'greatest 1 / ttc; 0 if it never approached a '
+               'leader, so that means over vehicles count it', FOOTPRINTS,
+               f'a ttc below {LEAST_TTC_S:g} s, as in a contact, counts as {LEAST_TTC_S:g} s'),
         Column('tet_s', NUMBER, 's', f'time with a ttc below {USUAL.ttc_s:g} s', FOOTPRINTS,
                'each step that it is below counts in full'),
         Column('tit', NUMBER, 's^2', f'integral of what the ttc is below {USUAL.ttc_s:g} s',
@@ -135,6 +187,7 @@ VEHICLE_PARTS = (
         Column('crossings', INTEGER, '1', 'rows of crossings with it'),
         Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
                empty='it crossed no other path')), _criticality),
+    TablePart(FOLLOWING_COLUMNS, _following),
     TablePart((
         *(Column(f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key, INTEGER,
                  '1', what, variant='as the engine told last', empty=UNRECORDED)

@@ -21,8 +21,9 @@ import pyarrow.parquet as pq
 
 # Columns of the vehicles' tables that are compared directly.
 COMPARED = ('distance', 'mean_speed', 'max_speed', 'min_acceleration', 'worst_gap', 'worst_ttc',
-            'worst_thw', 'worst_drac', 'worst_min_distance', 'worst_pet_s', 'tet_s', 'tit',
-            'score_nuplan', 'score_no_collision_at_fault', 'score_progress', 'score_comfort')
+            'worst_thw', 'max_inverse_ttc', 'time_gap_median_s', 'worst_drac',
+            'worst_min_distance', 'worst_pet_s', 'tet_s', 'tit', 'score_nuplan',
+            'score_no_collision_at_fault', 'score_progress', 'score_comfort')
 RECORDED, RERUN = 'recorded', 'rerun'
 COMPARISON = 'comparison'
 FILE = f'{COMPARISON}.csv'

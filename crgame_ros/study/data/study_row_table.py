@@ -18,7 +18,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 _SUFFIXES = {'s': 's', 'm': 'm', 'm/s': 'm_per_s', 'm/s^2': 'm_per_s2', 'm/s^3': 'm_per_s3',
-             's^2': 's2', '1/min': 'per_min', 'rad': 'rad', 'rad/s': 'rad_per_s', 'Hz': 'hz'}
+             's^2': 's2', '1/s': 'per_s', '1/min': 'per_min', 'rad': 'rad',
+             'rad/s': 'rad_per_s', 'Hz': 'hz'}
 _ASKED = 'it was not answered'
 SHARED = 'of a questionnaire'
 
