@@ -95,7 +95,7 @@ def _following(run: TableRun) -> Mapping[str, Sequence[Any]]:
             for name, values in headways.times().items():
                 row[f'{name}_mean_s'], row[f'{name}_median_s'] = values.mean, values.median
                 for limit, share in zip(SHORT_S, values.below, strict=True):
-                    row[f'{name}_below_{limit}_s'] = share
+                    row[f'{name}_below_{limit}s'] = share
         for name, value in row.items():
             columns[name].append(None if value is None or math.isnan(value) else value)
     return columns
@@ -117,7 +117,7 @@ def _following_columns() -> Iterator[Column]:
             yield Column(f'{name}_{kind}_s', NUMBER, 's', f'{kind} {what} divided by its speed',
                          FOOTPRINTS, moving, NO_LEADER)
         for limit in SHORT_S:
-            yield Column(f'{name}_below_{limit}_s', NUMBER, '1', f'share of the time with a {what}'
+            yield Column(f'{name}_below_{limit}s', NUMBER, '1', f'share of the time with a {what}'
                          f' divided by its speed, below {limit} s', FOOTPRINTS, moving, NO_LEADER)
 
 

@@ -26,7 +26,7 @@ _LONGEST_NAME = 60
 # The driving measures that are shown, by their names in the table of vehicles; the others are
 # only in the tables.
 SHOWN = ('mean_speed', 'max_speed', 'min_acceleration', 'max_inverse_ttc',
-         'share_approaching', 'worst_thw', 'time_gap_median_s', 'time_gap_below_1_s',
+         'share_approaching', 'worst_thw', 'time_gap_median_s', 'time_gap_below_1s',
          'worst_min_distance', 'worst_drac', 'worst_pet_s', 'tet_s', 'drive_sdlp',
          'drive_lane_changes', 'drive_srr_visual', 'drive_tlc_min', 'drive_time_above_limit',
          'drive_jerk_sd', 'drive_throttle_mean', 'drive_brake_mean', 'score_comfort')

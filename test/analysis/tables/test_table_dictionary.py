@@ -14,7 +14,7 @@ from crgame_ros.analysis.tables.run_tables import TABLES
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-UNITS = {'m/s^3', '1/min', '', '1', 'm', 's', 'rad', 'Hz', 'm/s', 'm/s^2', 'rad/s', 's^2',
+UNITS = {'m/s^3', '1/s', '1/min', '', '1', 'm', 's', 'rad', 'Hz', 'm/s', 'm/s^2', 'rad/s', 's^2',
          'ms'}
 
 
