@@ -3,7 +3,6 @@
 """recorder_node: the recording of each run's topics into one MCAP bag, as raw messages."""
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -57,11 +56,6 @@ class RecordedTopic:
         """Return whether late joiners get the latest message."""
         return self.topic.qos.durability == 'transient_local'
 
-    def drain(self) -> Iterator[tuple[bytes, int, int]]:
-        """Remove and yield all waiting messages, with the times of publication and reception."""
-        while (taken := self.slot.pop_timed()) is not None:
-            yield taken
-
 
 class RecorderNode(Node):
     """The node that writes serialised messages as they come; it opens a bag for each new game."""
@@ -112,24 +106,18 @@ class RecorderNode(Node):
             self._close()
 
     def _work(self) -> None:
-        # Without a bag, only the clock is read: the messages of other topics wait for the bag.
-        waiting = [(recorded, *taken) for name, recorded in list(self._topics.items())
-                   if not recorded.latched and (self._writer is not None or name == CLOCK_TOPIC)
-                   for taken in recorded.drain()]
-        # The game of each of these messages has come by now. It is read after the other
-        # documents, so that a new bag begins with those that belong to it.
-        for recorded in [item for item in self._topics.values()
-                         if item.latched and item.name != GAME_TOPIC]:
-            for document in recorded.drain():
-                self._receive(recorded, *document)
-        game = self._topics[GAME_TOPIC]
-        for data, published_ns, received_ns in game.drain():
-            # What was published before a new game belongs to the previous run, all else to the
-            # new one, even if this node was too busy to read either in time.
-            self._receive_all([item for item in waiting if item[2] < published_ns])
-            waiting = [item for item in waiting if item[2] >= published_ns]
-            self._receive(game, data, published_ns, received_ns)
-        self._receive_all(waiting)
+        # A new game comes after the last message of the previous run. The first message of its own
+        # run comes once this node has opened a bag for it. So data are read first, then documents.
+        if self._writer is not None:
+            for recorded in list(self._topics.values()):
+                if not recorded.latched:
+                    self._write_waiting(recorded)
+        else:
+            self._write_waiting(self._topics[CLOCK_TOPIC])
+        # The game is read last, so that a new bag begins with the documents that belong to it.
+        latched = [recorded for recorded in self._topics.values() if recorded.latched]
+        for recorded in sorted(latched, key=lambda item: item.name == GAME_TOPIC):
+            self._write_waiting(recorded)
         if self._writer is not None:
             try:
                 self._writer.flush_if_due()
@@ -165,27 +153,23 @@ class RecorderNode(Node):
                         subject: str = 'recording') -> None:
         self._endpoints.diagnostics.publish(f'recorder_node: {subject}', level, text, values)
 
-    def _receive_all(self, messages: list[tuple[RecordedTopic, bytes, int, int]]) -> None:
-        for message in messages:
-            self._receive(*message)
-
-    def _receive(self, recorded: RecordedTopic, data: bytes, published_ns: int,
-                 received_ns: int) -> None:
-        """Record one message, and follow the run by it."""
-        if recorded.latched:
-            recorded.latest = (data, published_ns, received_ns)
-            if recorded.name == GAME_TOPIC and data != self._game_text:
-                self._begin_bag(data)
-                return
-        elif recorded.name == CLOCK_TOPIC:
-            self._heard_s = time.monotonic()
-            stamp_ns = header_stamp_ns(data)
-            self._endpoints.diagnostics.now_ns = stamp_ns
-            self._follow(stamp_ns)
-        elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
-                and b'ended' in data:
-            self._note_end(data)
-        self._write(recorded, data, published_ns, received_ns)
+    def _write_waiting(self, recorded: RecordedTopic) -> None:
+        while (taken := recorded.slot.pop_timed()) is not None:
+            data, published_ns, received_ns = taken
+            if recorded.latched:
+                recorded.latest = (data, published_ns, received_ns)
+                if recorded.name == GAME_TOPIC and data != self._game_text:
+                    self._begin_bag(data)
+                    continue
+            elif recorded.name == CLOCK_TOPIC:
+                self._heard_s = time.monotonic()
+                stamp_ns = header_stamp_ns(data)
+                self._endpoints.diagnostics.now_ns = stamp_ns
+                self._follow(stamp_ns)
+            elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
+                    and b'ended' in data:
+                self._note_end(data)
+            self._write(recorded, data, published_ns, received_ns)
 
     def _follow(self, clock_ns: int) -> None:
         """Open another bag where time has run back: a recording is played again."""
@@ -232,7 +216,9 @@ class RecorderNode(Node):
             self._offset_ns, self._ended_s = offset_ns, None
             self._time = RunTime()
             self._closed = None
+            # Reported at once, without a topic: the simulation waits for the bag.
             self._recorded.clear()
+            self._recorded_told = False
             for recorded in self._topics.values():
                 qos = recorded.topic.qos
                 recorded.channel = self._writer.add_topic(

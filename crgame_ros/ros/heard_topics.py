@@ -14,7 +14,8 @@ class HeardTopics:
     """
     The recorder's reports while a run waits for its start.
 
-    Two companions may not have discovered each other yet, though the simulation has discovered
+    A message that comes before the bag of its run is open is recorded with the previous run, if
+    there is one. And two companions may not have discovered each other yet, though the simulation has discovered
     both. The recording would then lack the messages of one.
 
     :param endpoints: of sim_node.
@@ -27,15 +28,23 @@ class HeardTopics:
         self._slot = endpoints.polled('/diagnostics')
         self._names: set[str] = set()
 
+    def has_begun(self) -> bool:
+        """Return whether the recorder has opened a bag for the run."""
+        self._listen()
+        return bool(self._names)
+
     def missing(self, wanted: set[str]) -> set[str]:
         """Return the topics from which the recorder has no message yet."""
+        self._listen()
+        return wanted - self._names
+
+    def _listen(self) -> None:
         while (message := self._slot.pop()) is not None:
             for status in message.status:
                 values = read_status(status).values
                 if status.name == f'recorder_node: {RECORDED}' \
                         and values.get(OFFSET) == self._offset:
                     self._names.update(values)
-        return wanted - self._names
 
     def close(self) -> None:
         """Release the subscription."""

@@ -26,6 +26,8 @@ class StartGate:
     """
     The gate that publishes step 0 once all companions are connected, then awaits their answers.
 
+    The recorder must have opened the bag of the run, too.
+
     Answers are plans and commands.
 
     Discovery is not the same on both sides: a subscription that the publisher knows may itself
@@ -79,7 +81,7 @@ class StartGate:
         :param timeout_s: after this long the run starts without those that are missing [s]
         """
         self._began_ns = self._began_ns or now_ns
-        if not self._connected and not self._outputs.missing(self._companions):
+        if not self._connected and not self._missing():
             self._publish(now_ns)
         if self._connected:
             self._listen(now_ns)
@@ -87,6 +89,12 @@ class StartGate:
             self._time_out(now_ns, timeout_s)
         return self._connected and not self._planners and not self._seats \
             and self._traffic_answers is None and not self._unrecorded
+
+    def _missing(self) -> list[str]:
+        """Return who must be there before the first message of the run."""
+        companions = sorted(self._outputs.missing(self._companions))
+        return companions if companions or self._heard is None or self._heard.has_begun() \
+            else ['the bag of recorder_node']
 
     def _publish(self, now_ns: int) -> None:
         self._connected = True
@@ -128,7 +136,7 @@ class StartGate:
             self._unrecorded.pop(seat_id, None)
 
     def _time_out(self, now_ns: int, timeout_s: float) -> None:
-        missing = [] if self._connected else sorted(self._outputs.missing(self._companions))
+        missing = [] if self._connected else self._missing()
         missing += [f'the planner of {av_id}' for av_id in sorted(self._planners)]
         missing += ['the traffic'] if self._traffic_answers is not None else []
         missing += [f'a record of {topic}' for topic in self._unrecorded.values()
