@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+import json
 
 import pyarrow as pa
 
@@ -69,7 +70,17 @@ class TableDeclaration:
         self.schema = pa.schema([
             pa.field(column.name, column.type, nullable=column.name not in key,
                      metadata=column.notes) for column in self.columns],
-            metadata={'row': row, 'key': ','.join(key)})
+            metadata={'row': row, 'key': ','.join(key), 'pandas': _pandas_types(self.columns)})
+
+
+def _pandas_types(columns: Iterable[Column]) -> str:
+    """Return what lets pandas read integers and flags with gaps as such."""
+    types = {INTEGER: ('int64', 'Int64'), FLAG: ('bool', 'boolean')}
+    return json.dumps({
+        'index_columns': [], 'column_indexes': [], 'pandas_version': '2.0.0',
+        'columns': [{'name': column.name, 'field_name': column.name, 'metadata': None,
+                     'pandas_type': types[column.type][0], 'numpy_type': types[column.type][1]}
+                    for column in columns if column.type in types]})
 
 
 RUN = Column('run', TEXT, '', "the run: its folder's name, a colon and its epoch, which counts "

@@ -5,6 +5,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 import csv
+import math
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -103,6 +104,8 @@ PIECE_ROWS = 65_536
 # Text that spreadsheets would read as a formula gets this prefix (OWASP, CSV injection).
 FORMULA_BEGINS, FORMULA_GUARD = ('=', '+', '-', '@', '\t', '\r'), "'"
 NOT_A_NUMBER = 'NaN'
+# Beyond all numbers: every reader takes it for infinite. DuckDB takes inf for a date.
+INFINITE = '1e999'
 
 
 class TableWriter(TableRows):
@@ -110,7 +113,7 @@ class TableWriter(TableRows):
     A writer of the rows of one table.
 
     Numbers that are NaN and texts that are empty are missing: null in Parquet; in CSV `NaN` and an
-    empty field. CSV is RFC 4180, UTF-8; infinite numbers are inf and -inf.
+    empty field. CSV is RFC 4180, UTF-8; infinite numbers are 1e999 and -1e999.
 
     :param declaration: the table.
     :param path: path of the file to write; for Parquet also an open stream.
@@ -174,9 +177,10 @@ def _spelled(column: pa.Array) -> list[Any]:
     """Return a column's values as in CSV."""
     values: list[Any] = column.to_pylist()
     if column.type == NUMBER:
-        # Full precision, always with a point, an exponent or as inf, so that none looks like an
-        # integer.
-        return [NOT_A_NUMBER if value is None else value for value in values]
+        # Full precision, always with a point or an exponent, so that none looks like an integer.
+        return [NOT_A_NUMBER if value is None
+                else value if math.isfinite(value)
+                else INFINITE if value > 0.0 else f'-{INFINITE}' for value in values]
     if column.type == TEXT:
         return [FORMULA_GUARD + text if text and text.startswith(FORMULA_BEGINS) else text
                 for text in values]
