@@ -15,8 +15,8 @@ class HeardTopics:
     The recorder's reports while a run waits for its start.
 
     A message that comes before the bag of its run is open is recorded with the previous run, if
-    there is one. And two companions may not have discovered each other yet, though the simulation has discovered
-    both. The recording would then lack the messages of one.
+    there is one. And two companions may not have discovered each other yet, though the simulation
+    has discovered both. The recording would then lack the messages of one.
 
     :param endpoints: of sim_node.
     :param clock_offset_ns: of the run [ns]
