@@ -39,6 +39,8 @@ DRAIN_S = 0.3
 # A simulation that is silent for this long has ended or stands still [s].
 SILENCE_S = 2.0
 CLOCK_TOPIC = '/clock'
+# A run waits for its bag at most this long; until it starts, the bag is reported so often [s].
+AWAITED_S, AGAIN_S = 10.0, 0.2
 
 
 @dataclass
@@ -76,7 +78,8 @@ class RecorderNode(Node):
         self._game_text = b''
         # Topics with a message in this bag, and whether all of them have been reported.
         self._recorded: set[str] = set()
-        self._recorded_told = True
+        self._recorded_told, self._recorded_told_s = True, -math.inf
+        self._begun_s = -math.inf
         self._heard_s = -math.inf
         self._report_s = 0.0
         self._time = RunTime()
@@ -125,15 +128,23 @@ class RecorderNode(Node):
                 self._report_failure(error)
             if self._ended_s is not None and time.monotonic() - self._ended_s > DRAIN_S:
                 self._close()
-        if not self._recorded_told:
+        if not self._recorded_told or self._is_awaited:
             self._publish_recorded()
         if time.monotonic() - self._report_s > REPORT_S:
             self._report_s = time.monotonic()
             self._report(self._writer)
 
+    @property
+    def _is_awaited(self) -> bool:
+        """Return whether the simulation may wait for the bag, and is to be told of it again."""
+        now_s = time.monotonic()
+        return self._writer is not None and now_s - self._begun_s < AWAITED_S \
+            and now_s - self._recorded_told_s > AGAIN_S \
+            and self._endpoints.diagnostics.now_ns <= self._offset_ns
+
     def _publish_recorded(self) -> None:
         """Publish the topics whose messages arrive: a run begins when those of all nodes do."""
-        self._recorded_told = True
+        self._recorded_told, self._recorded_told_s = True, time.monotonic()
         self._publish_status(DiagnosticStatus.OK, RECORDED, {
             OFFSET: self._offset_ns, **dict.fromkeys(sorted(self._recorded), 1)}, RECORDED)
 
@@ -216,9 +227,8 @@ class RecorderNode(Node):
             self._offset_ns, self._ended_s = offset_ns, None
             self._time = RunTime()
             self._closed = None
-            # Reported at once, without a topic: the simulation waits for the bag.
             self._recorded.clear()
-            self._recorded_told = False
+            self._begun_s = time.monotonic()
             for recorded in self._topics.values():
                 qos = recorded.topic.qos
                 recorded.channel = self._writer.add_topic(

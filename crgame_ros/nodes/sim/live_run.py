@@ -146,6 +146,9 @@ class LiveRun:
     def run(self, stop: StopFlag) -> Outcome:
         """Run until the game's end, a reset or a stop."""
         self._stop = stop
+        # Before the documents, upon which the recorder opens its bag and reports it.
+        heard = HeardTopics(Endpoints(self._node), self.simulation.scheduler.clock_offset_ns) \
+            if 'recorder_node' in self._control.companions else None
         self._outputs.publish_documents(
             self._epoch, self.simulation.scheduler.clock_offset_ns,
             self._control.real_time_factor)
@@ -153,7 +156,7 @@ class LiveRun:
         result = self.simulation.begin()
         if self._epoch:
             self._settle()
-        outcome = self._wait_for_companions(result)
+        outcome = self._wait_for_companions(result, heard)
         if outcome is not None:
             self._reason = self._reason or outcome.reason(self._stop.requested)
             self._state.publish('ended', self._reason)
@@ -206,12 +209,11 @@ class LiveRun:
         while time.monotonic_ns() < until_ns:
             self._executor.spin_once(timeout_sec=0.02)
 
-    def _wait_for_companions(self, result: StepResult) -> Outcome | None:
+    def _wait_for_companions(self, result: StepResult,
+                             heard: HeardTopics | None) -> Outcome | None:
         """Stay at step 0 until all companions are connected, or an order ends the run."""
         control = self._control
         self._state.publish('waiting')
-        heard = HeardTopics(Endpoints(self._node), self.simulation.scheduler.clock_offset_ns) \
-            if 'recorder_node' in control.companions else None
         gate = StartGate(self._outputs, self._inputs, self.simulation, result,
                          control.companions, self._accept_plan, self._node.get_logger().warning,
                          None if self._feed is None else self._feed.is_ahead, heard)
