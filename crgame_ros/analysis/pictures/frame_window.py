@@ -81,7 +81,8 @@ def all_poses(log: RunTrajectories, rows: Sequence[int]) -> FloatArray:
 def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence[str] = (), *,
                    standing: bool | None = None, reach: float = REACH,
                    least: float = LEAST_LENGTH,
-                   road: Callable[[FrameWindow], tuple[float, float]] | None = None
+                   road: Callable[[FrameWindow], tuple[float, float]] | None = None,
+                   heading: Callable[[float, float, float], float] | None = None
                    ) -> tuple[FrameWindow, ...]:
     """
     Return the windows of one figure's frames, which show the driven and the named vehicles.
@@ -95,6 +96,8 @@ def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence
     :param least: least length of a window [m]
     :param road: returns the range of the road across a window [m]; if the window is higher than
         needed, it is centred on the road rather than on the vehicles.
+    :param heading: returns the road's heading [rad] at x, y and yaw of a vehicle; None to align
+        windows with the vehicle in focus.
     :return: windows of one size.
     :raises InputError: if the run has no driven vehicle.
     """
@@ -104,9 +107,11 @@ def series_windows(log: RunTrajectories, rows: Sequence[int], vehicles: Sequence
               if item.role.is_ego or item.id in vehicles]
     corners = footprints([log.descriptions[i] for i in wanted], poses[:, wanted])
     near = np.hypot(*np.moveaxis(poses[:, wanted, :2] - poses[:, focus, None, :2], -1, 0)) <= reach
-    middle = np.broadcast_to(poses[len(rows) // 2, focus], (len(rows), 3))
-    for centers in (middle, poses[:, focus]) if standing is None else (
-            middle if standing else poses[:, focus],):
+    own = poses[:, focus].copy()
+    if heading is not None:
+        own[:, 2] = [heading(*place) for place in own.tolist()]
+    middle = np.broadcast_to(own[len(rows) // 2], (len(rows), 3))
+    for centers in (middle, own) if standing is None else (middle if standing else own,):
         seen = np.concatenate([
             ((each[row] - centers[row, :2]) @ _turn(centers[row, 2]))
             for i, each in enumerate(corners) for row in range(len(rows)) if near[row, i]])

@@ -25,6 +25,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.recording.recorded_plans import read_plans
 from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.surface import (
     lanelet_polygons,
     polygons_of,
@@ -259,6 +260,7 @@ class FrameScene:
         network = parse_scenario(log.xml_text, '/scenario/xml').scenario.lanelet_network
         places = log.vehicle_states[:, :, :2].reshape(-1, 2)
         low, high = places.min(axis=0) - 2.0 * REACH, places.max(axis=0) + 2.0 * REACH
+        self._lanes = RoadNetwork(network)
         self.road = PicturedRoad(network, (*low.tolist(), *high.tolist()))
         self._reaches = np.array([item.shape.radius + abs(item.rear_to_center)
                                   for item in log.descriptions])
@@ -295,7 +297,18 @@ class FrameScene:
                 least: float = LEAST_LENGTH) -> tuple[FrameWindow, ...]:
         """Return windows as `series_windows` does, fitted to the available road."""
         return series_windows(self.log, rows, vehicles, standing=standing, reach=reach,
-                              least=least, road=self.road.across)
+                              least=least, road=self.road.across,
+                              heading=self._road_heading)
+
+    def _road_heading(self, x: float, y: float, yaw: float) -> float:
+        """Return the heading of the lane of a vehicle, as it drives along it; off the road yaw."""
+        lanelet = self._lanes.lanelet_at(x, y, yaw)
+        if lanelet is None:
+            return yaw
+        line = self._lanes.line(lanelet)
+        s, _ = line.project(np.array([(x, y)]))
+        heading = line.place(float(s[0]))[3]
+        return heading if math.cos(heading - yaw) >= 0.0 else heading + math.pi
 
     def row(self, k: int) -> int:
         """

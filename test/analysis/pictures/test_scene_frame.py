@@ -142,6 +142,16 @@ def test_a_camera_goes_along_where_one_stretch_is_too_long(cut_in: RunRecord) ->
     np.testing.assert_allclose(away, [away[0]] * 3, atol=1e-9)
 
 
+def test_a_window_lies_along_the_road(cut_in_scene: FrameScene) -> None:
+    """Not along the vehicle in focus, which turns while it changes the lane."""
+    log = cut_in_scene.log
+    yaws = log.vehicle_states[:, 0, 2]
+    windows = cut_in_scene.windows(range(len(log.ks)), [log.vehicles[0].id], standing=False)
+    assert np.ptp(yaws) > 0.02
+    assert np.ptp([window.yaw for window in windows]) < 1e-3
+    assert windows[0].yaw == pytest.approx(float(yaws[0]), abs=0.02)
+
+
 def test_names_stand_beside_their_vehicles_and_on_none(two_avs: RunRecord) -> None:
     """One name each, whose middle is in no footprint and within 15 m of its vehicle."""
     axes = frames_figure(FrameScene(two_avs.log), two_avs.log.ks[[40]].tolist()).axes[0]
