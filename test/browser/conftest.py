@@ -46,14 +46,18 @@ def only_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.fixture
-def browser(only_browser: Browser) -> Browser:
+def browser(only_browser: Browser) -> Iterator[Browser]:
     """Return a browser of 1280x720 in the state of a new start."""
-    only_browser.renew()
-    return only_browser
+    yield from _renewed(only_browser)
 
 
 @pytest.fixture(scope='module')
-def module_browser(only_browser: Browser) -> Browser:
+def module_browser(only_browser: Browser) -> Iterator[Browser]:
     """Return such a browser once, for all tests of a module."""
-    only_browser.renew()
-    return only_browser
+    yield from _renewed(only_browser)
+
+
+def _renewed(browser: Browser) -> Iterator[Browser]:
+    yield browser
+    # Now rather than before the next use: an open page goes on drawing beside other tests.
+    browser.renew()
