@@ -3,6 +3,7 @@
 """Finding exchangeable classes by name, entry point, module or file; checking their options."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 import importlib
 from importlib.metadata import entry_points
 import importlib.util
@@ -140,7 +141,9 @@ class ModelRegistry:
 
 def module_of_file(path: Path, name: str) -> types.ModuleType:
     """
-    Run a file as a module.
+    Run a file as a module; it finds modules beside itself first, as a script does.
+
+    These stay its own: another file gets those beside it, even if they have the same names.
 
     :param name: of the module.
     :raises Exception: any exception of the file; the module is then removed.
@@ -150,12 +153,32 @@ def module_of_file(path: Path, name: str) -> types.ModuleType:
     module = importlib.util.module_from_spec(spec)
     # Dataclasses and pickling find their module by name.
     sys.modules[name] = module
+    before = set(sys.modules)
+    folder = path.resolve().parent
+    sys.path.insert(0, str(folder))
     try:
         spec.loader.exec_module(module)
     except Exception:
         del sys.modules[name]
         raise
+    finally:
+        with suppress(ValueError):
+            sys.path.remove(str(folder))
+        beside = {found for found in sys.modules.keys() - before
+                  if '.' not in found and _is_beside(sys.modules[found], folder)}
+        for found in sys.modules.keys() - before:
+            if found.partition('.')[0] in beside:
+                del sys.modules[found]
     return module
+
+
+def _is_beside(module: types.ModuleType, folder: Path) -> bool:
+    """Return whether a module is a file of a folder, or a package in it."""
+    file = getattr(module, '__file__', None)
+    if file is None:
+        return False
+    path = Path(file).resolve()
+    return folder in (path.parent, path.parent.parent if path.name == '__init__.py' else None)
 
 
 def _from_module(target: str, label: str) -> Any:

@@ -141,3 +141,22 @@ def test_planners_without_their_package_say_how_to_get_it(
     assert done.returncode == 2
     assert done.stderr.count('\n') == 1 and package in done.stderr
     assert f'--ignore-requires-python -r {ROOT / "requirements-planners.txt"}' in done.stderr
+
+
+def test_files_with_modules_of_one_name_have_their_own(registry: ModelRegistry,
+                                                       tmp_path: Path) -> None:
+    """Each finds the one beside itself, and none is left for others to find."""
+    found = []
+    for number in (1, 2):
+        folder = tmp_path / str(number)
+        (folder / 'settings_of_it').mkdir(parents=True)
+        (folder / 'straight.py').write_text(
+            f'{CODE}\n\nimport settings_of_it.deep\nfrom pushes_of_it import PUSH\n'
+            'Straight.PUSHES = PUSH, settings_of_it.deep.PUSH\n')
+        (folder / 'pushes_of_it.py').write_text(f'PUSH = {number}\n')
+        (folder / 'settings_of_it' / '__init__.py').touch()
+        (folder / 'settings_of_it' / 'deep.py').write_text(f'PUSH = {10 * number}\n')
+        found.append(registry.find(f'{folder}/straight.py:Straight', 'here'))
+    assert [each.PUSHES for each in found] == [(1, 10), (2, 20)]
+    assert not {'pushes_of_it', 'settings_of_it', 'settings_of_it.deep'} & sys.modules.keys()
+    assert not any(str(tmp_path) in entry for entry in sys.path)

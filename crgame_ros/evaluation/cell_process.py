@@ -246,8 +246,8 @@ def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
     """
     worker = get_worker()
     if cell_of(text).code[0] != engine_digest():
-        raise CrgameError(f'worker {worker.address} has another crgame_ros than this one: install '
-                          'the same there')
+        raise CrgameError(f'worker {worker.address} has another crgame_ros than this one, or '
+                          'other packages: install the same there')
     store = ContentStore(Path(worker.local_directory) / 'crgame-contents')
     for digest, packed in contents.items():
         store.unpack(digest, packed)

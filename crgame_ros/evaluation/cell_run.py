@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Computes one cell: an offline run, and its measures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 import re
 import resource
@@ -124,22 +124,23 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
 
 
 def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
-    """Return failures of planners' code; the cell fails if such a planner never sent a plan."""
+    """Return failures of planners; the cell fails if one of them never sent a plan that counts."""
     told: dict[str, Any] = {}
     for vehicle, record in planners.items():
-        failures = _failures(record)
-        if not failures:
-            continue
-        count, plans = sum(number for _, number in failures), record.statistics.plans
-        first = max(failures, key=lambda item: item[1])[0]
-        if not told:
-            told = {'reason': f'{vehicle}: its planner failed in {count} of {plans} plans: '
-                              f'{first}', 'traceback': record.statistics.failure}
-        if count == plans:
-            told['status'] = 'memory' if 'MemoryError' in first else 'error'
+        plans, statistics = record.statistics.plans, record.statistics
+        failed, refused = ({reason: number for reason, number in statistics.reasons.items()
+                            if bool(_CODE_FAILED.match(reason)) is is_failure}
+                           for is_failure in (True, False))
+        if record.counters.refused:
+            refused[record.counters.last_refusal] = record.counters.refused
+        for reasons, what in ((failed, 'its planner failed in {} plans'),
+                              (refused, '{} plans of its planner were refused')):
+            if reasons and 'reason' not in told:
+                count = what.format(f'{sum(reasons.values())} of {plans}')
+                told |= {'reason': f'{vehicle}: {count}: {max(reasons, key=reasons.__getitem__)}',
+                         'traceback': statistics.failure}
+        if plans and sum(failed.values()) + sum(refused.values()) >= plans:
+            told['status'] = ('refused' if not failed else
+                              'memory' if any('MemoryError' in reason for reason in failed)
+                              else 'error')
     return told
-
-
-def _failures(record: PlannerRecord) -> Sequence[tuple[str, int]]:
-    return [(reason, number) for reason, number in record.statistics.reasons.items()
-            if _CODE_FAILED.match(reason)]

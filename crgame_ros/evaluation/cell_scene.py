@@ -164,14 +164,14 @@ def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:
 
 
 def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
-    """Yield a file, and the files of its folder that it names."""
+    """Yield a file, and the files of its folder that it names or imports, by their paths there."""
     files = [file]
     if key == 'occupancy':
         image = read_map_file(file).image
         if image.resolve().parent != file.resolve().parent:
             raise InputError('its image is in another folder', str(file),
                              'put it beside the map, so that both can travel')
-        files.append(image)
+        files.append(file.parent / image.name)
     files += code_neighbours(file)
     if sum(each.stat().st_size for each in files) > MOST_BYTES:
         raise InputError(f'has more than {MOST_BYTES // 2**20} MiB, with the files it imports',
@@ -179,7 +179,7 @@ def _files(file: Path, key: str) -> Iterator[tuple[str, bytes]]:
                          'module:Class')
     for each in files:
         try:
-            yield each.name, each.read_bytes()
+            yield each.relative_to(file.parent).as_posix(), each.read_bytes()
         except OSError as error:
             raise InputError(f'cannot be read ({error.strerror})', str(each),
                              'check the path') from error

@@ -22,10 +22,10 @@ _DIGEST = re.compile(rf'{PREFIX}([0-9a-f]{{{DIGEST_DIGITS}}})/')
 
 class Content(NamedTuple):
     """
-    A file, with the files of its folder that it names.
+    A file, with the files of its folder that it names or imports.
 
     :param name: name of the main file.
-    :param files: content of each file, by its name in the folder.
+    :param files: content of each file, by its path in the folder.
     """
 
     name: str
@@ -82,7 +82,12 @@ class ContentStore:
                 whole = Path(part) / digest
                 whole.mkdir()
                 for name, data in content.files.items():
-                    write_bytes(data, whole / name)
+                    file = whole / name
+                    if not file.resolve().is_relative_to(whole.resolve()):
+                        raise InputError('is outside of its folder', name[:200],
+                                         'start the evaluation again')
+                    file.parent.mkdir(parents=True, exist_ok=True)
+                    write_bytes(data, file)
                 # Another process may have stored it in the meantime.
                 if not place.is_dir():
                     _rename(whole, place)
@@ -98,8 +103,11 @@ class ContentStore:
         :raises InputError: if there is no such content.
         """
         try:
-            return {path.name: zlib.compress(path.read_bytes(), 6)
-                    for path in sorted((self.folder / digest).iterdir())}
+            place = self.folder / digest
+            place.stat()
+            return {path.relative_to(place).as_posix(): zlib.compress(path.read_bytes(), 6)
+                    for path in sorted(place.rglob('*')) if path.is_file()
+                    and path.parent.name != '__pycache__'}
         except OSError as error:
             raise InputError(f'a file of the evaluation cannot be read ({error.strerror})',
                              str(self.folder / digest), 'start the evaluation anew in another '

@@ -20,6 +20,7 @@ from crgame_ros.evaluation.summary.command import add_summary_arguments
 from crgame_ros.recording.export import prepare_folder, write_scenario
 from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.run_record import run_record_of
+from crgame_ros.schema.marks import named_file
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
     from crgame_ros.evaluation.evaluation import Computing
@@ -170,6 +171,8 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
     if isinstance(read, dict):
         here = {key: [str(Path(name).expanduser().resolve()) for name in given[key]]
                 for key in ('games', 'scenarios', 'humans') if key in given}
+        if 'planners' in given:
+            given['planners'] = [named_file(name, Path.cwd()) for name in given['planners']]
         read = read | given | here
     return parse_plan(read, str(values.plan), base), \
         values.out or Path('evaluations') / values.plan.stem

@@ -31,7 +31,8 @@ class EvaluationFolder:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        # The games of its cells name files in it.
+        self.path = path = path.resolve()
         self.store = ContentStore(path / FILES)
 
     def begin(self, plan: EvaluationPlan, grid: CellGrid) -> None:

@@ -140,7 +140,8 @@ def parse_plan(values: Any, where: str, base: Path) -> EvaluationPlan:
     :param base: directory against which its file names are resolved.
     :raises InputError: naming the key and the remedy.
     """
-    plan = read(EvaluationPlan, values, where, base)
+    # Files are found by their absolute names, and travel to workers.
+    plan = read(EvaluationPlan, values, where, base.resolve())
     try:
         plan.perceptions()
         plan.traffics()

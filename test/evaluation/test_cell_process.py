@@ -48,6 +48,13 @@ class Dying(ConstantVelocityPlanner):
         os.abort()
 
 
+class Leaping(ConstantVelocityPlanner):
+    def plan(self, request):
+        plan = super().plan(request)
+        plan.states[:, 1] += 5.0
+        return plan
+
+
 class Late(ConstantVelocityPlanner):
     asked = 0
 
@@ -55,7 +62,7 @@ class Late(ConstantVelocityPlanner):
         self.asked += 1
         return 1 / (self.asked - 3) and super().plan(request)
 """
-KINDS = ('Dividing', 'Sleeping', 'Eating', 'Dying', 'Late')
+KINDS = ('Dividing', 'Sleeping', 'Eating', 'Dying', 'Leaping', 'Late')
 
 
 @pytest.fixture(scope='module')
@@ -83,7 +90,8 @@ def cells(process: CellProcess) -> dict[str, Cell]:
     ('Dividing', 'error', 'its planner failed in 5 of 5 plans: ZeroDivisionError'),
     ('Sleeping', 'timeout', 'not done after 3 s'),
     ('Eating', 'memory', 'MemoryError|more than'),
-    ('Dying', 'died', 'SIGABRT')])
+    ('Dying', 'died', 'SIGABRT'),
+    ('Leaping', 'refused', 'av0: 5 of 5 plans of its planner were refused: the first state')])
 def test_a_cell_that_fails_is_a_row_and_the_next_is_whole(
         process: CellProcess, cells: dict[str, Cell], kind: str, status: str,
         reason: str) -> None:

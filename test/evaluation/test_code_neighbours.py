@@ -40,6 +40,23 @@ def test_names_are_found_where_they_stand_and_lead_on(tmp_path: Path) -> None:
     assert code_neighbours(tmp_path / 'broken.py') == []
 
 
+def test_imported_modules_and_packages_count(tmp_path: Path) -> None:
+    """Those beside the file only, with what they import, name and hold."""
+    (tmp_path / 'planner.py').write_text('import numpy, near, inner.deep\nfrom os import path\n'
+                                         'import crgame_ros.planner\n')
+    (tmp_path / 'near.py').write_text("import far\nTABLE = 'table.csv'\n")
+    for folder in ('inner', 'inner/__pycache__', 'crgame_ros', 'unused'):
+        (tmp_path / folder).mkdir()
+    for name in ('inner/__init__.py', 'inner/deep.py', 'inner/weights.npz', 'table.csv',
+                 'inner/__pycache__/deep.pyc', 'crgame_ros/__init__.py', 'unused/__init__.py',
+                 'unused.py'):
+        (tmp_path / name).touch()
+    found = [path.relative_to(tmp_path).as_posix()
+             for path in code_neighbours(tmp_path / 'planner.py')]
+    assert found == ['inner/__init__.py', 'inner/deep.py', 'inner/weights.npz', 'near.py',
+                     'table.csv']
+
+
 def test_a_policy_drives_where_only_its_contents_are(tmp_path: Path) -> None:
     place, store = tmp_path / 'mine', ContentStore(tmp_path / 'files')
     place.mkdir()

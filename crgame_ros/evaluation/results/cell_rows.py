@@ -19,7 +19,7 @@ from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult
 
-STATUSES = ('ok', 'error', 'timeout', 'memory', 'died')
+STATUSES = ('ok', 'error', 'refused', 'timeout', 'memory', 'died')
 _KEY = Column('cell', TEXT, '', 'key of the cell: a hash of everything that it depends on')
 _FACTORS = (
     Column('scenario', TEXT, '', "benchmark id, with the file's name where two files have that "
