@@ -69,6 +69,7 @@ BLOCK_CELLS = 65_536
 _LONGEST_REASON = 200
 _OK = 'ok'
 _COLUMNS = {'cell': pa.string(), 'status': pa.string(), 'reason': pa.string(),
+            'state_hash': pa.string(),
             **{factor: pa.string() for factor in TEXT_FACTORS}, 'seed': pa.int64()}
 
 
@@ -85,6 +86,7 @@ class CellBlock:
     :param status: `ok`, or the kind of failure.
     :param reasons: reason of the failure, shortened.
     :param ok: (N) whether the cell succeeded.
+    :param runs: (N) digests of their runs, equal for runs with the same states.
     """
 
     number: int
@@ -95,6 +97,7 @@ class CellBlock:
     status: pa.ChunkedArray
     reasons: pa.ChunkedArray
     ok: NDArray[np.bool_]
+    runs: NDArray[np.uint64]
 
 
 class CellBlocks:
@@ -123,7 +126,7 @@ class CellBlocks:
         """Return the planners' labels in alphabetical order."""
         return [text for text in self.labels['planner'].texts if text]
 
-    def clusters(self, block: CellBlock) -> IntArray:
+    def scenarios(self, block: CellBlock) -> IntArray:
         """Return the number of each cell's scenario (N), or that of its game without one."""
         scenarios, games = (block.labels[:, TEXT_FACTORS.index(name)].astype(np.int64)
                             for name in ('scenario', 'game'))
@@ -153,9 +156,13 @@ class CellBlocks:
         table = pa.Table.from_batches(tables).combine_chunks()
         rows = _each_once(table)
         table = table.take(pa.array(rows))
+        own_pairs = np.concatenate(pairs)[rows]
+        # Runs without a hash of their states are different ones.
+        runs = np.array([digest_of(text) if text else other for text, other in zip(
+            table['state_hash'].to_pylist(), own_pairs.tolist(), strict=True)], np.uint64)
         return CellBlock(number, table['cell'], np.concatenate(labels)[rows],
-                         np.concatenate(seeds)[rows], np.concatenate(pairs)[rows],
-                         table['status'], table['reason'], ~table['failed'].to_numpy())
+                         np.concatenate(seeds)[rows], own_pairs, table['status'],
+                         table['reason'], ~table['failed'].to_numpy(), runs)
 
     def _pairs(self, numbers: NDArray[np.int32], seeds: IntArray) -> NDArray[np.uint64]:
         digests = [self.labels[factor].digests(numbers[:, column])
@@ -176,8 +183,9 @@ def _failure_columns(rows: pa.RecordBatch) -> pa.RecordBatch:
     status = pc.fill_null(rows['status'], '')
     return pa.RecordBatch.from_arrays([
         pc.fill_null(rows['cell'], ''), pc.not_equal(status, _OK), status,
-        pc.utf8_slice_codeunits(pc.fill_null(rows['reason'], ''), 0, _LONGEST_REASON)],
-        ['cell', 'failed', 'status', 'reason'])
+        pc.utf8_slice_codeunits(pc.fill_null(rows['reason'], ''), 0, _LONGEST_REASON),
+        pc.fill_null(rows['state_hash'], '')],
+        ['cell', 'failed', 'status', 'reason', 'state_hash'])
 
 
 def _each_once(table: pa.Table) -> IntArray:
@@ -193,7 +201,7 @@ def _empty(number: int) -> CellBlock:
     texts = pa.chunked_array([], pa.string())
     return CellBlock(number, texts, np.empty((0, len(TEXT_FACTORS)), np.int32),
                      np.empty(0, np.int64), np.empty(0, np.uint64), texts, texts,
-                     np.empty(0, bool))
+                     np.empty(0, bool), np.empty(0, np.uint64))
 
 
 class CellGroups:

@@ -6,9 +6,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from crgame_ros.evaluation.summary.cell_block import CellBlock, CellBlocks, CellGroups, IntArray
+from crgame_ros.evaluation.summary.cell_block import (
+    CellBlock,
+    CellBlocks,
+    CellGroups,
+    IntArray,
+    mixed,
+)
+from crgame_ros.evaluation.summary.cluster_means import CountedCells
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
-from crgame_ros.evaluation.summary.group_bootstrap import DrawnUnits
 from crgame_ros.evaluation.summary.summary import FailureReason
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +23,6 @@ import pyarrow.compute as pc
 
 FloatArray = NDArray[np.float64]
 
-# Values with a smaller relative difference are equal.
-SAME = 1e-12
 # Greatest numbers of different reasons that are counted separately, and that are shown.
 _MOST_COUNTED, MOST_TOLD = 1000, 20
 _OTHER = 'other reasons'
@@ -42,22 +46,18 @@ class PairedCells:
     baseline: IntArray
     unpaired: IntArray
 
-    def differences(self, sums: FloatArray, counts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def differences(self, values: FloatArray) -> FloatArray:
         """
-        Return the mean of each cell minus that of the baseline's cell.
+        Return the value of each cell minus that of the baseline's cell, NaN without either.
 
-        :param sums: (N, measures) sums of all cells of the block.
-        :param counts: (N, measures) number of values in each sum.
-        :return: (P, measures) differences, 0 where there is none; and 1 where there is one or 0.
+        :param values: (N, measures) values of all cells of the block.
+        :return: (P, measures)
         """
-        with np.errstate(invalid='ignore', divide='ignore'):
-            means = sums / counts
-        own, other = means[self.rows], means[self.baseline]
-        found = own - other
-        # Rounding errors of equal values are no difference.
-        found[np.abs(found) <= SAME * np.maximum(np.abs(own), np.abs(other))] = 0.0
-        there = ~np.isnan(found)
-        return np.where(there, found, 0.0), there.astype(float)
+        return np.asarray(values[self.rows] - values[self.baseline])
+
+    def runs(self, runs: NDArray[np.uint64]) -> NDArray[np.uint64]:
+        """Return the digest of each pair of runs, from those of all cells of the block (N)."""
+        return mixed(runs[self.rows], runs[self.baseline])
 
 
 def paired_cells(block: CellBlock, baseline: int) -> PairedCells:
@@ -146,7 +146,7 @@ class CellTally:
     :param groups: groups of the cells.
     :param baseline: planner that others are compared with; empty for none.
     :param baseline_number: number of its label.
-    :ivar units: cells of each group, by the group's number.
+    :ivar cells: cells of each group, by the group's number.
     :ivar pairs: pairs of each group with cells of the baseline.
     :ivar failed: number of each group's failed cells.
     :ivar outcomes: number of pairs, by the success of the group's cell and of the baseline's.
@@ -157,8 +157,8 @@ class CellTally:
     groups: CellGroups
     baseline: str
     baseline_number: int
-    units: dict[int, DrawnUnits] = field(default_factory=dict)
-    pairs: dict[int, DrawnUnits] = field(default_factory=dict)
+    cells: dict[int, CountedCells] = field(default_factory=dict)
+    pairs: dict[int, CountedCells] = field(default_factory=dict)
     failed: Counter[int] = field(default_factory=Counter)
     outcomes: dict[int, Counter[tuple[bool, bool]]] = field(default_factory=dict)
     unpaired: Counter[int] = field(default_factory=Counter)
@@ -167,11 +167,11 @@ class CellTally:
     @property
     def scenarios(self) -> set[int]:
         """Return the numbers of all scenarios."""
-        return set().union(*(units.clusters for units in self.units.values()))
+        return set().union(*(counted.scenarios for counted in self.cells.values()))
 
-    def in_order(self, units: Mapping[int, DrawnUnits]) -> list[tuple[int, DrawnUnits]]:
-        """Return groups with their units, sorted by labels."""
-        return sorted(units.items(), key=lambda each: self.groups.labels[each[0]])
+    def in_order(self, counted: Mapping[int, CountedCells]) -> list[tuple[int, CountedCells]]:
+        """Return groups with their counts, sorted by labels."""
+        return sorted(counted.items(), key=lambda each: self.groups.labels[each[0]])
 
 
 def tally_cells(blocks: CellBlocks, by: Sequence[str], baseline: str) -> CellTally:
@@ -186,20 +186,20 @@ def tally_cells(blocks: CellBlocks, by: Sequence[str], baseline: str) -> CellTal
     found = CellTally(CellGroups(blocks, by), baseline,
                       planners.index(baseline) if baseline else -1)
     for block in blocks:
-        groups, clusters = found.groups.numbers(block), blocks.clusters(block)
-        _count_units(found.units, blocks.count, block.number, groups, clusters)
+        groups, scenarios = found.groups.numbers(block), blocks.scenarios(block)
+        _count(found.cells, groups, scenarios, block.runs)
         found.failed.update(groups[~block.ok].tolist())
         found.failures.add(block, groups)
         if baseline:
-            _count_pairs(found, blocks.count, block, groups, clusters)
+            _count_pairs(found, block, groups, scenarios)
     return found
 
 
-def _count_pairs(found: CellTally, blocks: int, block: CellBlock, groups: IntArray,
-                 clusters: IntArray) -> None:
+def _count_pairs(found: CellTally, block: CellBlock, groups: IntArray,
+                 scenarios: IntArray) -> None:
     pairs = paired_cells(block, found.baseline_number)
     own_groups = groups[pairs.rows]
-    _count_units(found.pairs, blocks, block.number, own_groups, clusters[pairs.rows])
+    _count(found.pairs, own_groups, scenarios[pairs.rows], pairs.runs(block.runs))
     found.unpaired.update(groups[pairs.unpaired].tolist())
     for group in np.unique(own_groups).tolist():
         own = own_groups == group
@@ -208,10 +208,8 @@ def _count_pairs(found: CellTally, blocks: int, block: CellBlock, groups: IntArr
             strict=True))
 
 
-def _count_units(units: dict[int, DrawnUnits], blocks: int, block: int, groups: IntArray,
-                 clusters: IntArray) -> None:
+def _count(counted: dict[int, CountedCells], groups: IntArray, scenarios: IntArray,
+           runs: NDArray[np.uint64]) -> None:
     for group in np.unique(groups).tolist():
         own = groups == group
-        found = units.setdefault(group, DrawnUnits([0] * blocks))
-        found.cells[block] = int(own.sum())
-        found.clusters.update(np.unique(clusters[own]).tolist())
+        counted.setdefault(group, CountedCells()).add(scenarios[own], runs[own])

@@ -104,8 +104,6 @@ def add_summary_arguments(parser: 'argparse.ArgumentParser | argparse._ArgumentG
     parser.add_argument('--worst', action='append', metavar='NAME', help='measure by which the '
                         'worst cells are chosen; may be given several times, the first one counts '
                         'first (default: collision, then worst_ttc)')
-    parser.add_argument('--resamples', type=int, default=2000, metavar='N',
-                        help='of the bootstrap (default: 2000)')
 
 
 def summarise_command(folder: Path, values: argparse.Namespace) -> int:
@@ -120,7 +118,7 @@ def summarise_command(folder: Path, values: argparse.Namespace) -> int:
     from crgame_ros.evaluation.summary.markdown import summary_markdown
     from crgame_ros.evaluation.summary.summarise import summarise
     summary = summarise(folder, measures=values.measure, by=tuple(values.by or ('planner',)),
-                        baseline=values.baseline, worst=values.worst, resamples=values.resamples)
+                        baseline=values.baseline, worst=values.worst)
     if values.format == 'json':
         print(json.dumps(summary.as_dict(), indent=2, allow_nan=False, ensure_ascii=False))
     else:

@@ -157,7 +157,7 @@ def _chips(summary: Summary) -> str:
     facts = {'cells finished': str(summary.cells), 'failed': str(summary.failed),
              'scenarios': str(summary.scenarios),
              f'groups by {" × ".join(summary.by)}': str(len(summary.groups)),
-             'baseline': free(summary.baseline or '–'), 'resamples': str(summary.resamples)}
+             'baseline': free(summary.baseline or '–')}
     return '<dl class="chips">' + ''.join(
         f'<div><dt>{words}</dt><dd>{value}</dd></div>' for words, value in facts.items()) + '</dl>'
 
@@ -233,7 +233,8 @@ def _plotted(group: GroupMeans | PairedDifferences, found: Estimate, measure: Su
     scale = 100.0 if measure.is_share else 1.0
     kind = 'estimate'
     if differences:
-        kind = {1: 'better', -1: 'worse'}.get(found.side * measure.better, kind)
+        kind = {1: 'better', -1: 'worse'}.get(
+            found.side(measure.negligible) * measure.better, kind)
     elif summary.baseline in group.labels:
         kind = 'baseline'
     return PlottedInterval(

@@ -35,6 +35,8 @@ class SummaryMeasure(NamedTuple):
     :param what: its definition in a sentence; empty where that of the column is sufficient.
     :param most: greater values count as this one: they result from speeds that are almost equal
         or gaps that are almost closed, and would dominate the mean.
+    :param least: smallest difference that matters, in its unit; None for a thousandth of it, or a
+        hundredth of a metre, a second, or what is derived from these.
     """
 
     name: str
@@ -47,6 +49,7 @@ class SummaryMeasure(NamedTuple):
     where: str = ''
     what: str = ''
     most: float = math.inf
+    least: float | None = None
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -64,6 +67,13 @@ class SummaryMeasure(NamedTuple):
         if self.is_share or self.column not in _NUMERIC:
             return '1'
         return _NUMERIC[self.column].unit or '1'
+
+    @property
+    def negligible(self) -> float:
+        """Return the size below which a difference is neither better nor worse."""
+        if self.least is not None:
+            return self.least
+        return 0.001 if self.unit == '1' else 0.01
 
     @property
     def definition(self) -> str:
@@ -125,7 +135,7 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('speed_limit', 'nuPlan: speed limit', 'score_speed_limit', 1),
     SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
     # All AVs count in its mean; in that of the least TTC only those that approached a leader.
-    SummaryMeasure('inverse_ttc', 'greatest 1/TTC', 'max_inverse_ttc', -1),
+    SummaryMeasure('inverse_ttc', 'greatest 1/TTC', 'max_inverse_ttc', -1, least=0.001),
     SummaryMeasure('worst_ttc', 'least TTC', 'worst_ttc', 1, most=20.0,
                    what='least TTC of the AVs that approached a leader; greater ones count as 20'),
     SummaryMeasure('worst_thw', 'least THW', 'worst_thw', 1, most=20.0),
@@ -145,8 +155,8 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('fallbacks', 'plans that braked instead', 'fallbacks', -1),
     SummaryMeasure('plans_refused', 'plans refused', 'plans_refused', -1),
     SummaryMeasure('timed_out', 'requests without an answer', 'timed_out', -1),
-    SummaryMeasure('latency_p50_s', 'median latency', 'latency_p50_s', -1),
-    SummaryMeasure('latency_max_s', 'greatest latency', 'latency_max_s', -1),
+    SummaryMeasure('latency_p50_s', 'median latency', 'latency_p50_s', -1, least=0.001),
+    SummaryMeasure('latency_max_s', 'greatest latency', 'latency_max_s', -1, least=0.001),
 )}
 # Order of the worst cells: collisions first, then by the smallest TTC.
 WORST_FIRST = ('collision', 'worst_ttc')

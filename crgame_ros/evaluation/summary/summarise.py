@@ -7,23 +7,36 @@ The cells are read in blocks, twice: first they are counted, then their measures
 in between grows with planners, scenarios and measures, not with cells.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.evaluation.summary.cell_block import BLOCK_CELLS, CellBlock, CellBlocks
 from crgame_ros.evaluation.summary.cell_tally import CellTally, paired_cells, tally_cells
+from crgame_ros.evaluation.summary.cluster_means import (
+    ClusterMeans,
+    CountedCells,
+    FloatArray,
+    holm,
+    IntArray,
+    run_clusters,
+)
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
-from crgame_ros.evaluation.summary.group_bootstrap import FloatArray, GroupBootstrap, IntArray
 from crgame_ros.evaluation.summary.measures import (
     chosen_measures,
     MEASURES,
     SummaryMeasure,
     WORST_FIRST,
 )
-from crgame_ros.evaluation.summary.summary import GroupMeans, PairedDifferences, Summary, WorstCell
+from crgame_ros.evaluation.summary.summary import (
+    Estimate,
+    GroupMeans,
+    PairedDifferences,
+    Summary,
+    WorstCell,
+)
 from crgame_ros.game.game import DEFAULT_PLANNER
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +44,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 MOST_CELLS = 10
-RESAMPLES = 2000
-_FEWEST_RESAMPLES, _MOST_RESAMPLES = 100, 100_000
-# Greatest number of values in resamples, 8 bytes each.
-_MOST_NUMBERS = 20_000_000
-_Bootstraps = dict[int, GroupBootstrap]
+_Means = dict[int, ClusterMeans]
 
 
 @dataclass(frozen=True)
@@ -52,25 +61,20 @@ class MeasuredVehicles:
     ids: NDArray[np.object_]
     values: FloatArray
 
-    def sums(self, block: CellBlock, measures: Sequence[SummaryMeasure]
-             ) -> tuple[FloatArray, FloatArray]:
-        """
-        Return the sums of each cell.
-
-        :return: (N, measures) sums of the values, and the numbers of values.
-        """
-        sums = np.zeros((len(block.ok), len(measures)))
-        counts = np.zeros_like(sums)
+    def means(self, block: CellBlock, measures: Sequence[SummaryMeasure]) -> FloatArray:
+        """Return the mean of each cell's AVs (N, measures), NaN where none has a value."""
+        found = np.full((len(block.ok), len(measures)), np.nan)
         for column, measure in enumerate(measures):
             if not measure.column:
-                sums[:, column], counts[:, column] = ~block.ok, 1.0
+                found[:, column] = ~block.ok
                 continue
             values = self.values[:, column]
             there = ~np.isnan(values)
-            sums[:, column], counts[:, column] = (
-                np.bincount(self.cells[there], weights, len(block.ok))
-                for weights in (values[there], None))
-        return sums, counts
+            sums, counts = (np.bincount(self.cells[there], weights, len(block.ok))
+                            for weights in (values[there], None))
+            known = counts > 0
+            found[known, column] = sums[known] / counts[known]
+        return found
 
 
 def measured_vehicles(parts: EvaluatedParts, block: CellBlock,
@@ -177,8 +181,7 @@ def _frugal_memory() -> Iterator[None]:
 @_frugal_memory()
 def summarise(folder: Path, *, measures: Sequence[str] | None = None,
               by: Sequence[str] = ('planner',), baseline: str | None = None,
-              worst: Sequence[str] | None = None, resamples: int = RESAMPLES, seed: int = 0,
-              block_cells: int = BLOCK_CELLS) -> Summary:
+              worst: Sequence[str] | None = None, block_cells: int = BLOCK_CELLS) -> Summary:
     """
     Summarise the finished cells.
 
@@ -189,34 +192,24 @@ def summarise(folder: Path, *, measures: Sequence[str] | None = None,
     :param baseline: planner with which others are compared; None for the default planner of
         games, or the first one if the evaluation lacks that.
     :param worst: measures by which the worst cells are chosen; None for collisions, then TTC.
-    :param resamples: number of resamples for the intervals.
-    :param seed: seed of the resamples.
     :param block_cells: approximate number of cells in memory at a time.
     :raises InputError: if an argument cannot be used, or a part cannot be read.
     """
     if not by or not set(by) <= set(TEXT_FACTORS):
         raise InputError(f'{short(list(by))} contains an unknown factor', '--by',
                          f'name some of {", ".join(TEXT_FACTORS)}')
-    if not _FEWEST_RESAMPLES <= resamples <= _MOST_RESAMPLES:
-        raise InputError(f'is {resamples}', '--resamples',
-                         f'give {_FEWEST_RESAMPLES} to {_MOST_RESAMPLES}')
-    if not 0 <= seed < 2**63:
-        raise InputError(f'is {seed}', 'seed', 'give one from 0 to 2^63 - 1')
     parts = EvaluatedParts(folder)
     chosen = chosen_measures(measures, parts.columns)
     worst_by = chosen_measures(worst, parts.columns) if worst else tuple(
         MEASURES[name] for name in WORST_FIRST if MEASURES[name].column in parts.columns)
     blocks = CellBlocks(parts, block_cells)
     tally = tally_cells(blocks, by, _baseline(baseline, by, blocks))
-    drawn = len(tally.units) + len(tally.pairs)
-    if drawn * 2 * len(chosen) * resamples > _MOST_NUMBERS:
-        raise InputError(f'{len(tally.units)} groups and {len(chosen)} measures are too many',
-                         '--by', 'name fewer factors or measures, or take fewer resamples')
-    means, differences, found = _sum_up(parts, blocks, tally, chosen, worst_by, (resamples, seed))
+    means, differences, found = _sum_up(parts, blocks, tally, chosen, worst_by)
     return Summary(
         folder, tuple(by), tally.baseline, chosen, len(tally.scenarios),
-        _groups(tally, means), _differences(tally, differences), worst_by, found.worst(),
-        tally.failures.reasons(parts, tally.groups.labels), resamples, seed)
+        _groups(tally, means, chosen), _differences(tally, differences, chosen), worst_by,
+        found.worst(),
+        tally.failures.reasons(parts, tally.groups.labels))
 
 
 def _baseline(wanted: str | None, by: Sequence[str], blocks: CellBlocks) -> str:
@@ -233,49 +226,65 @@ def _baseline(wanted: str | None, by: Sequence[str], blocks: CellBlocks) -> str:
 
 
 def _sum_up(parts: EvaluatedParts, blocks: CellBlocks, tally: CellTally,
-            chosen: Sequence[SummaryMeasure], worst_by: Sequence[SummaryMeasure],
-            draws: tuple[int, int]) -> tuple[_Bootstraps, _Bootstraps, WorstCells]:
-    """Read all measures block by block; `draws` is the number of resamples and their seed."""
+            chosen: Sequence[SummaryMeasure], worst_by: Sequence[SummaryMeasure]
+            ) -> tuple[_Means, _Means, WorstCells]:
+    """Read all measures block by block."""
     columns = tuple(dict.fromkeys((*chosen, *worst_by)))
     found = WorstCells(worst_by, [columns.index(measure) for measure in worst_by])
-    means, differences = ({group: GroupBootstrap(
-        '\0'.join((kind, *tally.groups.labels[group])), each, len(chosen), *draws)
-        for group, each in units.items()} for kind, units in (
-            ('means', tally.units), ('differences', tally.pairs)))
+    means, differences = ({group: ClusterMeans(len(chosen)) for group in counted}
+                          for counted in (tally.cells, tally.pairs))
     for block in blocks:
         vehicles = measured_vehicles(parts, block, columns)
         found.add(blocks, block, vehicles)
-        sums, counts = (each[:, :len(chosen)] for each in vehicles.sums(block, columns))
-        groups, clusters = tally.groups.numbers(block), blocks.clusters(block)
-        _add(means, block.number, groups, (sums, counts, clusters))
+        values = vehicles.means(block, columns)[:, :len(chosen)]
+        groups, scenarios = tally.groups.numbers(block), blocks.scenarios(block)
+        _add(means, tally.cells, groups, values, scenarios, block.runs)
         if tally.pairs:
             pairs = paired_cells(block, tally.baseline_number)
-            _add(differences, block.number, groups[pairs.rows],
-                 (*pairs.differences(sums, counts), clusters[pairs.rows]))
+            _add(differences, tally.pairs, groups[pairs.rows], pairs.differences(values),
+                 scenarios[pairs.rows], pairs.runs(block.runs))
     return means, differences, found
 
 
-def _add(bootstraps: _Bootstraps, block: int, groups: IntArray,
-         values: tuple[FloatArray, FloatArray, IntArray]) -> None:
+def _add(means: _Means, counted: Mapping[int, CountedCells], groups: IntArray,
+         values: FloatArray, scenarios: IntArray, runs: NDArray[np.uint64]) -> None:
     for group in np.unique(groups).tolist():
-        sums, counts, clusters = (each[groups == group] for each in values)
-        bootstraps[group].add(block, sums, counts, clusters)
+        own = groups == group
+        means[group].add(values[own], scenarios[own] if counted[group].clustered == 'scenarios'
+                         else run_clusters(runs[own]))
 
 
-def _groups(tally: CellTally, means: _Bootstraps) -> tuple[GroupMeans, ...]:
+def _groups(tally: CellTally, means: _Means,
+            chosen: Sequence[SummaryMeasure]) -> tuple[GroupMeans, ...]:
     return tuple(GroupMeans(
-        tally.groups.labels[group], sum(units.cells), tally.failed[group], len(units.clusters),
-        units.resampled, means[group].estimates())
-        for group, units in tally.in_order(tally.units))
+        tally.groups.labels[group], counted.cells, tally.failed[group], len(counted.scenarios),
+        counted.different_runs, counted.clustered, tuple(
+            _within(each, 0.0, measure)
+            for each, measure in zip(means[group].estimates(), chosen, strict=True)))
+        for group, counted in tally.in_order(tally.cells))
 
 
-def _differences(tally: CellTally, differences: _Bootstraps) -> tuple[PairedDifferences, ...]:
+def _within(found: Estimate, least: float, measure: SummaryMeasure) -> Estimate:
+    """Return an estimate whose interval is within what a share, or a difference, can be."""
+    if not measure.is_share:
+        return found
+    low, high = np.clip((found.low, found.high), least, 1.0).tolist()
+    return replace(found, low=low, high=high)
+
+
+def _differences(tally: CellTally, differences: _Means,
+                 chosen: Sequence[SummaryMeasure]) -> tuple[PairedDifferences, ...]:
+    groups = tally.in_order(tally.pairs)
+    estimates = [differences[group].estimates() for group, _ in groups]
+    # All differences that are told together are judged together.
+    judged = iter(holm(each for own in estimates for each in own))
     found = []
-    for group, units in tally.in_order(tally.pairs):
+    for group, counted in groups:
         # By the success of the group's cell, and of the baseline's.
         outcomes = tally.outcomes[group]
         found.append(PairedDifferences(
             tally.groups.labels[group], outcomes[True, True], outcomes[False, True],
             outcomes[True, False], outcomes[False, False], tally.unpaired[group],
-            len(units.clusters), units.resampled, differences[group].estimates()))
+            len(counted.scenarios), counted.different_runs, counted.clustered,
+            tuple(_within(next(judged), -1.0, measure) for measure in chosen)))
     return tuple(found)

@@ -22,20 +22,26 @@ class Estimate:
     :param value: NaN where there is no value.
     :param low: lower bound of the interval; NaN where there is none.
     :param high: upper bound.
-    :param n: number of values in the mean: AVs, cells or pairs.
-    :param units: number of drawn scenarios or cells with such values.
+    :param n: number of cells, or pairs of cells, with a value.
+    :param clusters: number of scenarios, or different runs of one scenario, with such values.
+    :param p: probability of a value at least as far from 0 if the true one is 0; NaN without an
+        interval.
+    :param beyond_chance: of a difference, whether it is told from 0 among all of them.
     """
 
     value: float
     low: float
     high: float
     n: int
-    units: int
+    clusters: int
+    p: float
+    beyond_chance: bool = False
 
-    @property
-    def side(self) -> int:
-        """Return the side of zero on which the whole interval is; 0 if it is on both."""
-        return 1 if self.low > 0.0 else -1 if self.high < 0.0 else 0
+    def side(self, negligible: float) -> int:
+        """Return the sign of a difference beyond chance that is not negligible; 0 of others."""
+        if not self.beyond_chance or abs(self.value) < negligible:
+            return 0
+        return 1 if self.value > 0.0 else -1
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,8 @@ class GroupMeans:
     :param cells: number of finished cells, failed ones included.
     :param failed: number of failed cells.
     :param scenarios: number of different scenarios.
-    :param resampled: kind of units drawn for the intervals.
+    :param runs: number of different runs: cells whose states are equal are one run.
+    :param clustered: what varies by chance: scenarios, or runs of one scenario.
     :param estimates: in the order of `Summary.measures`.
     """
 
@@ -55,7 +62,8 @@ class GroupMeans:
     cells: int
     failed: int
     scenarios: int
-    resampled: Literal['scenarios', 'cells']
+    runs: int
+    clustered: Literal['scenarios', 'runs']
     estimates: tuple[Estimate, ...]
 
 
@@ -71,7 +79,8 @@ class PairedDifferences:
     :param both_failed: number of pairs in which both failed.
     :param unpaired: number of the group's cells without a counterpart of the baseline so far.
     :param scenarios: number of different scenarios of the pairs.
-    :param resampled: kind of units drawn for the intervals.
+    :param runs: number of different pairs of runs.
+    :param clustered: what varies by chance: scenarios, or pairs of runs of one scenario.
     :param estimates: group minus baseline, in the order of `Summary.measures`.
     """
 
@@ -82,7 +91,8 @@ class PairedDifferences:
     both_failed: int
     unpaired: int
     scenarios: int
-    resampled: Literal['scenarios', 'cells']
+    runs: int
+    clustered: Literal['scenarios', 'runs']
     estimates: tuple[Estimate, ...]
 
 
@@ -142,8 +152,6 @@ class Summary:
     :param worst_by: measures by which the worst cells are chosen, in order of priority.
     :param worst: the worst cells, the worst one first.
     :param failures: most frequent first.
-    :param resamples: number of resamples.
-    :param seed: seed of the resamples.
     """
 
     folder: Path
@@ -156,8 +164,6 @@ class Summary:
     worst_by: tuple[SummaryMeasure, ...]
     worst: tuple[WorstCell, ...]
     failures: tuple[FailureReason, ...]
-    resamples: int
-    seed: int
 
     @property
     def cells(self) -> int:

@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.evaluation.summary.evaluated_parts import FACTORS
-from crgame_ros.evaluation.summary.group_bootstrap import FEWEST_SCENARIOS
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
 from crgame_ros.evaluation.summary.summary import (
     Estimate,
@@ -19,12 +18,10 @@ from crgame_ros.evaluation.summary.summary import (
 
 NOTHING = '-'
 _ALWAYS_TOLD = ('scenario', 'planner', 'seed')
-# Found in trials with synthetic evaluations (docs/evaluation.md).
-_MANY_UNITS = 20
-_SHARE_OF_NONE = ('an interval from 0 to 0 says that no resample contains the event: after n '
-                  'cells without it, its rate may still be 3/n')
-_BY_CHANCE = ('better and worse: the whole interval is on that side of zero; where nothing '
-              'differs one interval in twenty is, by chance')
+_SHARE_OF_NONE = ('an interval from 0 to 0 says that no cell has the event: after n cells '
+                  'without it, its rate may still be 3/n')
+_BY_CHANCE = ('better and worse: a difference that is not negligible and, among all of this table '
+              'together, beyond chance at 5 % (Holm); each interval is of its own measure alone')
 
 
 class SummaryCell(NamedTuple):
@@ -121,7 +118,9 @@ def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str
 
 def _means(summary: Summary) -> SummaryTable:
     counts = SummaryCell('cells finished'), *(SummaryCell(
-        str(group.cells), f'{group.scenarios} scenarios') for group in summary.groups)
+        str(group.cells), _scenarios(group.scenarios) + (
+            '' if group.runs >= group.cells else f', {group.runs} different runs'))
+        for group in summary.groups)
     rows = [counts]
     for place, measure in known_measures(summary):
         rows.append((SummaryCell(measure_label(measure)), *(
@@ -130,10 +129,10 @@ def _means(summary: Summary) -> SummaryTable:
     unknown = [measure.label for place, measure in enumerate(summary.measures)
                if place not in known]
     notes = [
-        'means over the n AVs with a value in cells that ended well (of the share that failed: '
-        'over all cells); what is not defined, such as the TTC of a vehicle with none ahead, is '
-        'left out', f'95 % intervals: percentile bootstrap, {summary.resamples} resamples, seed '
-        f'{summary.seed}', *_drawn(summary.groups)]
+        'means over scenarios, of the means over their cells that ended well, of the means over '
+        'their AVs (of the share that failed: over all cells); n counts the cells with a value; '
+        'what is not defined, such as the TTC of a vehicle with none ahead, is left out',
+        *_clusters(summary.groups)]
     bounds = [f'{measure.label} {measure.most:g} {measure.unit}' for _, measure
               in known_measures(summary) if math.isfinite(measure.most)]
     if bounds:
@@ -151,37 +150,29 @@ def _group(group: GroupMeans | PairedDifferences) -> str:
     return group_name(group.labels)
 
 
-def _drawn(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterator[str]:
-    """Yield notes on the units drawn for intervals, and on what the intervals describe."""
+def _scenarios(count: int) -> str:
+    return f'{count} scenario{"" if count == 1 else "s"}'
+
+
+def _clusters(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterator[str]:
+    """Yield notes on what varies by chance in the intervals, and what they apply to."""
     kinds: dict[str, list[str]] = {}
     for group in groups:
-        kinds.setdefault(group.resampled, []).append(_group(group))
-    what = 'pairs' if groups and isinstance(groups[0], PairedDifferences) else 'cells'
+        kinds.setdefault(group.clustered, []).append(_group(group))
     for kind, names in sorted(kinds.items()):
         whose = '' if len(kinds) == 1 else f'of {", ".join(names)}: '
         if kind == 'scenarios':
-            yield (f'{whose}whole scenarios are resampled, because {what} of one scenario are '
-                   'correlated (cluster bootstrap): the intervals apply to similar scenarios')
+            yield (f"{whose}95 % intervals are Student's, of the scenarios' means: they apply to "
+                   'similar scenarios')
         else:
-            yield (f'{whose}{what} are resampled, because there are fewer than {FEWEST_SCENARIOS} '
-                   'scenarios: the intervals apply to these scenarios alone')
-        if min(_units(group) for group in groups if group.resampled == kind) < _MANY_UNITS:
-            drawn = what if kind == 'cells' else kind
-            yield (f'{whose}of fewer than {_MANY_UNITS} {drawn} they are too narrow: of ten they '
-                   'hold the truth in 90 %, of five in 84 %')
-
-
-def _units(group: GroupMeans | PairedDifferences) -> int:
-    """Return the number of units to draw from."""
-    if group.resampled == 'scenarios':
-        return group.scenarios
-    return group.cells if isinstance(group, GroupMeans) else group.pairs
+            yield (f"{whose}95 % intervals are Student's, of different runs: they apply to this "
+                   'scenario alone; equal runs count as one')
 
 
 def _estimate(found: Estimate, measure: SummaryMeasure, signed: bool = False) -> SummaryCell:
     if not found.n:
         return SummaryCell(NOTHING)
-    side = found.side * measure.better if signed else 0
+    side = found.side(measure.negligible) * measure.better if signed else 0
     detail = f'{quantity(found.low, measure, signed)} to {quantity(found.high, measure, signed)}'
     if math.isnan(found.low):
         detail = 'no interval'
@@ -202,8 +193,8 @@ def _differences(summary: Summary) -> SummaryTable:
         _estimate(group.estimates[place], measure, signed=True) for group in groups))
         for place, measure in known_measures(summary)]
     notes = (f'difference from {summary.baseline} in the cell with the same other factors, '
-             'averaged over its AVs; n counts the pairs of which both have a value',
-             *_drawn(groups), _BY_CHANCE)
+             'of the means over their AVs; n counts the pairs of which both have a value',
+             *_clusters(groups), _BY_CHANCE)
     return SummaryTable('differences', f'Differences from {summary.baseline}',
                         'Mean difference, 95 % interval and n', ('', *map(_group, groups)),
                         tuple(rows), notes)

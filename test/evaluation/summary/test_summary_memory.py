@@ -29,7 +29,7 @@ def peak_kb():
     return int(next(line.split()[1] for line in lines if line.startswith('VmHWM')))
 
 before = peak_kb()
-found = summarise(Path(sys.argv[1]), resamples=500, block_cells=int(sys.argv[2]))
+found = summarise(Path(sys.argv[1]), block_cells=int(sys.argv[2]))
 print(found.cells, before, peak_kb())
 """
 
