@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SAMPLING = 0.25
+# Share of a step by which a length may miss a multiple of it.
+ROUNDING = 1e-6
 COARSE = 4
 # The smoothing widths tried in turn until the curvature bound holds [m].
 WIDTHS = (2.5, 4.0, 6.0, 9.0)
@@ -66,7 +68,8 @@ class ReferencePath(Curve):
             if np.abs(curvature).max() <= max_curvature:
                 break
         s = arc_length(smooth)
-        count = max(2, int(s[-1] / step) + 1)
+        # Where the length is a multiple of the step, rounding does not decide on the last point.
+        count = max(2, int(s[-1] / step + ROUNDING) + 1)
         grid = step * np.arange(count)
         return cls(step, np.column_stack((np.interp(grid, s, smooth[:, 0]),
                                           np.interp(grid, s, smooth[:, 1]))),

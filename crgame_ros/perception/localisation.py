@@ -16,7 +16,7 @@ import math
 
 from crgame_ros.game.perception_spec import LocalisationSpec
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.perception.noise import KeyedNoise
+from crgame_ros.perception.noise import in_map, KeyedNoise
 from crgame_ros.vehicle.state import ENCODER_REST, VehicleState
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,10 @@ class Localisation:
         self._lost_until = 0
         self._n = 0
         self._truth = initial
+        # The bias walks along the axes that the vehicle had at first: those of later steps are not
+        # known of steps that are left out.
         self._walk: Array = np.zeros(2)
+        self._first_yaw = initial.yaw
         deviations = self._deviations(initial)
         self._covariance: Array = np.diag(np.square(deviations))
         self._state: Array = self._measurement(0, initial, deviations)
@@ -152,9 +155,12 @@ class Localisation:
         """Measure x, y, yaw and speed (4): the truth with bias and noise."""
         spec = self._spec
         bias_x, bias_y = spec.position_bias
-        biased = np.array((truth.x + bias_x + self._walk[0], truth.y + bias_y + self._walk[1],
+        walked_x, walked_y = in_map(self._walk, self._first_yaw)
+        biased = np.array((truth.x + bias_x + walked_x, truth.y + bias_y + walked_y,
                            truth.yaw + spec.yaw_bias, truth.speed))
-        measured: Array = biased + deviations * self._noise.normal(n)[_MEASUREMENT:]
+        errors = deviations * self._noise.normal(n)[_MEASUREMENT:]
+        errors[:2] = in_map(errors[:2], truth.yaw)
+        measured: Array = biased + errors
         measured[2] = wrap_pi(float(measured[2]))
         return measured
 

@@ -2,10 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random numbers that depend on the step only, not on earlier draws."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+def in_map(errors: Array, yaw: float) -> Array:
+    """
+    Return errors (..., 2) along a vehicle and to its left as errors along the map's axes.
+
+    What a vehicle measures must not depend on how its map is turned.
+
+    :param yaw: of the vehicle [rad]
+    """
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.asarray(errors @ np.array(((cos, sin), (-sin, cos))))
 
 
 class KeyedNoise:

@@ -16,6 +16,7 @@ from crgame_ros.messages.request_layout import RequestLayout, with_lights, witho
 from crgame_ros.occupancy.occupancy import OccupancyGrid, OccupancyMap
 from crgame_ros.perception.bodies import SensedBodies
 from crgame_ros.perception.localisation import Localisation
+from crgame_ros.perception.noise import in_map
 from crgame_ros.perception.sensors import Detections, MountedSensor, Scan
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import pose_rates, VehicleState
@@ -291,10 +292,11 @@ class Perception:
             poses[:, :2] = (poses[:, :2] - truth[:2]) @ turned + estimate[:2]
             poses[:, 2] += turn
             velocities[:, :2] = velocities[:, :2] @ turned
-        poses += found.pose_errors
-        poses[:, 2] = wrap_pi_array(poses[:, 2])
+        yaw = self._truth.yaw
+        poses[:, :2] += in_map(found.pose_errors[:, :2], yaw)
+        poses[:, 2] = wrap_pi_array(poses[:, 2] + found.pose_errors[:, 2])
         moving = ~self._static[found.things]
-        velocities[moving, :2] += found.velocity_errors[moving]
+        velocities[moving, :2] += in_map(found.velocity_errors[moving], yaw)
         return poses, velocities
 
     def _deliver(self, n: int) -> None:

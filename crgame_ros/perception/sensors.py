@@ -91,8 +91,8 @@ class Detections(NamedTuple):
     The things that a scan reached.
 
     :param things: (D) indices of the things
-    :param pose_errors: (D, 3) of x, y [m] and yaw [rad]
-    :param velocity_errors: (D, 2) of the velocity's components [m/s]
+    :param pose_errors: (D, 3) along the carrier and to its left [m], and of the yaw [rad]
+    :param velocity_errors: (D, 2) of the velocity along the carrier and to its left [m/s]
     """
 
     things: Index

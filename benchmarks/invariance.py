@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Check that a run does not depend on where its map lies: turned, and moved to UTM coordinates.
+
+    python benchmarks/invariance.py
+    python benchmarks/invariance.py scenarios/merge.yaml --angles 45 --duration 20
+
+Each game runs offline as it is and placed anew, with its planners, perception and traffic. The
+table gives the largest difference of positions, yaws and speeds, after the placement is undone.
+"""
+
+import argparse
+import math
+from pathlib import Path
+import sys
+import tempfile
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
+
+from placed_runs import difference, run_placed, UTM  # noqa: E402, I100
+
+
+def main() -> None:
+    """Print one line for each game and placement."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('games', nargs='*', type=Path, help='game files; all of scenarios/')
+    parser.add_argument('--angles', nargs='+', type=float, default=(30.0, 45.0, 137.0),
+                        metavar='DEGREES')
+    parser.add_argument('--duration', type=float, default=10.0, help='of each run [s]')
+    given = parser.parse_args()
+    games = given.games or sorted(path for path in (ROOT / 'scenarios').glob('*.yaml')
+                                  if path.name.count('.') == 1)
+    places = [*((math.radians(angle), (0.0, 0.0)) for angle in given.angles), (0.0, UTM)]
+    print(f'{"game":20} {"placed":>8} {"position":>10} {"yaw":>10} {"speed":>10}')
+    with tempfile.TemporaryDirectory() as folder:
+        for game in games:
+            first = run_placed(game, Path(folder), 0.0, (0.0, 0.0), given.duration)
+            for angle, offset in places:
+                found = difference(first, run_placed(game, Path(folder), angle, offset,
+                                                     given.duration), angle, offset)
+                name = 'UTM' if any(offset) else f'{math.degrees(angle):g}°'
+                print(f'{game.stem:20} {name:>8}', *(f'{each:10.1e}' for each in found),
+                      flush=True)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run does not depend on where its map lies: planners, perception and traffic included."""
+
+import math
+from pathlib import Path
+
+from crgame_ros.paths import scenarios_directory
+from placed_runs import difference, run_placed, UTM
+import pytest
+
+DURATION_S = 4.0
+GAMES = ('t_junction', 'fog', 'traffic', 'cut_in', 'blocked_lane', 'crossing', 'intersection',
+         'lane_change', 'merge', 'occluded_pedestrian', 'parked_cars', 'roundabout', 'two_avs')
+
+
+@pytest.mark.slow
+@pytest.mark.matrix
+@pytest.mark.parametrize('game', GAMES)
+@pytest.mark.parametrize(('degrees', 'offset', 'most'), [
+    (30.0, (0.0, 0.0), 1e-6), (45.0, (0.0, 0.0), 1e-6), (137.0, (0.0, 0.0), 1e-6),
+    # Coordinates of millions of metres have nine digits less behind the point.
+    (0.0, UTM, 1e-5)])
+def test_a_game_is_the_same_wherever_its_map_lies(
+        tmp_path: Path, game: str, degrees: float, offset: tuple[float, float],
+        most: float) -> None:
+    angle, path = math.radians(degrees), scenarios_directory() / f'{game}.yaml'
+    one, other = (run_placed(path, tmp_path, *place, DURATION_S)
+                  for place in ((0.0, (0.0, 0.0)), (angle, offset)))
+    assert len(one.vehicle_states) == len(other.vehicle_states)
+    assert max(difference(one, other, angle, offset)) < most
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('game', ['fog', 'occluded_pedestrian', 't_junction'])
+def test_a_turned_game_is_the_same(tmp_path: Path, game: str) -> None:
+    """Those that noise, and the end of a road of a round length, once made different."""
+    path, angle = scenarios_directory() / f'{game}.yaml', math.radians(137.0)
+    one, other = (run_placed(path, tmp_path, each, (0.0, 0.0), DURATION_S)
+                  for each in (0.0, angle))
+    assert max(difference(one, other, angle, (0.0, 0.0))) < 1e-6
