@@ -99,13 +99,14 @@ class Curve:
             heading = slope * beyond + heading
         return s, x + beyond * along_x, y + beyond * along_y, heading, bends[after]
 
-    def rate(self, s: float, d: float, velocity: Sequence[float]) -> float:
+    def rates(self, s: float, d: float, *vectors: Sequence[float]) -> list[float]:
         """
-        Return ds/dt of a moving point that is projected on the curve [m/s].
+        Return how fast s grows along vectors, as ds/dt along the velocity of a projected point.
 
-        :param s: its arc length [m]
+        :param s: arc length of the point [m]
         :param d: its offset to the left [m]
-        :param velocity: (2) [m/s]
+        :param vectors: each (2), such as velocities [m/s]
+        :return: one for each, in its unit.
         """
         _, _, _, heading, bend = self.place(s)
         cos, sin = math.cos(heading), math.sin(heading)
@@ -114,7 +115,7 @@ class Curve:
         along_x, along_y = self._spans[1][segment][2:4]
         # The point stays on the normal of the heading, which turns along s.
         stretch = cos * along_x + sin * along_y - bend * d
-        return (velocity[0] * cos + velocity[1] * sin) / max(stretch, _LEAST_STRETCH)
+        return [(x * cos + y * sin) / max(stretch, _LEAST_STRETCH) for x, y in vectors]
 
     def heading_at(self, s: FloatArray) -> FloatArray:
         """Return the headings at arc lengths of any shape, not wrapped [rad]."""

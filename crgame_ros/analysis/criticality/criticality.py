@@ -297,12 +297,12 @@ class Criticality:
                 found.tit += step_s * short
 
 
-def _rates_along(path: Curve, corner: Corner, scene: Scene, number: int) -> tuple[float, float]:
+def _rates_along(path: Curve, corner: Corner, scene: Scene, number: int) -> list[float]:
     """Return how fast the s of a footprint's corner grows [m/s], and its acceleration [m/s^2]."""
     x, y = (scene.outlines[number, corner.number] - scene.poses[number, :2]).tolist()
     vx, vy, yaw_rate = scene.rates[number].tolist()
-    return (path.rate(corner.s, corner.d, (vx - yaw_rate * y, vy + yaw_rate * x)),
-            path.rate(corner.s, corner.d, scene.accelerations[number].tolist()))
+    return path.rates(corner.s, corner.d, (vx - yaw_rate * y, vy + yaw_rate * x),
+                      scene.accelerations[number].tolist())
 
 
 def _compute_leader_measures(gap: float, speed: float, leader_speed: float, acceleration: float,
