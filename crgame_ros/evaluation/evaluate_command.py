@@ -171,8 +171,6 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
     if isinstance(read, dict):
         here = {key: [str(Path(name).expanduser().resolve()) for name in given[key]]
                 for key in ('games', 'scenarios', 'humans') if key in given}
-        if 'planners' in given:
-            given['planners'] = [named_file(name, Path.cwd()) for name in given['planners']]
         read = read | given | here
     return parse_plan(read, str(values.plan), base), \
         values.out or Path('evaluations') / values.plan.stem
@@ -184,7 +182,8 @@ def _given(values: argparse.Namespace) -> dict[str, Any]:
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
         if getattr(values, name)}
     if values.planners:
-        given['planners'] = [name for name in values.planners.split(',') if name]
+        given['planners'] = [named_file(name, Path.cwd())
+                             for name in values.planners.split(',') if name]
     if values.seeds is not None:
         given['seeds'] = _seeds(values.seeds)
     for name in ('perception', 'traffic'):

@@ -32,8 +32,9 @@ def code_neighbours(file: Path) -> list[Path]:
     found, to_read = {file}, [file]
     while to_read:
         reader = to_read.pop()
-        named = [reader.with_name(name) for name in _texts(reader)]
-        for path in (*named, *_modules(_imports(reader), file.parent)):
+        nodes = list(_nodes(reader))
+        named = [reader.with_name(name) for name in _texts(nodes)]
+        for path in (*named, *_modules(_imports(nodes), file.parent)):
             if path not in found and path.is_file():
                 found.add(path)
                 to_read.append(path)
@@ -52,18 +53,18 @@ def _nodes(file: Path) -> Iterator[ast.AST]:
     yield from ast.walk(tree)
 
 
-def _texts(file: Path) -> Iterator[str]:
-    """Yield string literals of a Python file that can be names of files in the same folder."""
-    for node in _nodes(file):
+def _texts(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield string literals that can be names of files in the same folder."""
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) \
                 and 0 < len(node.value) < 256 and '\0' not in node.value \
                 and '/' not in node.value and node.value not in ('.', '..'):
             yield node.value
 
 
-def _imports(file: Path) -> Iterator[str]:
-    """Yield the first parts of the names of the modules that a Python file imports."""
-    for node in _nodes(file):
+def _imports(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    """Yield the first parts of the names of imported modules."""
+    for node in nodes:
         if isinstance(node, ast.Import):
             yield from (alias.name.partition('.')[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
