@@ -24,18 +24,20 @@ GAMES = ('t_junction', 'fog', 'traffic', 'cut_in', 'blocked_lane', 'crossing', '
 def test_a_game_is_the_same_wherever_its_map_lies(
         tmp_path: Path, game: str, degrees: float, offset: tuple[float, float],
         most: float) -> None:
-    angle, path = math.radians(degrees), scenarios_directory() / f'{game}.yaml'
-    one, other = (run_placed(path, tmp_path, *place, DURATION_S)
-                  for place in ((0.0, (0.0, 0.0)), (angle, offset)))
-    assert len(one.vehicle_states) == len(other.vehicle_states)
-    assert max(difference(one, other, angle, offset)) < most
+    assert _moved(tmp_path, game, degrees, offset) < most
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('game', ['fog', 'occluded_pedestrian', 't_junction'])
 def test_a_turned_game_is_the_same(tmp_path: Path, game: str) -> None:
     """Those that noise, and the end of a road of a round length, once made different."""
-    path, angle = scenarios_directory() / f'{game}.yaml', math.radians(137.0)
-    one, other = (run_placed(path, tmp_path, each, (0.0, 0.0), DURATION_S)
-                  for each in (0.0, angle))
-    assert max(difference(one, other, angle, (0.0, 0.0))) < 1e-6
+    assert _moved(tmp_path, game, 137.0, (0.0, 0.0)) < 1e-6
+
+
+def _moved(folder: Path, game: str, degrees: float, offset: tuple[float, float]) -> float:
+    """Return the largest difference that another place of the map makes."""
+    angle, path = math.radians(degrees), scenarios_directory() / f'{game}.yaml'
+    one, other = (run_placed(path, folder, *place, DURATION_S)
+                  for place in ((0.0, (0.0, 0.0)), (angle, offset)))
+    assert len(one.vehicle_states) == len(other.vehicle_states)
+    return max(difference(one, other, angle, offset))
