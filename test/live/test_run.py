@@ -186,6 +186,30 @@ def test_every_status_has_the_time_of_the_run_and_an_owner(finished: Launcher) -
         assert found == sorted(found), name
 
 
+def test_the_first_step_waits_until_the_recorder_hears_all_nodes(finished: Launcher) -> None:
+    """
+    Step 1 comes after the recorder's report that it has heard planner, driver and supervisor.
+
+    Without that, the first reports of a node that the recorder finds late are not recorded.
+    """
+    awaited = {'/av0/plan', '/hv0/driver_command', '/timing/frame_skip'}
+    heard_ns: list[int] = []
+    clock_ns: list[int] = []
+    with BagReader(finished.out / 'bag') as reader:
+        for item in reader.decoded(['/clock', '/diagnostics']):
+            if item.topic == '/clock':
+                stamp = item.message.clock
+                clock_ns.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
+                if clock_ns[-1] > clock_ns[0]:
+                    first_step_ns = item.log_time_ns
+                    break
+            heard_ns += [item.log_time_ns for status in getattr(item.message, 'status', [])
+                         if status.name == 'recorder_node: recorded topics'
+                         and awaited <= {value.key for value in status.values}]
+    assert heard_ns
+    assert min(heard_ns) < first_step_ns
+
+
 def test_no_step_is_missing_in_the_recording(finished: Launcher) -> None:
     """Cycles 1 to 350 and states 0 to 350 are there, each once."""
     numbers: list[int] = []

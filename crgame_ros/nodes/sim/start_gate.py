@@ -20,6 +20,9 @@ ASK_AGAIN_NS = NS_PER_S // 2
 CLOCK_AGAIN_NS = NS_PER_S // 10
 # The run waits this long for drivers without a device [ns].
 DRIVER_PATIENCE_NS = 3 * NS_PER_S
+# Latched topics of nodes that answer nothing: once the recorder has received one, it and the node
+# have discovered each other.
+LATCHED = {'timesync_node': '/timing/frame_skip'}
 
 
 class StartGate:
@@ -64,10 +67,11 @@ class StartGate:
                        if seat.recording is None
                        and {'driver_node', f'driver_node_{seat.id}'} & set(companions)}
         self._heard = heard
-        # Topics of other nodes that must be recorded from the start, with their vehicles.
+        # Topics of other nodes that must be recorded from the start, by vehicle or node.
         self._unrecorded: dict[str, str] = {} if heard is None else {
             **{av_id: f'/{av_id}/plan' for av_id in self._planners},
-            **{seat_id: f'/{seat_id}/driver_command' for seat_id in self._seats}}
+            **{seat_id: f'/{seat_id}/driver_command' for seat_id in self._seats},
+            **{node: topic for node, topic in LATCHED.items() if node in companions}}
         self._began_ns = 0
         self._asked_ns = 0
         self._told_ns = 0
@@ -112,7 +116,7 @@ class StartGate:
             self._traffic_answers = None
         if self._heard is not None and self._unrecorded:
             missing = self._heard.missing(set(self._unrecorded.values()))
-            self._unrecorded = {vehicle_id: topic for vehicle_id, topic
+            self._unrecorded = {sender: topic for sender, topic
                                 in self._unrecorded.items() if topic in missing}
         if now_ns - self._asked_ns > ASK_AGAIN_NS:
             self._asked_ns = now_ns
