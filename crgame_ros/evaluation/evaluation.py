@@ -5,7 +5,9 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 import json
+import math
 from pathlib import Path
+import time
 from typing import Any
 
 from crgame_ros.errors import CrgameError
@@ -21,6 +23,8 @@ from crgame_ros.evaluation.results.parts import PART_CELLS, ResultParts
 GIGABYTE = 1_000_000_000
 # Cells submitted per computing thread: enough that none waits, few enough for memory.
 AHEAD = 4
+# The scheduler counts its workers in 35 ms where there are 500: it is asked at this period [s].
+COUNT_S = 2.0
 # How often a cell is submitted again if its worker is gone.
 _ROUNDS = 5
 
@@ -144,6 +148,7 @@ class _Flight:
         # Contents of the cells in computation, and the number of these cells for each.
         self._contents: dict[str, Any] = {}
         self._uses: dict[str, int] = {}
+        self._threads, self._counted_s = 0, -math.inf
 
     def results(self, cells: Iterator[Cell]) -> Iterator[tuple[Cell, dict[str, Any]]]:
         """
@@ -176,9 +181,12 @@ class _Flight:
 
     @property
     def threads(self) -> int:
-        """Return the number of computing threads."""
-        return sum(worker['nthreads'] for worker in
-                   self._client.scheduler_info(n_workers=-1)['workers'].values())
+        """Return the number of computing threads, counted every few seconds."""
+        if time.monotonic() - self._counted_s > COUNT_S:
+            workers = self._client.scheduler_info(n_workers=-1)['workers']
+            self._threads = sum(worker['nthreads'] for worker in workers.values())
+            self._counted_s = time.monotonic()
+        return self._threads
 
     def _send(self, cell: Cell, rounds: int) -> Any:
         from crgame_ros.evaluation.cell_process import compute

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of an evaluation survive every end of the process that writes them."""
 
+import os
 from pathlib import Path
 import subprocess
 import sys
+import time
 from typing import Any
 
 from crgame_ros.errors import InputError
@@ -101,6 +103,44 @@ def test_what_is_not_wanted_is_put_away_and_comes_back(tmp_path: Path) -> None:
     assert sorted(seeds(tmp_path, 'vehicles', 'distance')) == sorted(
         number + 0.1 for number in (0, 1, 2, 4, 5, 6, 7) for _ in (0, 1))
     assert seeds(tmp_path / EARLIER) == [3]
+
+
+def test_each_part_that_was_put_away_is_read_as_often_as_one(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reading all parts for each of them took hours with some thousand parts."""
+    reads: dict[Path, int] = {}
+    read_table = pq.read_table
+
+    def counted(path: Path, **options: Any) -> pa.Table:
+        reads[path] = reads.get(path, 0) + 1
+        return read_table(path, **options)
+
+    with ResultParts(tmp_path, part_cells=1) as parts:
+        for number in range(12):
+            parts.add(rows(number))
+        assert parts.keep_wanted(lambda key, status: int(key, 16) > 9) == 10
+        monkeypatch.setattr(pq, 'read_table', counted)
+        assert parts.keep_wanted(lambda key, status: int(key, 16) > 9) == 0
+    # Ten parts are empty now, and two are not.
+    assert len(reads) == 22
+    assert max(reads.values()) <= 2
+
+
+def test_a_second_of_cells_is_written_to_the_disk_at_once(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each cell is with the operating system when it is added; the disk is asked rarely."""
+    synced: list[int] = []
+    with ResultParts(tmp_path) as parts:
+        parts.add(rows(0))
+        monkeypatch.setattr(os, 'fsync', synced.append)
+        monkeypatch.setattr(time, 'monotonic', lambda: 0.0)
+        for number in range(1, 100):
+            parts.add(rows(number))
+            assert len(next(tmp_path.glob('journal*')).read_text().splitlines()) == number + 1
+        assert not synced
+        monkeypatch.setattr(time, 'monotonic', lambda: 1e12)
+        parts.add(rows(100))
+    assert len(synced) == 1
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from functools import partial
 import json
 import os
 from pathlib import Path
+import time
 from types import TracebackType
 from typing import Any, IO, Self
 
@@ -26,6 +27,8 @@ import pyarrow.parquet as pq
 PART_CELLS = 256
 JOURNAL, LOCK = 'journal', '.lock'
 EARLIER = 'earlier'
+# Rows of a killed process are safe at once; those of a machine that loses its power after [s].
+SYNC_S = 1.0
 
 
 def part_name(number: int) -> str:
@@ -36,6 +39,8 @@ def part_name(number: int) -> str:
 class ResultParts:
     """
     The store of finished cells' rows, which loses none however the process ends.
+
+    A machine that fails loses the rows of the last second.
 
     Rows are appended to a journal, a line for each cell. Every `part_cells` of them are written
     as a part of each table. The part of `cells` is written last: if it exists, all are complete.
@@ -59,6 +64,7 @@ class ResultParts:
             raise _refusal(folder, error) from error
         self._rows: list[dict[str, Any]] = []
         self._journal: IO[str] | None = None
+        self._synced_s = 0.0
         self._journal_path = folder
         self._start_journal(self._recover())
 
@@ -80,7 +86,9 @@ class ResultParts:
             assert self._journal is not None
             self._journal.write(json.dumps(rows) + '\n')
             self._journal.flush()
-            os.fsync(self._journal.fileno())
+            if time.monotonic() - self._synced_s > SYNC_S:
+                os.fsync(self._journal.fileno())
+                self._synced_s = time.monotonic()
             self._rows.append(dict(rows))
             if len(self._rows) >= self._part_cells:
                 self.finish_part()
@@ -120,9 +128,16 @@ class ResultParts:
         """
         self.finish_part()
         earlier, away = self.folder / EARLIER, 0
-        before = _part_names(self.folder)
+        before, known = _part_names(self.folder), set(self.keys())
+
+        def is_wanted_again(key: str, status: str) -> bool:
+            if key in known or not wanted(key, status):
+                return False
+            known.add(key)
+            return True
+
         for name in _part_names(earlier):
-            _move(earlier, name, self.folder, partial(_is_new, wanted, set(self.keys())))
+            _move(earlier, name, self.folder, is_wanted_again)
         for name in before:
             away += _move(self.folder, name, earlier,
                           lambda key, status: not wanted(key, status))
@@ -155,10 +170,6 @@ def _write_lines(path: Path, rows: list[dict[str, Any]]) -> None:
     part = path.with_suffix('.part')
     part.write_text(''.join(json.dumps(row) + '\n' for row in rows), encoding='utf-8')
     part.replace(path)
-
-
-def _is_new(wanted: Callable[[str, str], bool], known: set[str], key: str, status: str) -> bool:
-    return wanted(key, status) and key not in known
 
 
 def _part_names(folder: Path) -> list[str]:
