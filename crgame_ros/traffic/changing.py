@@ -27,7 +27,7 @@ from crgame_ros.traffic.lane_change_intents import (
     TOO_NEAR,
 )
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.lane_table import LaneTable, project_on
+from crgame_ros.traffic.lane_table import angle_between, LaneTable, project_on
 from crgame_ros.traffic.leaders import first_from, Followers, Ways
 from crgame_ros.traffic.placement import Entries, front_within, rear_within
 from crgame_ros.traffic.routes import Routes
@@ -103,7 +103,7 @@ def _find_all_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, 
         y = agents.y[slot] + agents.rear_to_center[slot] * math.sin(yaw)
         guess = agents.s[slot] * lanes.length[lane[i]] / lanes.length[agents.lane[slot]]
         s, d, heading = project_on(lanes, lane[i], x, y, guess, 3)
-        result.s[i], result.d[i], result.turn[i] = s, d, yaw - heading
+        result.s[i], result.d[i], result.turn[i] = s, d, angle_between(yaw, heading)
         _find_ahead(lanes, following, agents, slot, entries, result, i)
         _find_behind(lanes, agents, slot, entries, result, i, pending_lane, pending_offset)
 
