@@ -24,6 +24,7 @@ from crgame_ros.recording.metadata import read_metadata
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.run_trajectories import read_trajectories
+from crgame_ros.ros.messages import from_time
 from crgame_ros.timing.cycle_rows import CycleTable
 from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS, wait_until
@@ -63,10 +64,9 @@ def _poses(bag: Path) -> dict[int, dict[str, tuple[float, float, float]]]:
     poses: dict[int, dict[str, tuple[float, float, float]]] = {}
     with BagReader(bag) as reader:
         for item in reader.decoded(['/vehicles/state']):
-            stamp = item.message.header.stamp
             point = item.message.points[0]
             values = dict(zip(item.message.joint_names, point.positions, strict=True))
-            poses[stamp.sec * 1_000_000_000 + stamp.nanosec] = {
+            poses[from_time(item.message.header.stamp)] = {
                 name: tuple(values[f'{name}/{joint}'] for joint in ('x', 'y', 'yaw'))
                 for name in {joint.split('/')[0] for joint in values}}
     start_ns = min(poses)
@@ -168,18 +168,15 @@ def test_every_status_has_the_time_of_the_run_and_an_owner(finished: Launcher) -
     with BagReader(finished.out / 'bag') as reader:
         clock = [item.message.clock for item in reader.decoded(['/clock'])]
         for item in reader.decoded(['/diagnostics', '/hv0/drivability', '/av0/drivability']):
-            stamp = item.message.header.stamp
             for status in item.message.status:
                 owners.setdefault(status.hardware_id, set()).add(status.name)
-                stamps.setdefault(status.name, []).append(
-                    stamp.sec * 1_000_000_000 + stamp.nanosec)
+                stamps.setdefault(status.name, []).append(from_time(item.message.header.stamp))
     assert {'/sim_node', '/planner_node_av0', '/recorder_node', '/drivability_node',
             '/timesync_node', '/criticality_node'} <= owners.keys() <= {
                 f'/{name}' for name in NODES}
     assert all(owner.split('/')[1].startswith(name.partition(':')[0].partition('_node')[0])
                for owner, names in owners.items() for name in names if ':' in name)
-    first_ns, last_ns = (value.sec * 1_000_000_000 + value.nanosec
-                         for value in (clock[0], clock[-1]))
+    first_ns, last_ns = from_time(clock[0]), from_time(clock[-1])
     assert last_ns - first_ns == STEPS * STEP_NS
     for name, found in stamps.items():
         assert first_ns <= min(found) and max(found) <= last_ns, name
@@ -198,8 +195,7 @@ def test_the_first_step_waits_until_the_recorder_hears_all_nodes(finished: Launc
     with BagReader(finished.out / 'bag') as reader:
         for item in reader.decoded(['/clock', '/diagnostics']):
             if item.topic == '/clock':
-                stamp = item.message.clock
-                clock_ns.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
+                clock_ns.append(from_time(item.message.clock))
                 if clock_ns[-1] > clock_ns[0]:
                     first_step_ns = item.log_time_ns
                     break

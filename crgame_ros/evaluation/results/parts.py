@@ -27,7 +27,7 @@ import pyarrow.parquet as pq
 PART_CELLS = 256
 JOURNAL, LOCK = 'journal', '.lock'
 EARLIER = 'earlier'
-# Rows of a killed process are safe at once; those of a machine that loses its power after [s].
+# The journal is written to the disk at most this often [s].
 SYNC_S = 1.0
 
 
@@ -40,7 +40,7 @@ class ResultParts:
     """
     The store of finished cells' rows, which loses none however the process ends.
 
-    A machine that fails loses the rows of the last second.
+    A machine that fails may lose those that were added within a second of the last write to disk.
 
     Rows are appended to a journal, a line for each cell. Every `part_cells` of them are written
     as a part of each table. The part of `cells` is written last: if it exists, all are complete.
