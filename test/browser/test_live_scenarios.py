@@ -123,9 +123,9 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     page.wait("crgame.driving.seat === 'hv0'", 'the seat of who has brought it')
     page.wait_for_run('running')
     page.wait('crgame.store.status.planners.av0?.accepted > 3', 'plans of its AV')
+    speed = page.vehicle(0)[3]
     page.hold('w')
     page.graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)
-    speed = page.vehicle(0)[3]
     page.wait('crgame.world.shown.vehicles[3] > arguments[0] + 1', 'a faster car', speed)
     page.release('w')
     assert page.browser.console_errors() == []
