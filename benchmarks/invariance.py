@@ -6,9 +6,11 @@ Check that a run does not depend on where its map lies: turned, and moved to UTM
 
     python benchmarks/invariance.py
     python benchmarks/invariance.py scenarios/merge.yaml --angles 45 --duration 20
+    python benchmarks/invariance.py FOLDER/*.xml
 
-Each game runs offline as it is and placed anew, with its planners, perception and traffic. The
-table gives the largest difference of positions, yaws and speeds, after the placement is undone.
+In a CommonRoad scenario with a planning problem, an AV drives among reactive traffic. Each game
+runs offline as it is and placed anew, with its planners, perception and traffic. The table gives
+the largest difference of positions, yaws and speeds, after the placement is undone.
 """
 
 import argparse
@@ -27,7 +29,8 @@ def main() -> None:
     """Print one line for each game and placement."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('games', nargs='*', type=Path, help='game files; all of scenarios/')
+    parser.add_argument('games', nargs='*', type=Path,
+                        help='games or scenarios; all games of scenarios/')
     parser.add_argument('--angles', nargs='+', type=float, default=(30.0, 45.0, 137.0),
                         metavar='DEGREES')
     parser.add_argument('--duration', type=float, default=10.0, help='of each run [s]')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of games whose maps are turned or moved, compared with those that are not."""
+"""Runs of games and scenarios whose maps are turned or moved, compared with those that are not."""
 
 import math
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import Any
 
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
-from crgame_ros.game.file import load_game, parse_game
+from crgame_ros.game.file import parse_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
@@ -19,6 +19,9 @@ import yaml
 # Zone 32 of UTM, near Munich [m].
 UTM = (691_000.0, 5_336_000.0)
 DIGITS = 14
+# A scenario without a game: one AV, and agents that take the place of its recorded vehicles.
+PLAYED = {'humans': [], 'avs': [{'id': 'av0', 'planner': 'idm'}], 'seed': 1,
+          'traffic': {'recorded': 'reactive', 'agents': 10}}
 
 
 def placed(values: Any, angle: float, offset: tuple[float, float]) -> Any:
@@ -47,8 +50,14 @@ def placed(values: Any, angle: float, offset: tuple[float, float]) -> Any:
 
 def run_placed(path: Path, folder: Path, angle: float, offset: tuple[float, float],
                duration_s: float) -> OfflineResult:
-    """Run a game whose map is turned by an angle [rad] around the origin, then moved."""
-    game = load_game(path)
+    """
+    Run a game whose map is turned by an angle [rad] around the origin, then moved.
+
+    :param path: of a game, or of a CommonRoad scenario, which is then `PLAYED`.
+    """
+    played = {**PLAYED, 'scenario': path.name} if path.suffix == '.xml' \
+        else yaml.safe_load(path.read_text())
+    game = parse_game(played, str(path), path.parent)
     scenario, problems = CommonRoadFileReader(str(game.scenario)).open()
     for each in (scenario, problems):
         each.translate_rotate(np.zeros(2), angle)
@@ -56,7 +65,7 @@ def run_placed(path: Path, folder: Path, angle: float, offset: tuple[float, floa
     name = folder / f'{path.stem}_{round(math.degrees(angle))}_{round(offset[0])}.xml'
     CommonRoadFileWriter(scenario, problems, decimal_precision=DIGITS).write_to_file(
         str(name), OverwriteExistingFile.ALWAYS)
-    values = placed(yaml.safe_load(path.read_text()), angle, offset)
+    values = placed(played, angle, offset)
     values['scenario'] = str(name)
     return run_offline(build_setup(parse_game(values, str(path), path.parent)),
                        duration_s=duration_s)

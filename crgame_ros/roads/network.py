@@ -29,6 +29,8 @@ _SLOW_USERS = {RoadUser.PEDESTRIAN, RoadUser.BICYCLE, RoadUser.TRAIN}
 # A lane for cars is preferred, unless another one fits the heading much better.
 _NOT_FOR_CARS_PENALTY = 0.2
 _OFFSET_WEIGHT = 0.1
+# Scores and angles that agree in these digits are equal.
+_DIGITS = 6
 # Published maps have successors that begin elsewhere (metres away, even the lanelet itself).
 _MAX_GAP = 1.0
 _MAX_CHAIN = 1000
@@ -279,7 +281,8 @@ class RoadNetwork:
             score = score + _NOT_FOR_CARS_PENALTY
         if yaws is not None:
             score = score + np.abs(wrap_pi_array(yaws - line.heading_at(s)))
-        return np.asarray(score, dtype=np.float64)
+        # Lanes that fork lie upon each other at first: of equal ones, rounding must not choose.
+        return np.asarray(np.round(score, _DIGITS), dtype=np.float64)
 
     def _straightest(self, lanelet_id: int, candidates: Sequence[int], end: int) -> int | None:
         """Return the straightest lanelet that touches this one at its end (-1) or start (0)."""
@@ -288,7 +291,7 @@ class RoadNetwork:
         for candidate in candidates:
             other = self.line(candidate)
             gap = np.hypot(*(other.points[-1 - end] - line.points[end]))
-            turn = abs(wrap_pi(float(other.heading[end] - line.heading[end])))
+            turn = round(abs(wrap_pi(float(other.heading[end] - line.heading[end]))), _DIGITS)
             if gap <= _MAX_GAP and candidate != lanelet_id:
                 scored.append((not self.is_for_cars(candidate), turn, candidate))
         return min(scored)[2] if scored else None

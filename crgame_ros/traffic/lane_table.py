@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+# A place in a lane's coordinates is found when a correction is smaller [m]; in a bend each of them
+# makes the error smaller by the offset over the radius.
+FOUND = 1e-9
+MOST_ROUNDS = 12
+
 
 class Point(Protocol):
     """
@@ -133,7 +138,8 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
 
     Cosine and sine are interpolated, because headings of neighbouring points are nearly equal.
 
-    :param rounds: of correction; one is enough for a guess that is off by centimetres.
+    :param rounds: greatest number of corrections; one is enough for a guess that is off by
+        centimetres.
     :return: s [m], d [m] and the lane's heading there [rad]
     """
     s, d, yaw = guess, 0.0, 0.0
@@ -145,9 +151,12 @@ def project_on(lanes: LaneTable, lane: int, x: float, y: float, guess: float,
         inside = min(max(share, 0.0), 1.0)
         cos = here.cos + inside * (after.cos - here.cos)
         sin = here.sin + inside * (after.sin - here.sin)
-        s += east * cos + north * sin
+        ahead = east * cos + north * sin
+        s += ahead
         d = north * cos - east * sin
         yaw = here.yaw + inside * (after.yaw - here.yaw)
+        if abs(ahead) < FOUND:
+            break
     return s, d, yaw
 
 

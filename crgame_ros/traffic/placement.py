@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 from crgame_ros.traffic.compiled import bare, compiled, inlined
 from crgame_ros.traffic.lane_cells import cell_of, CellTable
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.lane_table import angle_between, LaneTable, nearest_row, project_on
+from crgame_ros.traffic.lane_table import (
+    angle_between,
+    LaneTable,
+    MOST_ROUNDS,
+    nearest_row,
+    project_on,
+)
 import numpy as np
 from numpy.typing import NDArray
 
@@ -173,7 +179,7 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, ahea
     x, y, heading = bodies.poses[i, 0], bodies.poses[i, 1], bodies.poses[i, 2]
     half_length, half_width = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
     reach = half_length + half_width
-    s, d, yaw = project_on(lanes, lane, x, y, guess, 2)
+    s, d, yaw = project_on(lanes, lane, x, y, guess, MOST_ROUNDS)
     if s < -reach or s > lanes.length[lane] + reach or abs(d) > 20.0:
         return 0
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -189,7 +195,7 @@ def _put(lanes: LaneTable, bodies: Bodies, i: int, lane: int, guess: float, ahea
         at, off, _ = project_on(
             lanes, lane, x + along * ahead_x - left * ahead_y,
             y + along * ahead_y + left * ahead_x,
-            s + along * (ahead_x * cos + ahead_y * sin), 2)
+            s + along * (ahead_x * cos + ahead_y * sin), MOST_ROUNDS)
         found.corners[n, corner, 0], found.corners[n, corner, 1] = at, off
         rear, front = min(rear, at), max(front, at)
         low, high = min(low, off), max(high, off)
