@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 SAMPLING = 0.25
 # Share of a step by which a length may miss a multiple of it.
 ROUNDING = 1e-6
+# Lengths [m] and angles [rad] that agree in these digits are equal.
+EQUAL_DIGITS = 6
 COARSE = 4
 # The smoothing widths tried in turn until the curvature bound holds [m].
 WIDTHS = (2.5, 4.0, 6.0, 9.0)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import math
 
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.polyline import EQUAL_DIGITS
 from crgame_ros.geometry.reference_point import seen_from
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,6 @@ CANDIDATES = 16
 STRIDE = 2
 # A pose farther than this from every centre line is on no lane [m].
 REACH = 3.0
-# Distances that agree in these digits are equal.
-DIGITS = 6
 
 
 class LaneLookup:
@@ -52,7 +51,7 @@ class LaneLookup:
         distance, sample = distance.reshape(-1, count), sample.reshape(-1, count)
         known = np.minimum(sample, len(self._poses) - 1)
         angle = np.abs(wrap_pi_array(poses[:, None, 2] - self._poses[known, 2]))
-        cost = np.round(np.where(angle <= self._max_angle, distance, math.inf), DIGITS)
+        cost = np.round(np.where(angle <= self._max_angle, distance, math.inf), EQUAL_DIGITS)
         # Lanes that fork lie upon each other at first: of equally near ones the first counts.
         nearest_first = cost == cost.min(axis=1, keepdims=True)
         best = np.argmin(np.where(nearest_first, known, len(self._poses)), axis=1)

@@ -10,6 +10,7 @@ from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.geometry.curve import Curve
+from crgame_ros.geometry.polyline import EQUAL_DIGITS
 from crgame_ros.roads.signs import MAX_SPEED, sign_elements
 from crgame_ros.roads.surface import lanelet_areas
 import numpy as np
@@ -29,8 +30,6 @@ _SLOW_USERS = {RoadUser.PEDESTRIAN, RoadUser.BICYCLE, RoadUser.TRAIN}
 # A lane for cars is preferred, unless another one fits the heading much better.
 _NOT_FOR_CARS_PENALTY = 0.2
 _OFFSET_WEIGHT = 0.1
-# Scores and angles that agree in these digits are equal.
-_DIGITS = 6
 # Published maps have successors that begin elsewhere (metres away, even the lanelet itself).
 _MAX_GAP = 1.0
 _MAX_CHAIN = 1000
@@ -282,7 +281,7 @@ class RoadNetwork:
         if yaws is not None:
             score = score + np.abs(wrap_pi_array(yaws - line.heading_at(s)))
         # Lanes that fork lie upon each other at first: of equal ones, rounding must not choose.
-        return np.asarray(np.round(score, _DIGITS), dtype=np.float64)
+        return np.asarray(np.round(score, EQUAL_DIGITS), dtype=np.float64)
 
     def _straightest(self, lanelet_id: int, candidates: Sequence[int], end: int) -> int | None:
         """Return the straightest lanelet that touches this one at its end (-1) or start (0)."""
@@ -291,7 +290,7 @@ class RoadNetwork:
         for candidate in candidates:
             other = self.line(candidate)
             gap = np.hypot(*(other.points[-1 - end] - line.points[end]))
-            turn = round(abs(wrap_pi(float(other.heading[end] - line.heading[end]))), _DIGITS)
+            turn = round(abs(wrap_pi(float(other.heading[end] - line.heading[end]))), EQUAL_DIGITS)
             if gap <= _MAX_GAP and candidate != lanelet_id:
                 scored.append((not self.is_for_cars(candidate), turn, candidate))
         return min(scored)[2] if scored else None
