@@ -19,6 +19,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Their tests start ROS graphs, servers or browsers; they come first, because they wait more
 # than they compute.
 GRAPH_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
+# Published scenarios beside the project; tests that need them skip where they are absent.
+PUBLISHED = ROOT.parent / 'shared' / 'scenarios'
 TIERS = ('quick', 'default', 'all')
 
 
@@ -48,13 +50,15 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out tests of other tiers; graphs come first; each file has a worker to itself."""
     tier = config.getoption('--tier')
-    kept, left_out, seen = [], [], set[str]()
+    kept, left_out, cases = [], [], dict[str, set[str]]()
     for item in items:
         if item.path.relative_to(ROOT / 'test').parts[0] in GRAPH_FOLDERS:
             item.add_marker(pytest.mark.graph)
-        case_of = item.nodeid.partition('[')[0]
-        (kept if _is_in(item, tier, case_of in seen) else left_out).append(item)
-        seen.add(case_of)
+        test, _, case = item.nodeid.removesuffix(']').partition('[')
+        (kept if _is_in(item, tier, case, is_first=test not in cases) else left_out).append(item)
+        cases.setdefault(test, set()).add(case)
+    if PUBLISHED.is_dir() and not any('::' in path for path in config.args):
+        _check_named_cases(items, cases)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
     items[:] = sorted(kept, key=lambda item: item.get_closest_marker('graph') is None)
@@ -63,13 +67,26 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition('::')[0]))
 
 
-def _is_in(item: pytest.Item, tier: str, is_further_case: bool) -> bool:
+def _is_in(item: pytest.Item, tier: str, case: str, is_first: bool) -> bool:
     if tier == 'all':
         return True
     marked = {mark.name for mark in item.iter_markers()}
-    if {'exhaustive', 'clock'} & marked or ('matrix' in marked and is_further_case):
+    if {'exhaustive', 'clock'} & marked:
         return False
+    matrix = item.get_closest_marker('matrix')
+    if matrix and not (case in matrix.args if matrix.args else is_first):
+        # A matrix without cases is skipped, and says so.
+        return item.get_closest_marker('skip') is not None
     return tier == 'default' or not {'graph', 'slow'} & marked
+
+
+def _check_named_cases(items: list[pytest.Item], cases: dict[str, set[str]]) -> None:
+    """Raise an error if `matrix` names a case that its test does not have."""
+    for item in items:
+        matrix, test = item.get_closest_marker('matrix'), item.nodeid.partition('[')[0]
+        for case in matrix.args if matrix else ():
+            if case not in cases[test]:
+                raise pytest.UsageError(f'{test} has no case {case}')
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
@@ -88,10 +105,9 @@ def project_root() -> Path:
 @pytest.fixture(scope='session')
 def shared_scenarios() -> Path:
     """Return the directory of published scenarios beside the project, or skip."""
-    directory = ROOT.parent / 'shared' / 'scenarios'
-    if not directory.is_dir():
-        pytest.skip(f'no published scenarios at {directory}')
-    return directory
+    if not PUBLISHED.is_dir():
+        pytest.skip(f'no published scenarios at {PUBLISHED}')
+    return PUBLISHED
 
 
 @pytest.fixture

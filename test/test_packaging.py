@@ -79,6 +79,7 @@ def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(target.glob('*.whl'))
 
 
+@pytest.mark.matrix('options1')
 @pytest.mark.slow
 @pytest.mark.parametrize('options', [[], ['--symlink-install']])
 def test_colcon_makes_executables(source: Path, options: list[str], tmp_path: Path) -> None:

@@ -69,6 +69,7 @@ def check_against_file(document: dict[str, Any], setup: Setup) -> None:
     assert [item['id'] for item in document['objects']] == list(setup.obstacles.ids)
 
 
+@pytest.mark.matrix('intersection', 'parked_cars')
 @pytest.mark.parametrize('path', GAMES, ids=lambda path: path.stem)
 def test_own_games(path: Path) -> None:
     setup = build_setup(load_game(path))
@@ -79,6 +80,7 @@ def test_own_games(path: Path) -> None:
     assert {goal['av'] for goal in document['goals']} == {av.id for av in setup.avs}
 
 
+@pytest.mark.matrix('USA_Lanker-1_3_T-1', 'ZAM_Tjunction-1_42_T-1')
 @pytest.mark.parametrize('name', PUBLISHED)
 def test_published_scenarios(name: str, shared_scenarios: Path) -> None:
     setup = published(shared_scenarios, name)

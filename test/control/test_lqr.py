@@ -122,6 +122,7 @@ def test_gains_beyond_the_table_are_held() -> None:
     assert tracker.gain(-7.0) == pytest.approx(np.mean((tracker.gain(6.0), tracker.gain(8.0)), 0))
 
 
+@pytest.mark.matrix('straight-30', 's-curve-15', 'circle-15')
 @pytest.mark.slow
 @pytest.mark.parametrize(('speed', 'curvature', 'bound', 'settled'), [
     (5.0, lambda s: 0.0, 1e-9, 1e-9), (15.0, lambda s: 0.0, 1e-9, 1e-9),
@@ -172,6 +173,7 @@ def test_a_controller_that_knows_no_slip_leaves_the_circle_too() -> None:
     assert -0.03 < errors[-1, 0] < -0.005
 
 
+@pytest.mark.matrix('2.0-15.0', '-4.0-3.0')
 @pytest.mark.parametrize('speed', [2.0, 3.0, 5.0, 15.0, 30.0])
 @pytest.mark.parametrize('offset', [0.5, 2.0, -4.0])
 def test_an_offset_is_taken_back(speed: float, offset: float) -> None:
@@ -191,6 +193,7 @@ def test_an_offset_is_taken_back(speed: float, offset: float) -> None:
     assert np.abs(driven[:, 2]).max() < 0.5
 
 
+@pytest.mark.matrix('0.5-15.0')
 @pytest.mark.parametrize('speed', [2.0, 3.0, 5.0, 8.0, 15.0])
 @pytest.mark.parametrize('yaw', [0.5, -0.8])
 def test_a_heading_error_is_taken_back(speed: float, yaw: float) -> None:

@@ -86,6 +86,7 @@ def test_lateral_error_with_the_dynamic_bicycle(speed: float) -> None:
     assert np.abs(errors[300:, 0]).max() < 0.05
 
 
+@pytest.mark.matrix('2.0-15.0', '-8.0-3.0')
 @pytest.mark.slow
 @pytest.mark.parametrize('speed', [2.0, 3.0, 5.0, 15.0, 30.0])
 @pytest.mark.parametrize('offset', [2.0, -8.0])

@@ -181,6 +181,7 @@ def test_short_plans_are_compared_as_long_as_they_last() -> None:
     assert made.worst.lateral == pytest.approx(0.31, abs=0.01)
 
 
+@pytest.mark.matrix('roundabout')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', ['cut_in', 'roundabout', 'parked_cars'])
 def test_the_motion_that_a_planner_chose(project_root: Path, game: str) -> None:

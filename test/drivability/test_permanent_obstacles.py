@@ -55,6 +55,7 @@ def rear(x: float, y: float, yaw: float = 0.0) -> list[float]:
             0.0, 0.0, 0.0, 0.0, 0.0]
 
 
+@pytest.mark.matrix('0.5-polygon')
 @pytest.mark.slow
 @pytest.mark.parametrize('shape', [
     BMW.shape, Shape.circle(0.6), Shape.polygon(((2.0, 0.0), (-1.0, 1.0), (-0.5, 0.0),

@@ -36,6 +36,7 @@ def episode(env: DrivingEnv, seed: int, steps: int) -> list[tuple[object, ...]]:
     return drive
 
 
+@pytest.mark.matrix('fog')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', ['cut_in', 'dense_merge', 'fog'])
 def test_equal_seeds_give_equal_episodes_and_others_do_not(game: str) -> None:
@@ -76,6 +77,7 @@ def test_a_policy_drives_in_a_run_as_it_did_in_the_environment(seat: str) -> Non
     assert np.abs(np.array(states) - run)[:, :, :4].max() < 1e-6
 
 
+@pytest.mark.matrix('parked_cars-av0', 'dense_merge-av0')
 @pytest.mark.slow
 @pytest.mark.parametrize(('game', 'seat'), [
     ('two_avs', 'hv0'), ('parked_cars', 'av0'), ('occluded_pedestrian', 'hv0'),

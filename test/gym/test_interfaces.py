@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings('error')
 
 
+@pytest.mark.matrix('cut_in', 'traffic')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', shipped_games())
 def test_gymnasium_accepts_every_environment(game: str) -> None:
@@ -30,6 +31,7 @@ def test_gymnasium_accepts_every_environment(game: str) -> None:
     check_env(gymnasium.make(environment_id(game), worlds=1).unwrapped, skip_render_check=True)
 
 
+@pytest.mark.matrix('two_avs')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', shipped_games())
 def test_pettingzoo_accepts_every_game_with_all_its_seats(game: str) -> None:

@@ -89,6 +89,7 @@ def ends(loaded: LoadedScenario) -> shapely.Geometry:
     return shapely.union_all(lines)
 
 
+@pytest.mark.matrix('DEU_Guetersloh-36_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [
     'ZAM_ParkedCars-1_1_T-1', 'ZAM_Roundabout-1_1_T-1', 'USA_Lanker-1_3_T-1',

@@ -37,6 +37,7 @@ def consistency(spec: LocalisationSpec, steps: int = 400,
     return float(mean.mean()), float(((mean > low) & (mean < high)).mean())
 
 
+@pytest.mark.matrix('dropouts')
 @pytest.mark.slow
 @pytest.mark.parametrize(('spec', 'steps', 'yaw'), [
     pytest.param(LocalisationSpec(), 400, 3.0, id='default'),
@@ -52,6 +53,7 @@ def test_covariance_is_that_of_the_errors(spec: LocalisationSpec, steps: int,
     assert inside > 0.85
 
 
+@pytest.mark.matrix('yaw')
 @pytest.mark.slow
 @pytest.mark.parametrize('spec', [
     pytest.param(LocalisationSpec(position_bias=(0.2, 0.0)), id='position'),

@@ -50,6 +50,7 @@ def test_stops_behind_a_standing_car(name: str, vehicle: VehicleParameters) -> N
     assert 87.75 - 2.0 * 4.5 < front(plans[-1], vehicle) < 87.75 - 0.1
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_reaches_the_desired_speed_on_a_free_road(name: str,
@@ -59,6 +60,7 @@ def test_reaches_the_desired_speed_on_a_free_road(name: str,
     assert 9.0 < plans[-1].states[0, 3] < 10.3
 
 
+@pytest.mark.matrix('reactive')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_starts_from_rest(name: str, vehicle: VehicleParameters) -> None:
@@ -67,6 +69,7 @@ def test_starts_from_rest(name: str, vehicle: VehicleParameters) -> None:
     assert plans[-1].states[0, 3] > 2.0
 
 
+@pytest.mark.matrix('USA_US101-reactive', 'ZAM_Over-idm-package')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 @pytest.mark.parametrize('scenario', ['USA_US101', 'ZAM_Tjunction', 'ZAM_Over'])

@@ -101,6 +101,7 @@ def test_map_without_lanelets_is_a_planning_error(vehicle: VehicleParameters) ->
                           VehicleState(0.0, 0.0, 0.0, 5.0), vehicle)
 
 
+@pytest.mark.matrix('USA_Lanker-1_3_T-1', 'ZAM-Ramp-1_1-T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('path', support.shared_scenarios(), ids=support.file_id)
 def test_paths_on_real_maps_are_drivable(path: Path, vehicle: VehicleParameters) -> None:

@@ -53,6 +53,7 @@ def run(scenario: Scenario, vehicle: VehicleParameters, ticks: int,
     return plans, np.array([(plan.states[0, 0] + ahead, plan.states[0, 3]) for plan in plans])
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize('state', [TrafficLightState.RED, TrafficLightState.RED_YELLOW,
                                    TrafficLightState.YELLOW])
 def test_halts_half_a_metre_before_the_line(state: TrafficLightState,

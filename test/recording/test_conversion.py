@@ -54,6 +54,7 @@ def assert_holds(report: ConversionReport, result: OfflineResult) -> None:
                 report.first_k + step).poses[column, :2]) < TOLERANCE
 
 
+@pytest.mark.matrix('sqlite3')
 @pytest.mark.slow
 @pytest.mark.parametrize('kind', ['ours', 'mcap', 'sqlite3'])
 def test_recordings_of_every_make(tmp_path: Path, recorder: Any, drive: Drive, kind: str) -> None:

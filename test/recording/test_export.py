@@ -29,6 +29,7 @@ TRAFFIC = 'ZAM_Traffic-1_1_T-1.xml'
 TWO_AVS = 'C-ZAM_TwoAvs-1_1_T-1.xml'
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [CUT_IN, PARKED, TRAFFIC, TWO_AVS])
 def test_round_trip_of_our_own_scenarios(runs: Any, tmp_path: Path, name: str) -> None:
@@ -171,6 +172,7 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
         assert list(folder.iterdir()) == []
 
 
+@pytest.mark.matrix('False')
 @pytest.mark.slow
 @pytest.mark.parametrize('problem', [True, False])
 def test_run_without_a_driven_vehicle(runs: Any, tmp_path: Path, problem: bool) -> None:

@@ -63,6 +63,7 @@ def test_goal_refers_to_the_renumbered_lanelet(runs: Any, tmp_path: Path) -> Non
     assert scenario.lanelet_network.find_lanelet_by_id(new) is not None
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize(('pattern', 'replacement', 'told'), [
     ('<isLeftOf ref="[0-9]+"/>', '<isLeftOf ref="98765"/>', 'the schema refuses'),

@@ -54,6 +54,7 @@ def test_a_recorded_car_that_runs_into_the_av(tmp_path: Path, recorder: Any,
     assert report['notices'] == []
 
 
+@pytest.mark.matrix('500.0')
 @pytest.mark.parametrize('rate', [100.0, 500.0])
 def test_a_human_is_told_as_the_av_s_contact(rate: float, tmp_path: Path, recorder: Any) -> None:
     """One entry for both has the AV's front; above 100 Hz only each fifth state is recorded."""

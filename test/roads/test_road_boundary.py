@@ -191,6 +191,7 @@ def test_large_map_is_built_only_around_the_run(monkeypatch: pytest.MonkeyPatch)
     assert len(built) == 2  # nothing is built during checks
 
 
+@pytest.mark.matrix('projected-USA_Lanker-1_3_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', PUBLISHED)
 @pytest.mark.parametrize('offset', [(0.0, 0.0), (5.6e6, 3.2e5)], ids=['local', 'projected'])

@@ -77,6 +77,7 @@ MALFORMED = [
 ]
 
 
+@pytest.mark.matrix('_vehicles_state', '_scenario_game')
 @pytest.mark.parametrize(('name', 'vehicle', 'messages'), MALFORMED,
                          ids=[case[0].replace('/', '_') for case in MALFORMED])
 def test_no_message_stops_the_pump(setup: Setup, name: str, vehicle: str,

@@ -94,6 +94,7 @@ def test_a_run_far_from_the_origin_is_the_run_at_the_origin(
     assert here.planners['av0'].counters == there.planners['av0'].counters
 
 
+@pytest.mark.matrix('idm-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('lanelet', [0, 1, 2])
 @pytest.mark.parametrize('planner', ['idm', 'reactive', 'constant-velocity'])

@@ -52,6 +52,7 @@ def obstacles(text: str) -> ScenarioObstacles:
         + f'</lanelet>{text}</commonRoad>', 'x'))
 
 
+@pytest.mark.matrix('USA_US101-4_1_T-1.xml', 'OSC_PedestrianCollision-1_1_T-1.xml')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [
     'DEU_Flensburg-10_1_T-1.xml', 'USA_US101-4_1_T-1.xml', 'ZAM_Tutorial-1_2_T-1.xml',

@@ -154,6 +154,7 @@ def test_bicycle_along_the_lane_follows_it() -> None:
     assert prediction.predict(0, 30)[0][30, 0, 2] == pytest.approx(30.0 / RADIUS, abs=1e-3)
 
 
+@pytest.mark.matrix('USA_Lanker-1_3_T-1.xml', 'ZAM-Ramp-1_1-T-1.xml')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', [*BUSY, 'ZAM_Tutorial-1_2_T-1.xml', 'ZAM-Ramp-1_1-T-1.xml'])
 def test_rows_are_consistent(name: str) -> None:

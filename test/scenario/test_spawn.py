@@ -50,6 +50,7 @@ def box(state: VehicleState) -> pycrcc.RectOBB:
     return pycrcc.RectOBB(CAR.length / 2, CAR.width / 2, state.yaw, x, y)
 
 
+@pytest.mark.matrix('True-USA_Lanker-1_3_T-1', 'False-ZAM_Tjunction-1_42_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', NAMES)
 @pytest.mark.parametrize('with_av', [True, False])
@@ -97,6 +98,7 @@ def test_human_stands_beside_and_slightly_behind() -> None:
     assert human.speed == av.speed == 12.0
 
 
+@pytest.mark.matrix('USA_US101-4_1_T-1-ahead0-aside0', 'more/OSC_Overtake-1_1_T-1-ahead5-aside5')
 @pytest.mark.slow
 @pytest.mark.parametrize(('name', 'ahead', 'aside'), [
     # Dense traffic that does not react: the nearest place behind that no vehicle runs into.

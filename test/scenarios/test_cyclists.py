@@ -81,6 +81,7 @@ def run_into(path: Path, planner: str) -> list[tuple[float, float]]:
     return hits
 
 
+@pytest.mark.matrix('8.0-3.0-90', '14.0-5.0-140')
 @pytest.mark.slow
 @pytest.mark.parametrize('angle', [90, -60, 40, 25, 140, -155])
 @pytest.mark.parametrize(('speed', 'ride'), [(8.0, 3.0), (14.0, 5.0)])
@@ -95,6 +96,7 @@ def test_idm_runs_into_no_crossing_cyclist(angle: int, speed: float, ride: float
         assert run_into(path, 'idm') == [], late
 
 
+@pytest.mark.matrix('3.0-0.9')
 @pytest.mark.slow
 @pytest.mark.parametrize('offset', [0.0, 0.9, -1.3])
 @pytest.mark.parametrize('ride', [0.0, 3.0, -4.0])

@@ -107,6 +107,7 @@ def test_human_makes_the_av_slow_down(name: str) -> None:
     assert least < distances(result, 'av0', 'hv0').min() < most
 
 
+@pytest.mark.matrix('occluded_pedestrian')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', GAMES)
 def test_script_survives_an_uneven_clock(name: str) -> None:

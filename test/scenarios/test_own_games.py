@@ -117,6 +117,7 @@ def test_human_makes_the_av_react(name: str, av_id: str) -> None:
     assert expected.gap[0] < _gaps(played, av_id).min() < expected.gap[1]
 
 
+@pytest.mark.matrix('cut_in', 'traffic')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', sorted({name for name, _ in REACTIONS}))
 def test_no_vehicle_collides_or_leaves_the_road(name: str) -> None:
@@ -143,6 +144,7 @@ def test_cut_in_is_the_manoeuvre_of_the_paper() -> None:
     assert _gaps(result, 'av0')[-1] == pytest.approx(2.0, abs=0.3)
 
 
+@pytest.mark.matrix('roundabout')
 @pytest.mark.slow
 @pytest.mark.parametrize('path', GAMES, ids=lambda path: str(path.stem))
 def test_scripts_survive_an_uneven_clock(path: Path) -> None:

@@ -98,6 +98,7 @@ WILD = [nested(5000), {1: {2: 3}}, {None: None}, {True: 1}, 10**400, -10**400, m
         ['\udfff'], b'bytes', 1e308, {('a', 'b'): 1}, object()]
 
 
+@pytest.mark.matrix('perception')
 @pytest.mark.slow
 @pytest.mark.parametrize('kind', [Game, PerceptionSpec, TrafficSpec, EventList, Cart],
                          ids=['game', 'perception', 'traffic', 'events', 'cart'])

@@ -31,6 +31,7 @@ def run(path: Path, stop: bool, rate: float = 100.0, **options: bool) -> Offline
     return run_offline(build_setup(game), duration_s=7.0, **options)
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize(('name', 'steps'), [
     ('USA_US101-4_1_T-1', 55),        # the road bends, the human doesn't

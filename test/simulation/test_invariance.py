@@ -28,6 +28,7 @@ def test_a_game_is_the_same_wherever_its_map_lies(
     assert _moved(tmp_path, scenarios_directory() / f'{game}.yaml', degrees, offset) < most
 
 
+@pytest.mark.matrix('dense_merge')
 @pytest.mark.slow
 @pytest.mark.parametrize('game', ['dense_merge', 'fog', 'occluded_pedestrian', 't_junction'])
 def test_a_turned_game_is_the_same(tmp_path: Path, game: str) -> None:
@@ -39,6 +40,7 @@ def test_a_turned_game_is_the_same(tmp_path: Path, game: str) -> None:
     assert _moved(tmp_path, scenarios_directory() / f'{game}.yaml', 137.0, (0.0, 0.0)) < 1e-6
 
 
+@pytest.mark.matrix('more/ESP_Toledo-7_5_T-1-137.0')
 @pytest.mark.slow
 @pytest.mark.parametrize(('scenario', 'degrees'), [
     # A bend in which places depended on a grid along the map's axes.

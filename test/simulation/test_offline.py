@@ -77,6 +77,8 @@ def ways(result: OfflineResult) -> Array:
     return np.copysign(np.hypot(*moves.T), np.einsum('ij,ij->i', moves, heading))
 
 
+@pytest.mark.matrix(
+    'constant-200.0-0', 'accelerating-400.0-1', 'circle-200.0-3', 'braking-50.0-12')
 @pytest.mark.slow
 @pytest.mark.parametrize('latency', range(13))
 @pytest.mark.parametrize(('course', 'distance'), [
@@ -101,6 +103,7 @@ def test_av_covers_the_right_distance(cut_in: LoadedScenario, course: str, dista
     assert steps.max() <= result.states_of('av0')[:, 3].max() * support.DT * 1.001
 
 
+@pytest.mark.matrix('1-1000.0', '12-5.0')
 @pytest.mark.slow
 @pytest.mark.parametrize('rate', [5.0, 10.0, 20.0, 30.0, 1000.0])
 @pytest.mark.parametrize('latency', [0, 1, 12])

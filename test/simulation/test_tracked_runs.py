@@ -50,6 +50,7 @@ def perfect() -> OfflineResult:
     return run_offline(tracked('parked_cars', execution='perfect'))
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize('tracker', ['lqr', 'pure-pursuit'])
 @pytest.mark.parametrize('dynamics', ['dynamic-bicycle', 'ks'])
@@ -69,6 +70,7 @@ def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
     assert result.state_hash != perfect.state_hash
 
 
+@pytest.mark.matrix('ZAM_Tjunction-1_42_T-1-6.0')
 @pytest.mark.slow
 @pytest.mark.parametrize(('name', 'metres'), [
     ('DEU_Flensburg-10_1_T-1', 2.5), ('ZAM_Tjunction-1_42_T-1', 6.0)])
@@ -145,6 +147,7 @@ def test_yaw_rate_follows_the_slip() -> None:
     np.testing.assert_allclose(turned[turning[1:]], expected[1:][turning[1:]], atol=0.01)
 
 
+@pytest.mark.matrix('estimated')
 @pytest.mark.slow
 @pytest.mark.parametrize('pose', ['true', 'estimated'])
 def test_a_biased_estimate_puts_the_car_beside_the_lane(pose: str) -> None:

@@ -83,6 +83,7 @@ def bits(run: support.Run, *numbers: int) -> bytes:
     return np.array(run.poses)[:, chosen].tobytes() + np.array(run.speeds)[:, chosen].tobytes()
 
 
+@pytest.mark.matrix('model-options-options')
 @pytest.mark.slow
 @pytest.mark.parametrize(('given', 'changed'), [
     ({'politeness': 1.0}, {'politeness': 1.0}),

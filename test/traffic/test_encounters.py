@@ -50,6 +50,7 @@ def touch(agents: Agents, braking: float, room: float) -> bool:
     return False
 
 
+@pytest.mark.matrix('2.3')
 @pytest.mark.slow
 @pytest.mark.parametrize('angle', [1.57, 2.3, -0.9, 3.0])
 def test_nothing_is_braked_for_that_passes(angle: float) -> None:

@@ -43,6 +43,7 @@ def never(found: Verdict) -> list[str]:
                 x.what == 'off road' and float(x.note.split()[-2]) < TOO_LONG)]
 
 
+@pytest.mark.matrix('USA_Lanker-1_3_T-1', 'more/ESP_Toledo-7_5_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', MAPS)
 def test_no_agent_collides_runs_a_light_or_leaves_the_road(name: str) -> None:

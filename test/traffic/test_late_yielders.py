@@ -95,6 +95,7 @@ def test_a_late_yielder_alone_drives_like_any_other(shared_scenarios: Path) -> N
     assert np.hypot(*(np.nanmax(poses[0], axis=0) - np.nanmin(poses[0], axis=0))[0, :2]) > 30.0
 
 
+@pytest.mark.matrix
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['more/DEU_TestIntersectionInteract-3_1_T-1',
                                   'more/DEU_AAH1-2_76900_T-7049'])

@@ -48,6 +48,7 @@ def published(name: str) -> Path:
     return SHARED / name
 
 
+@pytest.mark.matrix('ZAM_Intersection-1_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_lanes_follow_their_lanelets(file: Path) -> None:
@@ -70,6 +71,7 @@ def test_lanes_follow_their_lanelets(file: Path) -> None:
         assert set(here.speed_limit.tolist()) == {np.inf if limit is None else limit}
 
 
+@pytest.mark.matrix('ZAM_Intersection-1_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_links_are_the_lanelets_own(file: Path) -> None:
@@ -196,6 +198,7 @@ def test_table_is_read(tmp_path: Path) -> None:
     assert roads.lane(9).at(np.array([1.0])).speed_limit.tolist() == [8.3]
 
 
+@pytest.mark.matrix('ZAM_Intersection-1_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('file', OWN, ids=lambda file: file.stem)
 def test_table_round_trip_keeps_every_bit(file: Path, tmp_path: Path) -> None:

@@ -190,6 +190,7 @@ def _numbers(found: Sequence[DriverBehaviour]) -> NDArray[np.float64]:
     return np.array(numbers)
 
 
+@pytest.mark.matrix('2.3')
 @pytest.mark.slow
 @pytest.mark.parametrize('angle', [0.5, math.pi / 2, 2.3, -2.9])
 def test_nothing_depends_on_the_maps_axes(

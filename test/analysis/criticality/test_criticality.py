@@ -245,6 +245,7 @@ def _mirrored(description: ObjectDescription, placement: Placement) -> ObjectDes
     return replace(description, shape=replace(shape, vertices=vertices))
 
 
+@pytest.mark.matrix('USA_Lanker-1_3_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', SCENARIOS)
 def test_nothing_depends_on_the_maps_axes_or_numbers(name: str, shared_scenarios: Path) -> None:

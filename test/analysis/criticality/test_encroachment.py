@@ -109,6 +109,7 @@ def _outlines(poses: Array) -> Array:
     return placed(BOX, poses)
 
 
+@pytest.mark.matrix('4.0-7.0--4.0-0.1', '8.0-14.0--7.0-0.04')
 @pytest.mark.parametrize('dt', [0.04, 0.1, 0.2])
 @pytest.mark.parametrize(('speed', 'radius', 'offset'), [
     (6.0, 9.0, -3.5), (4.0, 7.0, -4.0), (8.0, 14.0, -7.0), (5.0, 10.0, -8.0)])

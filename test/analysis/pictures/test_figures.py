@@ -99,6 +99,7 @@ def test_timing_lines_are_the_cycles() -> None:
         assert run.label in above.get_xlabel() and run.label in below.get_xlabel()
 
 
+@pytest.mark.matrix('2-1-4')
 @pytest.mark.parametrize(('runs', 'columns', 'panels'),
                          [(1, 1, 2), (1, 2, 2), (2, 1, 4), (3, 2, 6)])
 def test_every_run_has_its_two_panels(runs: int, columns: int, panels: int) -> None:
@@ -143,6 +144,7 @@ def test_the_table_is_table_one() -> None:
     assert table.text().splitlines()[1].split() == ['Final', 'Error', '1.00', 'ms', '51.00', 'ms']
 
 
+@pytest.mark.matrix('pdf')
 @pytest.mark.slow
 @pytest.mark.parametrize('file_format', FORMATS)
 def test_the_same_run_gives_the_same_bytes(file_format: str, cut_in: RunRecord) -> None:
