@@ -10,16 +10,10 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from crgame_ros.analysis.report.file import write_report
-from crgame_ros.analysis.report.run import measured_run
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell_run import run_cell
 from crgame_ros.evaluation.folder import EvaluationFolder, REPORTS
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.command import add_summary_arguments
-from crgame_ros.recording.export import prepare_folder, write_scenario
-from crgame_ros.recording.offline_outcome import offline_outcome
-from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.schema.marks import named_file
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
@@ -37,6 +31,12 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     :return: the report's file.
     :raises InputError: if there is no such cell, or it cannot be run.
     """
+    from crgame_ros.analysis.report.file import write_report
+    from crgame_ros.analysis.report.run import measured_run
+    from crgame_ros.evaluation.cell_run import run_cell
+    from crgame_ros.recording.export import prepare_folder, write_scenario
+    from crgame_ros.recording.offline_outcome import offline_outcome
+    from crgame_ros.recording.run_record import run_record_of
     place = EvaluationFolder(folder)
     cell = place.find(key)
     if cell.code[0] != engine_digest():

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, filtfilt
 
 FloatArray = NDArray[np.float64]
 
@@ -44,6 +43,7 @@ def smoothed(angles_deg: FloatArray, dt_s: float, cutoff_hz: float) -> FloatArra
 
     :param angles_deg: (N) dt apart, N > 9 [degrees]
     """
+    from scipy.signal import butter, filtfilt  # Takes a second.
     numerator, denominator = butter(ORDER, cutoff_hz, fs=1.0 / dt_s)
     return np.asarray(filtfilt(numerator, denominator, angles_deg))
 

@@ -13,8 +13,6 @@ from commonroad.common.solution import CostFunction, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.trajectory import Trajectory
-from commonroad_dc.costs.evaluation import CostFunctionEvaluator
-from commonroad_dc.costs.route_matcher import LaneletRouteMatcher
 from crgame_ros.errors import one_line
 
 _PATH_LENGTH = 'the code takes the path length L where the site has the offset from the lane'
@@ -83,6 +81,7 @@ def evaluate_costs(scenario: Scenario, problem: PlanningProblem, trajectory: Tra
     :param trajectory: states of the centre, as in CommonRoad's vehicle models.
     :param kind: vehicle type, which gives the width.
     """
+    from commonroad_dc.costs.route_matcher import LaneletRouteMatcher
     found = tuple(_evaluate(scenario, problem, trajectory, kind, name) for name in names)
     # The checker caches its last scenario until exit, at which its package would warn.
     LaneletRouteMatcher.scenario_cc.cache_clear()
@@ -91,6 +90,7 @@ def evaluate_costs(scenario: Scenario, problem: PlanningProblem, trajectory: Tra
 
 def _evaluate(scenario: Scenario, problem: PlanningProblem, trajectory: Trajectory,
               kind: VehicleType, name: str) -> TrajectoryCost:
+    from commonroad_dc.costs.evaluation import CostFunctionEvaluator  # Takes seconds.
     evaluator = CostFunctionEvaluator(CostFunction[name], kind)
     try:
         found = evaluator.evaluate_pp_solution(scenario, problem, trajectory)

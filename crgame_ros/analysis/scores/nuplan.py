@@ -26,7 +26,6 @@ from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
 from crgame_ros.scenario.loading import exact_position, LoadedScenario
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 import shapely
 
 FloatArray = NDArray[np.float64]
@@ -171,6 +170,7 @@ def measure_comfort(drive: ScoredDrive) -> DriveComfort | None:
 
 def _filtered(values: FloatArray, dt_s: float, samples: int, order: int) -> FloatArray:
     """Return values smoothed over a window of samples of 0.1 s, differentiated `order` times."""
+    from scipy.signal import savgol_filter  # Takes a second.
     window = max(LEAST_STEPS, round(samples * _SAMPLE_S / dt_s))
     window = min(window, len(values))
     window -= window % 2 == 0

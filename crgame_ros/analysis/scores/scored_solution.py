@@ -14,7 +14,6 @@ from commonroad.common.solution import (
 )
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.trajectory import Trajectory
-from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.nuplan import NuplanScore, NuplanScorer
 from crgame_ros.analysis.scores.plan_record import find_goal
 from crgame_ros.analysis.scores.planner import PlannerScores, REMARKS
@@ -94,6 +93,7 @@ def _part(scored: ScoredScenario, found: PlanningProblemSolution, name: str) -> 
 
 def _failures(scored: ScoredScenario, solution: Solution) -> dict[str, str]:
     """Run the checks that concern a solution as a whole; return failures by name."""
+    from commonroad_dc.feasibility import solution_checker
     problems = PlanningProblemSet(list(scored.loaded.planning_problems))
     failed = {}
     for name, check in (

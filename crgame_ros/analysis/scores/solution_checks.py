@@ -9,7 +9,6 @@ from typing import Any
 from commonroad.common.solution import PlanningProblemSolution, Solution
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.scenario import Scenario
-from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.trajectory_feasibility import (
     TrajectoryFeasibility,
 )
@@ -59,6 +58,7 @@ def check_solution(scenario: Scenario, problem: PlanningProblem,
     :param boundary: boundary of the road.
     :param earlier: failures of checks of the whole solution, by name.
     """
+    from commonroad_dc.feasibility import solution_checker
     problems = PlanningProblemSet([problem])
     solution = Solution(scenario.scenario_id, [found])
     checks: dict[str, Callable[[], object]] = {
@@ -84,5 +84,6 @@ def check_solution(scenario: Scenario, problem: PlanningProblem,
 
 
 def _shape(found: PlanningProblemSolution) -> Shape:
+    from commonroad_dc.feasibility import solution_checker
     known = solution_checker.VehicleParameterMapping.from_vehicle_type(found.vehicle_type)
     return Shape.rectangle(float(known.l), float(known.w))

@@ -5,17 +5,18 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from commonroad.common.solution import PlanningProblemSolution, TrajectoryType, VehicleModel
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.state import TraceState
 from commonroad.scenario.trajectory import Trajectory
-from commonroad_dc.feasibility import feasibility_checker
-from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
 from crgame_ros.errors import one_line
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # Importing the checker takes a second.
+    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
 
 FloatArray = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
     :param dt_s: time step [s]
     :param progress: called with the share checked so far, 0 to 1.
     """
-    dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
+    dynamics = _dynamics(found)
     if found.trajectory_type in (TrajectoryType.Input, TrajectoryType.PMInput):
         return _check_inputs(found, problem, dynamics, dt_s)
     stride = max(1, round(LEAST_STEP_S / dt_s))
@@ -110,14 +111,20 @@ def check_feasibility(found: PlanningProblemSolution, problem: PlanningProblem, 
         worst[1], worst[2], worst[3], worst[4], stride * dt_s)
 
 
+def _dynamics(found: PlanningProblemSolution) -> 'VehicleDynamics':
+    from commonroad_dc.feasibility.vehicle_dynamics import VehicleDynamics
+    return VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
+
+
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, step_s: float
+def _transition(now: TraceState, then: TraceState, dynamics: 'VehicleDynamics', step_s: float
                 ) -> tuple[bool, tuple[float, float, float, float, float]]:
     """Check one transition; return the verdict, both errors and the excess over three limits."""
     start, end = dynamics.state_to_array(now)[0], dynamics.state_to_array(then)[0]
+    from commonroad_dc.feasibility import feasibility_checker
     made, feasible = _apparently_made(start, end, dynamics, step_s), True
     if made is None:
         feasible, inputs = feasibility_checker.state_transition_feasibility(
@@ -143,7 +150,7 @@ def _transition(now: TraceState, then: TraceState, dynamics: VehicleDynamics, st
         max(0.0, math.hypot(acceleration, across) - limit))
 
 
-def _apparently_made(start: FloatArray, end: FloatArray, dynamics: VehicleDynamics,
+def _apparently_made(start: FloatArray, end: FloatArray, dynamics: 'VehicleDynamics',
                      step_s: float) -> FloatArray | None:
     """
     Return the KS model's next state with the inputs that speeds and steering angles imply.
@@ -176,8 +183,9 @@ def _why(position: float, heading: float, acceleration: float, rate: float,
 
 
 def _check_inputs(found: PlanningProblemSolution, problem: PlanningProblem,
-                  dynamics: VehicleDynamics, dt_s: float) -> TrajectoryFeasibility:
+                  dynamics: 'VehicleDynamics', dt_s: float) -> TrajectoryFeasibility:
     """Check a solution that holds inputs: each input must be within bounds and friction."""
+    from commonroad_dc.feasibility import feasibility_checker
     try:
         feasible, made = feasibility_checker.input_vector_feasibility(
             problem.initial_state, found.trajectory, dynamics, dt_s)
@@ -199,7 +207,8 @@ def simulated(found: PlanningProblemSolution, problem: PlanningProblem,
     """
     if found.trajectory_type not in (TrajectoryType.Input, TrajectoryType.PMInput):
         return found.trajectory
-    dynamics = VehicleDynamics.from_model(found.vehicle_model, found.vehicle_type)
+    dynamics = _dynamics(found)
+    from commonroad_dc.feasibility import feasibility_checker
     try:
         return feasibility_checker.input_vector_feasibility(
             problem.initial_state, found.trajectory, dynamics, dt_s)[1]
