@@ -66,7 +66,7 @@ def _import_without_ros(*modules: str) -> 'subprocess.CompletedProcess[str]':
                           capture_output=True, text=True)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_core_runs_without_ros(core: list[str]) -> None:
     """Every module of the core imports where rclpy and all messages are blocked."""
     assert len(core) > 20

@@ -50,7 +50,7 @@ def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
     assert not out.exists() or not any(out.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.matrix
 @pytest.mark.skipif(shutil.which('mount') is None, reason='no mount')
 @pytest.mark.parametrize('command', COMMANDS)

@@ -86,12 +86,12 @@ def test_against_shapely(first: str, second: str, offset: tuple[float, float]) -
 
 @pytest.mark.slow
 def test_many_objects_at_once_against_shapely() -> None:
-    """57 objects of all shapes and 3 vehicles: every index is that of shapely, 200 times."""
+    """57 objects of all shapes and 3 vehicles: every index is that of shapely, 50 times."""
     random = np.random.default_rng(5)
     shapes = [list(SHAPES.values())[i % len(SHAPES)] for i in range(57)]
     driven = [CAR, SHAPES['truck'], CAR]
     detector = CollisionDetector(driven, shapes)
-    for _ in range(200):
+    for _ in range(50):
         poses = random.uniform((-40, -40, -4), (40, 40, 4), (57, 3))
         velocities = random.uniform(-20, 20, (57, 3))
         dt = random.uniform(0.0, 0.2)

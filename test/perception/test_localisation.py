@@ -77,7 +77,7 @@ def test_estimate_takes_the_bias_over() -> None:
                                atol=3.0 * standard_error[:2].max())
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_bias_walks_like_a_random_walk() -> None:
     """After 4 s its standard deviation is the walk times sqrt(4 s), within 95 %."""
     # A filter that trusts only the position shows its input.

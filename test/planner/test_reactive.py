@@ -106,7 +106,7 @@ def test_stays_while_there_is_no_gap(cars: tuple[Car, ...], vehicle: VehiclePara
     assert max(abs(plan.states[0, 1]) for plan in plans) < 0.3
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_does_not_use_the_lane_of_oncoming_traffic(vehicle: VehicleParameters) -> None:
     road, cars = lanes(2, oncoming=True), ((80.0, 0.0, 0.0, 0.0),)
     plans = drive(road, VehicleState(0.0, 0.0, 0.0, 12.0), cars, 150)
@@ -115,7 +115,7 @@ def test_does_not_use_the_lane_of_oncoming_traffic(vehicle: VehicleParameters) -
     assert max(plan.states[0, 1] for plan in plans) < 0.5 * WIDTH
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_stays_where_the_side_lane_ends(vehicle: VehicleParameters) -> None:
     """The lane beside ends 60 m ahead, before a standing car could be passed."""
     x, beyond = np.linspace(-50.0, 60.0, 40), np.linspace(60.0, 900.0, 100)

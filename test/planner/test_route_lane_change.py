@@ -69,6 +69,7 @@ def test_waits_for_a_gap_and_then_changes(cars: Cars, planner: str,
     assert min(gaps(plans, cars, vehicle)) > 2.0
 
 
+@pytest.mark.exhaustive
 def test_stops_at_the_end_of_its_lane_for_a_queue(vehicle: VehicleParameters) -> None:
     """There is no gap at all: cars stand bumper to bumper beside the whole lane."""
     cars = tuple((-45.0 + 6.0 * i, 0.0) for i in range(42))

@@ -109,7 +109,7 @@ def test_traffic_that_reacts_makes_another_world(
     assert f'from {other["others_differ_s"]:.1f} s' in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_folders_are_new_and_files_have_names_of_their_own(
         record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Beside the run, numbered; two planners of one name in two folders."""

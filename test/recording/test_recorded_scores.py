@@ -202,7 +202,7 @@ def test_valid_solution_says_the_same(record: RunRecord,
         == {True, False}
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_command_tells_the_same_of_the_recording(
         run: Path, record: RunRecord, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """It agrees as JSON and in lines; commonroad-io reads its files, which score the same."""

@@ -56,6 +56,7 @@ def test_the_command_writes_one_file(recorded: Path, tmp_path: Path,
     assert not list(tmp_path.glob('.*'))
 
 
+@pytest.mark.exhaustive
 def test_several_runs_in_one_file(recorded: Path, tmp_path: Path) -> None:
     """They are compared."""
     out = tmp_path / 'both.html'

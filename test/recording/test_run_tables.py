@@ -308,6 +308,7 @@ def test_plans_are_compared_with_what_was_driven(recorded: Recorded, tmp_path: P
     assert vehicle['plans_passing'] is None
 
 
+@pytest.mark.exhaustive
 def test_several_runs_in_the_same_tables(recorded: Recorded, tmp_path: Path, drive: Any,
                                          recorder: Any,
                                          capsys: pytest.CaptureFixture[str]) -> None:

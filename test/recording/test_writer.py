@@ -291,7 +291,7 @@ with BagWriter(Path(sys.argv[1]), now_ns=lambda: now[0]) as writer:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.skipif(not Path('/proc/self/statm').exists(), reason='needs /proc')
 def test_memory_stays_flat_over_ten_minutes(tmp_path: Path) -> None:
     """Ten simulated minutes of 40 topics and 500 messages a second grow by less than 5 MB."""

@@ -162,6 +162,7 @@ def test_no_lanelets_means_off_road_everywhere() -> None:
     assert boundary([], (0.0, 0.0)).is_off_road(0.0, 0.0, 0.0, CAR)
 
 
+@pytest.mark.exhaustive
 def test_large_map_is_built_only_around_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """2,000 lanelets: few polygons are triangulated, and the answer is right everywhere."""
     built: list[int] = []

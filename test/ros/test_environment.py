@@ -207,6 +207,7 @@ def test_nothing_listens_beyond_loopback(ros_domain: int, clean: pytest.MonkeyPa
             peer.communicate(timeout=20)
 
 
+@pytest.mark.exhaustive
 def test_another_pythons_ros_is_told_in_one_line(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nodes and the launcher name this Python and the remedy; there is no traceback."""

@@ -399,6 +399,7 @@ def test_what_an_av_knows_of_is_outlined_where_it_takes_it_to_be() -> None:
     assert not paths.perceived.present
 
 
+@pytest.mark.exhaustive
 def test_published_scenarios_can_be_drawn(shared_scenarios: Path) -> None:
     """Every published map has a surface, and all coordinates are finite."""
     files = sorted(shared_scenarios.glob('*.xml'))

@@ -65,8 +65,8 @@ def run(scenario: Path, planner: str, with_map: bool) -> OfflineResult:
 @pytest.mark.slow
 @pytest.mark.matrix
 @pytest.mark.parametrize(('name', 'planner', 'offset', 'with_map'), [
-    ('ZAM_CutIn-1_1_T-1.xml', 'reactive', TILES, True),
-    ('ZAM_Crossing-1_1_T-1.xml', 'idm', OFFSET, False)])
+    ('ZAM_Crossing-1_1_T-1.xml', 'idm', OFFSET, False),
+    ('ZAM_CutIn-1_1_T-1.xml', 'reactive', TILES, True)])
 def test_a_run_far_from_the_origin_is_the_run_at_the_origin(
         name: str, planner: str, offset: np.ndarray, with_map: bool, tmp_path: Path) -> None:
     """
@@ -148,7 +148,7 @@ def test_time_steps_of_a_millisecond_are_refused(tmp_path: Path) -> None:
     assert "timeStepSize is '0.001'; give seconds from 0.01 to 10" in told
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_bounds_of_thousands_of_points_that_cross_are_refused(tmp_path: Path) -> None:
     """A surface of 20,000 unordered points took gigabytes; in order they are a road."""
     root = etree.parse(scenarios_directory() / 'ZAM_Crossing-1_1_T-1.xml').getroot()

@@ -76,7 +76,7 @@ def test_reactive_passes_beside(game: Game, latency: int) -> None:
     check_passed(run(game, 'reactive', latency))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.matrix
 @pytest.mark.parametrize(('ahead', 'speed'), [(-6.0, 26.0), (4.0, 24.0)],
                          ids=['later', 'slower'])
@@ -86,7 +86,7 @@ def test_both_do_so_in_other_games(game: Game, ahead: float, speed: float) -> No
     assert run(other, 'idm', 5).states_of('av0')[-1, 3] < 0.3
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_exported_cut_in_stays_on_the_road_driven_again(game: Game, tmp_path: Path) -> None:
     """
     Also with the human's planning problem, whose route changes lanes to the right.

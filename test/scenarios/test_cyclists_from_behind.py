@@ -41,6 +41,7 @@ def drive(path: Path) -> tuple[OfflineResult, list[Contact]]:
                     if (item.vehicle_id, item.other_id) == ('av0', 'o50')]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.matrix
 @pytest.mark.parametrize('angle', [5.0, -10.0, 20.0])
 @pytest.mark.parametrize(('speed', 'ride'), [(5.0, 10.0), (8.0, 10.0)])

@@ -62,7 +62,7 @@ def _line_of_sight(result: OfflineResult) -> list[int]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_pedestrian_is_known_from_the_first_line_of_sight_on() -> None:
     """
     Never before, and at most two scans later, when a ray of the fan meets the visible part.
@@ -112,6 +112,7 @@ def _gap_when_braking_begins(result: OfflineResult) -> float:
     return float(distances(result, 'av0', 'hv0')[int(np.argmax(speeds(result, 'av0')))])
 
 
+@pytest.mark.exhaustive
 def test_av_in_fog_stops_within_its_sight() -> None:
     """At 13 m/s it needs comfortable braking only, for the human and for the van behind."""
     pytest.importorskip('commonroad_rp')

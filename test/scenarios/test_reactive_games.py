@@ -14,7 +14,7 @@ import pytest
 WANTED = 0.8
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.matrix
 @pytest.mark.parametrize('name', ['parked_cars', 'roundabout'])
 def test_reactive_planner_answers_and_hits_no_vehicle(name: str, project_root: Path) -> None:

@@ -127,7 +127,7 @@ def _passing(result: OfflineResult) -> list[str]:
     return passing
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_agents_swerve_around_the_skip_with_the_stated_clearance() -> None:
     """
     The band keeps 0.5 m between the skip and a vehicle 2 m wide (1.8 m: 0.1 m more).

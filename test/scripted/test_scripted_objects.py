@@ -336,9 +336,9 @@ def test_follower_takes_the_gap_of_the_idm() -> None:
 def test_follower_brakes_as_idm_of_traffic_to_the_last_bit() -> None:
     """The law and its emergency guard are traffic's own, close behind and far, slow and fast."""
     random = np.random.default_rng(0)
-    speeds, desired = random.uniform(0.0, 20.0, 20_000), random.uniform(0.1, 20.0, 20_000)
+    speeds, desired = random.uniform(0.0, 20.0, 2_000), random.uniform(0.1, 20.0, 2_000)
     speeds[::10] *= 0.01
-    gaps, leaders = random.uniform(0.0, 60.0, 20_000), random.uniform(-2.0, 20.0, 20_000)
+    gaps, leaders = random.uniform(0.0, 60.0, 2_000), random.uniform(-2.0, 20.0, 2_000)
     gaps[::3] *= 0.05
     for mover in MOVER_TYPES.values():
         law = (mover.headway, mover.distance, mover.acceleration, mover.deceleration,
@@ -403,7 +403,7 @@ def test_pedestrian_beside_a_parked_car_walks_away() -> None:
     assert poses[-1, 2, :2] == pytest.approx([1.0, 1.4], abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_random_crossings_end_without_collision() -> None:
     """Twelve walks over one to three lanes, with cars at 4 to 20 m/s at random gaps."""
     rng = np.random.default_rng(4)

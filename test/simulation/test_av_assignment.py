@@ -79,7 +79,7 @@ def test_problems_that_start_apart_all_drive() -> None:
     assert problems_of(Game(path, humans=HUMAN)) == [100, 101]
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_an_exported_run_driven_again_has_the_same_cast(tmp_path: Path) -> None:
     """Run, XML, run, XML, run: hv0 plays back to 0.1 mm, av0 drives its own problem equally."""
     first = run_offline(build_setup(load_game(scenarios_directory() / 'cut_in.yaml')),

@@ -42,7 +42,7 @@ def speeds(result: OfflineResult) -> np.ndarray[Any, np.dtype[np.float64]]:
     return result.states_of('av0')[:, StateColumn.SPEED]
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_av_stops_for_the_pedestrian_that_is_released(game: Game) -> None:
     """Without the trigger it drives past; with it, it halts in front of the walker."""
     passed, stopped = play(game), play(game, (RELEASE_N, 'pedestrian'))
@@ -66,14 +66,15 @@ def test_runs_with_triggers_repeat_to_the_last_bit(game: Game) -> None:
     """The setup is shared and no event changes it; a trigger one tick later gives another run."""
     setup = build_setup(game)
     triggers = [(200, 'slow-zone'), (405, 'careful-planner'), (RELEASE_N, 'pedestrian')]
-    first, plain, again = (run_offline(setup, triggers=used)
+    first, plain, again = (run_offline(setup, triggers=used, duration_s=12.0)
                            for used in (triggers, (), triggers))
     assert first.state_hash == again.state_hash != plain.state_hash
     assert [(event.name, event.n) for event in first.fired] == [
         ('slow-zone', 200), ('careful-planner', 410), ('pedestrian', RELEASE_N)]
     assert first.object_poses.tobytes() == again.object_poses.tobytes()
-    assert play(game).state_hash == plain.state_hash
-    assert play(game, (RELEASE_N + 1, 'pedestrian')).fired[0].n == RELEASE_N + 10
+    assert play(game, duration_s=12.0).state_hash == plain.state_hash
+    later = play(game, (RELEASE_N + 1, 'pedestrian'), duration_s=12.0)
+    assert later.fired[0].n == RELEASE_N + 10
 
 
 @pytest.mark.slow

@@ -29,7 +29,7 @@ def speeds(result: OfflineResult) -> NDArray[np.float64]:
     return np.hypot(*np.moveaxis(result.object_velocities[:, columns, :2], -1, 0))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_agents_obey_the_speed_limit_of_an_event() -> None:
     """After it agents slow down to the limit, within drivers' tolerance; without it they don't."""
     event = {'name': 'slow', 'speed_limit': {'speed': 8.0}, 'when': {'time': 2.0}}

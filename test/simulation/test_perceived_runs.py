@@ -52,7 +52,7 @@ def test_same_seed_same_bits() -> None:
     assert len(set(hashes)) == 3
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_wrong_poses_do_not_make_the_car_jump() -> None:
     """Plans start at the AV's estimated pose, a metre off; it drives on from its true pose."""
     setup = perceiving('parked_cars', NOISY)

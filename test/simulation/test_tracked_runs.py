@@ -204,6 +204,7 @@ def test_a_person_takes_over_and_gives_back() -> None:
     assert result.planners['av0'].counters.refused == 0
 
 
+@pytest.mark.exhaustive
 def test_the_human_can_have_lags_too() -> None:
     """With FS 2 the same pedals move the human's car later; without it nothing changes."""
     values = yaml.safe_load((scenarios_directory() / 'cut_in.yaml').read_text())

@@ -210,7 +210,7 @@ def _first(run: Drive, car: int, lanelets: set[int]) -> int:
     return next(k for k in range(len(run.poses)) if run.lanelets(k)[car] in lanelets)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_courtesy_lets_a_car_merge_that_would_wait_for_the_end_of_the_platoon() -> None:
     """With it a gap opens gently and the car keeps its speed; without it the car halts."""
     ramp = 2 * PLATOON

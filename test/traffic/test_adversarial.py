@@ -22,7 +22,7 @@ def accelerations(run: support.Run, number: int) -> np.ndarray:
     return np.diff(speeds[np.isfinite(speeds)]) / run.dt
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_cones_at_the_edge_do_not_hide_a_standing_car() -> None:
     # 1.9 m beside the middle of a lane of 4 m, every 2 m for 160 m before the car and beside it.
     lane = support.roads(support.straight_lane(1, 0.0, 0.0, 400.0, width=4.0))

@@ -191,7 +191,7 @@ def test_a_change_that_comes_to_nothing_ends_in_the_nearer_lane(y: float, lane: 
     assert abs(agents.d[0]) < 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_no_change_begins_where_a_junction_is_near_behind_a_short_lanelet() -> None:
     """
     Lanes 1 and 2 end at x = 200; lanelets of 6 m lie between them and a junction.

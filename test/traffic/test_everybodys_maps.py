@@ -67,7 +67,7 @@ def test_no_agent_stands_for_good_where_a_ramp_ends() -> None:
 # Short roads between junctions, full in a circle; lanes beside each other that merge with a third
 # one behind a bend; bends of 3 m; a triangle of junctions around an island; two junctions in one.
 @pytest.mark.matrix
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(('name', 'seed', 'seconds', 'speed'), [
     ('more/BEL_Putte-8_2_T-1', 0, 180.0, 2.2), ('DEU_Guetersloh-36_1_T-1', 2, 240.0, 2.2),
     ('more/DZA_Annaba-7', 3, 65.0, 5.0), ('more/DEU_Moabit-4_1_T-1', 1, 60.0, 4.0),
