@@ -25,7 +25,11 @@ called_from=$PWD
 cd -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")"
 export CRGAME_DEVELOP=1
 source scripts/env.sh
+# When pytest first collects the tests it rewrites all their assertions: once, beside the compiler,
+# instead of in each of its workers.
+[[ -d test/__pycache__ ]] || "$CRGAME_PYTHON" -m pytest --collect-only -qq >/dev/null 2>&1 &
 "$CRGAME_PYTHON" -m crgame_ros.traffic.warm_up
+wait
 
 ROS_DOMAIN_ID=$("$CRGAME_PYTHON" -c \
     'from crgame_ros.ros.environment import free_domain_id; print(free_domain_id())')

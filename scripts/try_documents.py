@@ -4,13 +4,14 @@
 """
 Run the commands of README.md and docs/ as a reader would: in order, in a clean shell.
 
-    python3 scripts/try_documents.py [FILE.md …]
+    python3 scripts/try_documents.py [--without PATTERN] [FILE.md …]
 
 A command that runs until it is ended (a game, a page) gets Ctrl-C once it is up, and has to end
 well. Every command must exit with 0, without a traceback or an error; those that need what this
 machine lacks (ros2, rviz2, a wheel) are named as not run.
 """
 
+import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 import os
@@ -176,14 +177,18 @@ def _places(folder: Path) -> dict[str, str]:
 
 def main(arguments: Sequence[str]) -> int:
     """Try the documents; return 1 if a command failed."""
-    if {'-h', '--help'} & set(arguments):
-        print(__doc__)
-        return 0
-    documents = [Path(name) for name in arguments] or [
-        ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('documents', nargs='*', type=Path, metavar='FILE.md', default=[
+        ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))],
+        help='default: README.md and docs/')
+    parser.add_argument('--without', metavar='PATTERN', help='leave out commands that match')
+    values = parser.parse_args(arguments)
+    if values.without:
+        NOT_RUN[values.without] = lambda: 'left out'
     with tempfile.TemporaryDirectory() as name:
         shell = Shell(Path(name), _places(Path(name)))
-        for document in documents:
+        for document in values.documents:
             for block in blocks(document.read_text(), 'bash'):
                 print(document.name, flush=True)
                 shell.preamble = []
