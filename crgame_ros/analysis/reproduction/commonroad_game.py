@@ -10,7 +10,7 @@ from typing import Any
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.analysis.pictures.critical_moments import critical_moments, Touch
 from crgame_ros.analysis.pictures.figure_style import figure_bytes
-from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
+from crgame_ros.analysis.pictures.frames_figure import frames_figure
 from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.pictures.timing_figure import timing_figure
@@ -39,9 +39,8 @@ from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from matplotlib.figure import Figure
 import numpy as np
 
-# Number and spacing [s] of the close view's panels, as in the paper; the other view shows the
-# whole run.
-PANELS, SPACING_S = 12, 0.2
+# Number of panels, as in the paper. There they are 0.2 s apart; ours cover the whole encounter.
+PANELS = 12
 
 
 def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, folder: Path,
@@ -61,13 +60,8 @@ def write_run_figures(run: Alternative, numbers: tuple[int, int], name: str, fol
                                tuple(map(Touch.from_entry, run.contacts or ())))
     scene = FrameScene(log)
     frames, profiles = numbers
-    written: list[Path] = []
-    if moments:
-        ks = panel_steps(scene, moments[0].time_s, PANELS, SPACING_S)
-        written += _write(frames_figure(scene, ks, moments[0].vehicles),
-                          folder / f'figure_{frames:02}_{name}_frames', formats)
-    written += _write(frames_figure(scene, _whole(scene)),
-                      folder / f'figure_{frames:02}_{name}_whole', formats)
+    written = list(_write(frames_figure(scene, _panel_steps(run)),
+                          folder / f'figure_{frames:02}_{name}_frames', formats))
     written += _write(profiles_figure(record, moments[:1]),
                       folder / f'figure_{profiles:02}_{name}_profiles', formats)
     return tuple(written)
@@ -86,11 +80,13 @@ def write_timing_figure(found: Synchronization, folder: Path,
     return tuple(written)
 
 
-def _whole(scene: FrameScene) -> tuple[int, ...]:
-    """Choose scenario steps over the whole run, equally far apart."""
-    first, last = int(scene.log.ks[0]), int(scene.log.ks[-1])
-    stride = max(1, (last - first) // (PANELS - 1))
-    return tuple(range(first, last + 1, stride))[:PANELS]
+def _panel_steps(run: Alternative) -> tuple[int, ...]:
+    """Choose scenario steps, equally far apart, from before the cut-in to the AV's answer."""
+    ks = run.log.ks
+    begin, end = Encounter(run, run.log.game.avs[0].id).steps
+    stride = max(1, -(-(end - begin) // (PANELS - 2)))
+    first = min(max(0, begin - stride), max(0, len(ks) - 1 - (PANELS - 1) * stride))
+    return tuple(ks[first::stride][:PANELS].tolist())
 
 
 def _write(figure: Figure, place: Path, formats: Sequence[str]) -> tuple[Path, ...]:
@@ -208,7 +204,8 @@ def evaluate_timing(request: EvaluationRequest) -> tuple[EvaluationPart, Synchro
     request.say(f'timing: the graph, then the naive loop, {request.timed_s:g} s each …')
     found = measure_synchronization(scenarios_directory() / 'cut_in.yaml', request.idm,
                                     request.timed_s, request.runs)
-    return EvaluationPart(judge_synchronization(found), {'table_1': found.rows()},
+    numbers = {'table_1': found.rows(), 'load': found.load, 'is_valid': found.is_valid}
+    return EvaluationPart(judge_synchronization(found), numbers,
                           write_timing_figure(found, request.folder, request.formats)), found
 
 

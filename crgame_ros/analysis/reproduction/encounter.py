@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 # Length to which the lane is followed [m]: longer than any game.
 _ALONG = 2000.0
+# A vehicle stands below this speed [m/s], and has passed another with this lead [m].
+_STANDING, _PASSED = 0.1, 8.0
 
 
 class DrivenLane:
@@ -80,6 +82,21 @@ class Encounter:
         """Return the AV's lead over the human at the end, by rear axles along the lane [m]."""
         last = self.lane.along[-1]
         return float(last[self._place] - last[0])
+
+    @cached_property
+    def steps(self) -> tuple[int, int]:
+        """
+        Return the rows of the encounter: from the human's cut-in to the AV's answer.
+
+        It begins when the human's rear axle enters the AV's lane, and ends when the AV stands or
+        is ahead again; without either it is the whole run.
+        """
+        inside = np.abs(self.lane.across[:, 0]) < 0.5 * self.lane.width
+        begin = int(np.argmax(inside))
+        lead = self.lane.along[:, self._place] - self.lane.along[:, 0]
+        answered = (self.speeds < _STANDING) | (lead > _PASSED)
+        answered[:begin] = False
+        return begin, int(np.argmax(answered)) if answered.any() else len(answered) - 1
 
     @property
     def least_gap(self) -> float | None:

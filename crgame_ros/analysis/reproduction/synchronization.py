@@ -3,11 +3,13 @@
 """Compares the project's loop to the naive one (CRG section IV-C, figure 14 and table I)."""
 
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 import json
+import os
 from pathlib import Path
 import time
-from typing import Any
+from typing import Any, TypeVar
 
 from crgame_ros.analysis.pictures.figure_run import FigureRun
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
@@ -125,6 +127,11 @@ PAPER_TABLE = {
     'Precision Ratio': ('1.00e-4', '2.85e-2')}
 
 
+# Beside other programs that use more of the machine, the loops cannot be compared [-].
+MOST_OTHERS = 0.1
+Result = TypeVar('Result')
+
+
 @dataclass(frozen=True)
 class Synchronization:
     """
@@ -132,10 +139,26 @@ class Synchronization:
 
     :param proposed: cycles of the project's loop in a live graph.
     :param naive: cycles of the naive loop.
+    :param others: shares of the machine's processor time that other programs used beside the
+        project's loop and beside the naive one [-]
     """
 
     proposed: TimedRun
     naive: TimedRun
+    others: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def is_valid(self) -> bool:
+        """Tell whether other programs left enough of the machine to compare the loops."""
+        return max(self.others) <= MOST_OTHERS
+
+    @property
+    def load(self) -> str:
+        """Return what other programs used, in a sentence, and whether the comparison is valid."""
+        return (f'Other programs used {self.others[0]:.0%} of the machine beside our loop and '
+                f'{self.others[1]:.0%} beside the naive one' + (
+                    '.' if self.is_valid else f': the comparison is not valid. At most '
+                    f'{MOST_OTHERS:.0%} may be used: end them, and repeat it.'))
 
     @property
     def table(self) -> TimingTable:
@@ -160,13 +183,37 @@ def measure_synchronization(game: Path, planner: str, duration_s: float,
     :param folder: folder of both runs' files, with subfolders `proposed` and `naive`.
     :raises CrgameError: if a run failed.
     """
-    run_live(game, planner, folder / 'proposed', duration_s)
+    _, beside_proposed = others_beside(
+        lambda: run_live(game, planner, folder / 'proposed', duration_s))
     proposed = FigureRun(folder / 'proposed', PROPOSED, None, print).timed
     setup = effective_setup(RunRequest(game=game, planners=(planner,)))
     loop = NaiveLoop(setup, folder / 'naive')
-    loop.run(duration_s)
+    _, beside_naive = others_beside(lambda: loop.run(duration_s))
     loop.close()
-    return Synchronization(proposed, TimedRun(NAIVE, loop.cycles, setup.scheduler.dt_s))
+    return Synchronization(proposed, TimedRun(NAIVE, loop.cycles, setup.scheduler.dt_s),
+                           (beside_proposed, beside_naive))
+
+
+def others_beside(work: Callable[[], Result]) -> tuple[Result, float]:
+    """
+    Do some work, and measure what other programs use meanwhile.
+
+    :return: the work's result, and the share of the machine's processor time that neither this
+        process nor its ended children used [-]
+    """
+    begin_s, busy_s, own_s = time.monotonic(), _busy_s(), sum(os.times()[:4])
+    result = work()
+    others_s = _busy_s() - busy_s - (sum(os.times()[:4]) - own_s)
+    whole_s = (time.monotonic() - begin_s) * (os.cpu_count() or 1)
+    return result, max(0.0, others_s) / whole_s
+
+
+def _busy_s() -> float:
+    """Return the time that all processors worked, or were taken by the host, since boot [s]."""
+    with open('/proc/stat', encoding='ascii') as file:
+        user, nice, system, _idle, _wait, *interrupts_and_stolen = map(
+            int, file.readline().split()[1:9])
+    return (user + nice + system + sum(interrupts_and_stolen)) / os.sysconf('SC_CLK_TCK')
 
 
 def _smaller(name: str) -> Expectation[tuple[TimingSummary, TimingSummary]]:
@@ -191,6 +238,8 @@ TIMING_EXPECTATIONS = tuple(map(_smaller, (
 
 
 def judge_synchronization(found: Synchronization) -> tuple[Judgement, ...]:
-    """Judge the expectations on the paper's table that hold on any machine."""
+    """Judge the expectations on table I that hold on any machine; none if it is not valid."""
+    if not found.is_valid:
+        return ()
     ours, naive = found.table.summaries
     return judge('timing', TIMING_EXPECTATIONS, (ours, naive))

@@ -33,6 +33,11 @@ def test_idm(idm: Alternative) -> None:
     assert _unmet(idm, IDM_EXPECTATIONS) == []
     assert _unmet(idm, REACTIVE_EXPECTATIONS) == [
         'leaves its lane', 'passes the human', 'does not stop']
+    encounter = Encounter(idm, 'av0')
+    begin, end = encounter.steps
+    across = encounter.lane.across[:, 0]
+    assert across[begin] < 0.5 * encounter.lane.width < across[begin - 1]
+    assert encounter.speeds[end] < 0.1 <= encounter.speeds[end - 1]
 
 
 def test_without_reactions(cut_in: RecordedHuman, unmoved: Alternative) -> None:
@@ -58,6 +63,9 @@ def test_reactive() -> None:
     encounter = Encounter(run, 'av0')
     assert encounter.lane.width == pytest.approx(3.75)
     assert encounter.deviation == pytest.approx(3.75, abs=0.1)
+    begin, end = encounter.steps
+    lead = encounter.lane.along[:, 1] - encounter.lane.along[:, 0]
+    assert lead[begin] < 0.0 and lead[end - 1] < 8.0 < lead[end]
 
 
 def test_lane_is_measured(unmoved: Alternative) -> None:

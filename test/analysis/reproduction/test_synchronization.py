@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Table I: the naive loop, the paper's numbers, and the order that must hold."""
 
+import os
 from pathlib import Path
+import subprocess
+import sys
+import time
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
 from crgame_ros.analysis.reproduction.synchronization import (
     judge_synchronization,
     NaiveLoop,
+    others_beside,
     PAPER_TABLE,
     Synchronization,
 )
@@ -40,6 +45,27 @@ def test_order() -> None:
     for worse in (_loop(0.002), _loop(0.001)):
         judged = judge_synchronization(Synchronization(worse, _loop(0.001)))
         assert not any(each.is_met for each in judged)
+
+
+def test_other_programs_make_the_comparison_invalid() -> None:
+    """Nothing is judged then, and a sentence tells it with the shares."""
+    found = Synchronization(_loop(0.0), _loop(0.001), (0.02, 0.35))
+    assert judge_synchronization(found) == ()
+    assert found.load.startswith('Other programs used 2% of the machine beside our loop and 35% '
+                                 'beside the naive one: the comparison is not valid.')
+    assert Synchronization(_loop(0.0), _loop(0.001), (0.02, 0.1)).load.endswith('naive one.')
+
+
+def test_other_programs_are_told_apart_from_our_own() -> None:
+    """A process of ours counts once it has ended; another's counts as others."""
+    spin = [sys.executable, '-c', 'import time\nwhile time.process_time() < 1.0: pass']
+    other = subprocess.Popen(spin)
+    begin_s = time.monotonic()
+    _, others = others_beside(lambda: subprocess.run(spin, check=True))
+    took_s = time.monotonic() - begin_s
+    least_s = 0.5
+    assert others * took_s * (os.cpu_count() or 1) > least_s
+    other.wait()
 
 
 def test_paper_table() -> None:
