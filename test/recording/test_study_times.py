@@ -10,6 +10,8 @@ import polars
 import pytest
 from study_maker import DURATION_S, lines_of
 
+pytestmark = pytest.mark.xdist_group('study-data')
+
 
 def answers(folder: Path) -> polars.DataFrame:
     """Read the table as other programs do."""
