@@ -282,10 +282,11 @@ class LiveDrives:
         """Poll the graph, then pause."""
         graph, director = self._graph, self._director
         if graph is not None and director is not None:
-            if graph.has_ended:
-                raise _LostGraphError
             graph.poll()
             director.poll()
+            # Last: the nodes of a killed launcher say that they were asked to end.
+            if graph.has_ended:
+                raise _LostGraphError
         await asyncio.sleep(pause_s)
 
     async def _until(self, condition: Callable[[], bool], patience_s: float, what: str) -> None:
