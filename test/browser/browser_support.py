@@ -116,6 +116,11 @@ class Browser:
                             f'{error and f" ({error})" or ""}; console: {self.console_errors()}')
             time.sleep(_POLL_S)
 
+    def wait_for_frame(self) -> None:
+        """Wait until the page has drawn what it has received so far."""
+        self.run_async('await new Promise((done) => requestAnimationFrame(() =>'
+                       ' requestAnimationFrame(done)));')
+
     def console_errors(self) -> list[str]:
         """Return every error that the page has logged since it was opened, also thrown ones."""
         self._errors += [entry['message'] for entry in self.driver.get_log('browser')

@@ -31,7 +31,9 @@ __all__ = ['Graph', 'live_graph', 'LivePage', 'PATIENCE_S', 'SCENARIOS']
 PATIENCE_S = 45.0
 _POLL_S = 0.05
 THROTTLE, BRAKE, STEERING = 0, 1, 2
-_TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state')
+# How long the page shows notices and mishaps [ms]; a slow test would look too late.
+MESSAGES_STAY_MS = (5000, 9000, 10000)
+_TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state', '/diagnostics')
 
 
 class Graph(NamedTuple):
@@ -195,6 +197,35 @@ class LivePage:
     def wait_for_run(self, state: str) -> None:
         """Wait until the run is waiting, running, paused or ended."""
         self.wait('crgame.store.status.run === arguments[0]', f'a run that is {state}', state)
+
+    def pause(self) -> None:
+        """Pause the run by the button, and wait until its last step is shown."""
+        self.order('pause')
+        self.wait_for_run('paused')
+        self.wait('crgame.store.status.n === arguments[0] && crgame.world.shown.n === arguments[0]'
+                  ' && !crgame.world.camera.moves', 'the last step in the picture',
+                  self.graph.peer.wait_for_pause())
+
+    def hold_at_the_start(self) -> None:
+        """Begin the run anew, held at its first step."""
+        self.pause()
+        epoch = self.run('return crgame.store.status.epoch')
+        self.order('reset')
+        self.wait('crgame.store.status.epoch > arguments[0] && crgame.store.status.n === 0'
+                  ' && crgame.store.status.run === "paused"'
+                  ' && crgame.world.shown.epoch === crgame.store.status.epoch'
+                  ' && crgame.world.shown.n === 0', 'the first step of a run', epoch)
+
+    def wait_for_frame(self) -> None:
+        """Wait until the page has drawn what it has received so far."""
+        self.browser.wait_for_frame()
+
+    def keep_messages(self) -> None:
+        """Let messages stay that go by themselves after some seconds, till the next load."""
+        self.run("""
+            const setTimeoutOfPage = window.setTimeout;
+            window.setTimeout = (call, ms, ...more) => setTimeoutOfPage(
+              call, arguments[0].includes(ms) ? 1e9 : ms, ...more);""", MESSAGES_STAY_MS)
 
     def reset(self) -> None:
         """Reset by the button, and wait until the new run is shown and running."""

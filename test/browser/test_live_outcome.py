@@ -30,6 +30,16 @@ CUT_IN, TRAFFIC = 'ZAM_CutIn-1_1_T-1', 'ZAM_Intersection-1_1_T-1'
 SCHEMA = Path(commonroad.__file__).parent.joinpath(
     'scenario_definition', 'xml_definition_files', 'XML_commonRoad_XSD.xsd')
 SHORT_S = 3.0
+# Notes the runs in which the card was hidden; the runs are short.
+WATCH = """
+window.cardless = [];
+crgame.store.on('status', ({ run, epoch }) => requestAnimationFrame(() => {
+  if (run === 'running' && document.querySelector('#outcome').hidden) {
+    cardless.push(epoch);
+  }
+}));
+"""
+WITHOUT_CARD = 'window.cardless.some((epoch) => epoch > arguments[0])'
 
 
 def write_games(folder: Path) -> Path:
@@ -102,12 +112,14 @@ def test_a_run_is_over_at_its_own_duration_and_says_how_it_went(page: LivePage) 
     assert float(told[0] or told[1]) == pytest.approx(gap / av.speed, abs=0.3)
     # The report names each vehicle's part, as for offline runs.
     assert '(front of av0; could have avoided it: av0)' in text
+    # As many as were in time: their number depends on the machine.
     accepted = int(re.search(r'(\d+) plans accepted', text)[1])
-    assert 0.5 * 10 * SHORT_S < accepted <= 10 * SHORT_S
+    report = json.loads((page.graph.launcher.out / 'run_2' / 'timing.json').read_text())
+    assert 0 < accepted == report['planners']['av0']['accepted'] <= 10 * SHORT_S
     assert {'Mean step error', 'Largest lag', 'Precision ratio'} <= set(page.run(
         'return [...document.querySelectorAll("#outcome dt")].map((node) => node.textContent)'))
     assert folder_on_card(page) == Path('run/run_2')
-    assert page.run('return crgame.store.alarms') == []
+    page.wait('crgame.store.alarms.length === 0', 'the alarms of a busy machine to go')
     assert page.text('#recording').startswith('Recorded')
     assert page.text('.clock-state') == 'Ended'
     assert page.browser.console_errors() == []
@@ -132,9 +144,14 @@ def test_the_card_has_score_links_and_the_last_seconds(page: LivePage) -> None:
     for path in (scenario, folder / 'game.yaml', folder / 'timing.json'):
         assert sizes[path.name] == [200, path.stat().st_size]
     assert sizes['Everything as ZIP'][1] > (folder / 'bag' / 'bag_0.mcap').stat().st_size
+    # Noted frame by frame: the replay goes on meanwhile.
+    page.run("""window.past = new Promise((done) => {
+        const look = () => (crgame.lastSeconds.isOpen && crgame.world.shown.t < 2
+          && !document.querySelector('#outcome').checkVisibility()
+          ? done() : requestAnimationFrame(look));
+        look(); });""")
     page.click('#outcome [data-action=look]')
-    page.wait('crgame.lastSeconds.isOpen && crgame.world.shown.t < 2'
-              ' && !document.querySelector("#outcome").checkVisibility()')
+    page.run_async('await window.past;')
     page.click('#last-seconds [data-action=end]')
     page.wait('crgame.world.shown.t === crgame.store.latest.t')
 
@@ -182,9 +199,10 @@ def test_runs_are_listed_replayed_compared_and_deleted(page: LivePage) -> None:
 @pytest.mark.exhaustive
 def test_again_another_and_the_next_game(page: LivePage) -> None:
     """The same game runs again, then only traffic; each run hides the card."""
+    page.run(WATCH)
+    epoch = page.run('return crgame.store.status.epoch')
     page.click('#outcome [data-action=again]')
-    page.wait('crgame.store.status.run === "running"'
-              ' && document.querySelector("#outcome").hidden', 'the run, without the card')
+    page.wait(WITHOUT_CARD, 'the run, without the card', epoch)
     wait_for_card(page)
     assert folder_on_card(page).name == 'run_3'
     page.click('#outcome [data-action=close]')
@@ -192,15 +210,15 @@ def test_again_another_and_the_next_game(page: LivePage) -> None:
     page.tab('drive')
     page.click('#outcome [data-action=another]')
     start(page, 'alone.yaml')
-    page.wait('crgame.store.status.run === "running" && crgame.world.shown.objects.length > 0',
-              'agents of traffic')
+    page.wait('crgame.world.shown.epoch === crgame.store.status.epoch'
+              ' && crgame.world.shown.objects.length > 0', 'agents of traffic')
     assert 'only traffic' in page.text('#panel-drive')
     assert 'traffic was alone' in wait_for_card(page)
     assert folder_on_card(page).name == 'run_4'
+    epoch = page.run('return crgame.store.status.epoch')
     page.click('#outcome [data-action=next]')
-    page.wait('document.querySelector("#outcome").hidden'
-              ' && crgame.store.scene.title === "A crash"',
-              'the game after the last of the list')
+    page.wait(f'{WITHOUT_CARD} && crgame.store.scene.title === "A crash"',
+              'the game after the last of the list', epoch)
     wait_for_card(page)
     assert folder_on_card(page).name == 'run_5'
     # An alarm stays visible for some seconds.

@@ -31,6 +31,8 @@ pytestmark = pytest.mark.exhaustive
 TOPICS = ('/clock', '/scenario/game', '/timing/cycle', '/vehicles/state', '/seats/drivers')
 HOSTILE = 20
 LONG_S, SHORT_S = 3600.0, 6.0
+# The least real-time factor.
+SLOWEST = 0.1
 
 
 @pytest.fixture
@@ -64,6 +66,7 @@ class Person(LivePage):
             field = self.driver.find_element(By.ID, 'my-name')
             field.send_keys(Keys.CONTROL, 'a')
             field.send_keys(name, Keys.ENTER)
+        self.keep_messages()
 
     def ask(self, **message: Any) -> dict[str, Any]:
         """Send a request regardless of the page's buttons; return the reply."""
@@ -144,8 +147,11 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
     bert.wait('crgame.store.seats.hv0.ready', 'her readiness')
     peer.listen_for(0.5)
     assert bert.run('return crgame.store.status.n') == 0
+    watcher.run("""window.counted = false;
+        crgame.store.on('status', ({ countdown_s }) => { window.counted ||= countdown_s > 0; });
+        """)
     bert.click('.lobby .primary')
-    watcher.wait('crgame.store.status.countdown_s > 0', 'the countdown')
+    watcher.wait('window.counted', 'the countdown')
     watcher.wait('crgame.store.status.run === "running" && crgame.store.status.n > 10', 'the run')
 
     # Both drive their own vehicles. A driver's P pauses nothing.
@@ -200,6 +206,8 @@ def test_two_people_drive_one_game(graph: Graph, new_browser: OpenBrowser) -> No
 @pytest.mark.parametrize('graph', [SHORT_S], indirect=True)
 def test_a_game_ends_for_everybody(graph: Graph, new_browser: OpenBrowser) -> None:
     """Others see a director's actions with the name; at the end each gets the result."""
+    # The run must not be over before the director's last action, nor before it is looked at.
+    assert graph.peer.set_parameter('real_time_factor', SLOWEST).successful
     dora = Person(graph, new_browser(1000, 640, trusting=True), 'direct', 'Dora')
     drivers = {seat: Person(graph, new_browser(1000, 640, trusting=True), f'drive {seat}', name)
                for seat, name in (('hv0', 'Anna'), ('hv1', 'Bert'))}
@@ -216,6 +224,7 @@ def test_a_game_ends_for_everybody(graph: Graph, new_browser: OpenBrowser) -> No
             person.wait_for_run('paused' if deed == 'pause' else 'running')
     assert 'Dora' not in dora.text('#notices'), 'she knows'
     # After the reset they drive to the end without further confirmation.
+    assert graph.peer.set_parameter('real_time_factor', 1.0).successful
     for seat, person in drivers.items():
         person.wait_for_run('ended')
         person.wait('document.querySelector(".score[data-state=told]")', 'the score')
@@ -228,6 +237,7 @@ def test_a_game_ends_for_everybody(graph: Graph, new_browser: OpenBrowser) -> No
             .querySelector(`#outcome [data-action=${action}]`).disabled);""") == [
             True, True, True, False]
         assert person.run('return crgame.store.status.t') == SHORT_S
+    assert graph.peer.set_parameter('real_time_factor', SLOWEST).successful
     dora.click('#outcome [data-action=again]')
     for person in drivers.values():
         person.wait('document.querySelector("#outcome").hidden'

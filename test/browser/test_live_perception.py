@@ -97,7 +97,6 @@ def page(graph: Graph, listener: Peer, module_browser: Browser) -> LivePage:
     opened.run("crgame.world.follow('av0', true);"
                "crgame.perception.set('rays', true); crgame.perception.set('estimate', true);")
     go_until(opened, f'crgame.world.shown.t > {HELD_S}')
-    listener.listen_for(0.5)
     return opened
 
 
@@ -158,14 +157,15 @@ def told(listener: Peer, page: LivePage, name: str) -> bool:
     """Return whether the planner's newest request at the shown time has an object."""
     scheduler = listener.games[-1].scheduler
     n = page.run('return crgame.world.shown.n')
-    request = next(message for message in reversed(listener.messages['/<av>/plan_request'])
-                   if scheduler.step_of_stamp(from_time(message.header.stamp)) <= n)
-    return f'{name}/x' in request.joint_names
+    request = next((message for message in reversed(listener.messages['/<av>/plan_request'])
+                    if scheduler.step_of_stamp(from_time(message.header.stamp)) <= n), None)
+    return request is not None and f'{name}/x' in request.joint_names
 
 
 def test_a_hidden_pedestrian_is_an_outline(page: LivePage, listener: Peer) -> None:
     """The request has the van only; without the layer the person is drawn normally."""
-    assert (told(listener, page, VAN), told(listener, page, PERSON)) == (True, False)
+    listener.wait_until(lambda: told(listener, page, VAN), 'a request with the van')
+    assert not told(listener, page, PERSON)
     hollow = page.run('return crgame.perception.hollow')
     assert PERSON in hollow and VAN not in hollow and 'av0' not in hollow
     assert page.run('return document.querySelector(\'[data-layer="unseen"]\').hidden') is False
@@ -204,8 +204,9 @@ def test_the_estimate_is_that_of_the_message(page: LivePage, listener: Peer) -> 
     """Pose and ellipse are those of /localization at the shown step, 2 m off the truth."""
     shown = page.run('return crgame.perception.estimate')
     scheduler = listener.games[-1].scheduler
-    message = next(item for item in listener.messages['/<av>/localization']
-                   if scheduler.step_of_stamp(from_time(item.header.stamp)) == shown['n'])
+    message, = listener.wait_until(lambda: [
+        item for item in listener.messages['/<av>/localization']
+        if scheduler.step_of_stamp(from_time(item.header.stamp)) == shown['n']], 'the estimate')
     pose = message.pose.pose
     assert [shown['x'], shown['y']] == pytest.approx([pose.position.x, pose.position.y], abs=1e-6)
     assert np.sin(0.5 * shown['yaw']) == pytest.approx(pose.orientation.z, abs=1e-6)
@@ -262,8 +263,7 @@ def test_a_pedestrian_in_view_is_solid(page: LivePage, listener: Peer) -> None:
                   'a step', n)
         page.wait(SHOWN, 'everything of the step')
     assert page.run(f'return {solid}')
-    listener.listen_for(0.5)
-    assert told(listener, page, PERSON)
+    listener.wait_until(lambda: told(listener, page, PERSON), 'a request with the person')
     assert share_of(pixels(page, *place_of(page, PERSON)), page, 'vulnerable') == 1.0
 
 

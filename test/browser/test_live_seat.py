@@ -3,6 +3,7 @@
 """Return to the lane after a contact, a restart, and a local device."""
 
 from collections.abc import Iterator
+from itertools import count
 import signal
 
 from browser_support import Browser
@@ -14,7 +15,7 @@ from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import run_folders
 from crgame_ros.recording.run_record import read_drivers
 from crgame_ros.simulation.offline import run_offline
-from live_browser_support import Graph, live_graph, LivePage, SCENARIOS
+from live_browser_support import Graph, live_graph, LivePage, PATIENCE_S, SCENARIOS
 import numpy as np
 import pytest
 from selenium.webdriver.common.keys import Keys
@@ -46,7 +47,9 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Graph]:
 @pytest.fixture(scope='module')
 def page(graph: Graph, module_browser: Browser) -> LivePage:
     """Open the page once; the tests are one session, in their order."""
-    return LivePage(graph, module_browser)
+    opened = LivePage(graph, module_browser)
+    opened.keep_messages()
+    return opened
 
 
 def put_backs(page: LivePage) -> list[dict[str, object]]:
@@ -75,8 +78,11 @@ def test_a_vehicle_is_put_back_by_button_and_by_key(page: LivePage) -> None:
     page.wait('crgame.world.shown.vehicles[0] < arguments[0] - 2', 'the jump to be shown', x)
     row = page.vehicle(0)
     assert abs(row[1]) < 0.05 and abs(row[2]) < 1e-3 and row[3] == pytest.approx(0.0, abs=1e-3)
+    contacts = 'crgame.store.fired.filter((event) => event.by === "contact").length'
+    before = page.run(f'return {contacts}')
     page.hold('w')
-    page.wait('crgame.world.shown.vehicles[3] > 1', 'to drive on')
+    # It has driven on, as it touches the other one again.
+    page.wait(f'{contacts} > arguments[0]', 'the next contact', before)
     page.wait('Math.abs(crgame.world.shown.vehicles[3]) < 0.5', 'to stand again')
     page.release('w')
     page.hold(Keys.BACKSPACE)
@@ -88,13 +94,15 @@ def test_a_vehicle_is_put_back_by_button_and_by_key(page: LivePage) -> None:
 
 
 def test_the_delay_of_a_device_at_the_machine_is_shown(page: LivePage, graph: Graph) -> None:
-    publisher = graph.peer.publisher('/<hv>/joy', 'hv1')
-    for number in range(80):
-        # The left trigger, with slight changes.
-        publisher.publish(Joy(axes=[0.0, 0.0, 0.2 + 0.1 * (number % 2), 0.0, 0.0, 1.0],
+    publisher, numbers = graph.peer.publisher('/<hv>/joy', 'hv1'), count()
+
+    def shown() -> bool:
+        # The left trigger, with slight changes: only inputs that change something are measured.
+        publisher.publish(Joy(axes=[0.0, 0.0, 0.2 + 0.1 * (next(numbers) % 2), 0.0, 0.0, 1.0],
                               buttons=[0] * 11))
         graph.peer.listen_for(0.04)
-    page.wait_for_text('li[data-device="hv1"]', 'to the state that obeys')
+        return 'to the state that obeys' in page.text('li[data-device="hv1"]')
+    graph.peer.wait_until(shown, 'the delay of the device', PATIENCE_S)
     text = page.text('li[data-device="hv1"]')
     assert text.startswith('generic_gamepad') and 'ms to the command' in text
 

@@ -59,13 +59,23 @@ class Peer:
                 self.messages[name].append(message)
 
     def wait_until(self, condition: Callable[[], object], what: str,
-                   limit_s: float = PATIENCE_S) -> None:
-        """Listen until a condition holds; fail, naming it, if it never does."""
+                   limit_s: float = PATIENCE_S) -> Any:
+        """Listen until a condition holds; return its value, or fail, naming it."""
         until_s = time.monotonic() + limit_s
         self.listen()
-        while not condition():
+        while not (value := condition()):
             assert time.monotonic() < until_s, f'waited {limit_s:g} s in vain for {what}'
             self.listen()
+        return value
+
+    def wait_for_pause(self) -> int:
+        """Wait until the run stands still and its clock has come; return its step n."""
+        def stands() -> bool:
+            newest = self.statuses('sim_node: run')[-1:]
+            return any(status.message == 'paused' and int(values['n']) == self.n
+                       for status, values in newest)
+        self.wait_until(stands, 'a pause')
+        return self.n
 
     def listen_for(self, seconds: float) -> None:
         """Listen for a time."""
@@ -74,9 +84,11 @@ class Peer:
             self.listen()
 
     def publisher(self, name: str, vehicle_id: str = '') -> Publisher:
-        """Return a publisher that has a subscriber."""
+        """Return a publisher that all subscribers of its topic hear, of which there is one."""
         publisher = self._endpoints.publisher(name, vehicle_id)
-        self.wait_until(publisher.get_subscription_count, f'a subscriber of {name}')
+        # The first that hears it may be this node itself.
+        self.wait_until(lambda: 0 < self.node.count_subscribers(publisher.topic_name)
+                        <= publisher.get_subscription_count(), f'the subscribers of {name}')
         return publisher
 
     def call(self, service: str) -> Trigger.Response:
