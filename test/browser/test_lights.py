@@ -6,8 +6,9 @@ from collections.abc import Iterator
 import os
 from pathlib import Path
 import time
+from typing import Any
 
-from browser_support import Browser
+from browser_support import Browser, PATIENCE_S
 from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def show(page: Served, browser: Browser, lights: int, n: int) -> None:
     backend.n = n
     page.call(backend.send_now)
     browser.wait(f'crgame.world.shown.n === {n} && crgame.world.shown.vehicles[12] === {lights}')
-    time.sleep(0.2)
+    browser.wait_for_frame()
     if 'CRGAME_SCREENSHOTS' in os.environ:
         browser.screenshot(Path(os.environ['CRGAME_SCREENSHOTS']) / f'lights_{lights}_{n}.png')
 
@@ -92,16 +93,22 @@ def test_keys_of_the_lever_are_sent_and_do_not_drive(page: Served,
     page.backend.messages.clear()
     for key in ',.jg':
         ActionChains(module_browser.driver).key_down(key).pause(0.1).key_up(key).perform()
-    module_browser.wait('crgame.driving.hands.lights.join() === "0,0,0,0"')
-    time.sleep(0.2)
+    none = [False] * 4
+
+    def inputs() -> list[dict[str, Any]]:
+        return [message for message in page.backend.messages if message['type'] == 'input']
+    end = time.monotonic() + PATIENCE_S
+    while not (told := [message['lights'] for message in inputs()]) or told[-1] != none \
+            or [False, False, False, True] not in told:
+        assert time.monotonic() < end, told
+        time.sleep(0.02)
     if 'CRGAME_SCREENSHOTS' in os.environ:
         module_browser.screenshot(Path(os.environ['CRGAME_SCREENSHOTS']) / 'driving.png')
-    hands = [message for message in page.backend.messages if message['type'] == 'input']
+    hands = inputs()
     assert all(message['keys'] == [False] * 4 for message in hands)
     changes = [held for before, held in zip(
         [None, *(message['lights'] for message in hands)], [m['lights'] for m in hands],
         strict=False) if held != before]
-    none = [False] * 4
     pressed = [held for held in changes if held != none]
     assert pressed == [[i == j for j in range(4)] for i in range(4)]
     assert module_browser.console_errors() == []

@@ -138,6 +138,9 @@ def test_the_view_is_saved_as_it_is_seen(page: Browser, tmp_path: Path) -> None:
         while (before !== crgame.view3d.stats.frames) {
           before = crgame.view3d.stats.frames;
           await new Promise((resolve) => setTimeout(resolve, 500));
+          for (let i = 0; i < 3; i += 1) {
+            await new Promise(requestAnimationFrame);
+          }
         }
         return before;""")
     size = page.run('const { width, height } = document.querySelector("#view3d");'

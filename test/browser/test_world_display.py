@@ -101,8 +101,9 @@ def test_pause_holds_the_last_state_exactly(
     page.control('start')
     browser.wait('crgame.world.shown.t > 0.5')
     page.control('pause')
-    browser.wait("crgame.store.status.run === 'paused'")
-    time.sleep(0.3)
+    browser.wait("crgame.store.status.run === 'paused' && crgame.store.latest.n === arguments[0]"
+                 ' && crgame.world.shown.t === crgame.store.latest.t', 'the last state',
+                 arguments=(page.backend.n,))
     first = shown(browser)
     time.sleep(0.7)
     second = shown(browser)
@@ -184,12 +185,19 @@ def test_connection_that_breaks_is_taken_up_again(
         run: RecordedRun, page: Served, browser: Browser) -> None:
     page.control('start')
     browser.wait('crgame.world.shown.t > 0.3')
+    # Held, so that a later time comes by the next connection.
+    page.control('pause')
+    browser.wait('crgame.store.latest.n === arguments[0] && crgame.world.shown.t'
+                 ' === crgame.store.latest.t', arguments=(page.backend.n,))
+    t = shown(browser)['t']
     clients = list(page.backend.hub.clients)
-    browser.run('crgame.connection.interrupt()')
-    browser.wait('!crgame.store.connected', 'the loss')
+    browser.run("""window.lost = false;
+        crgame.store.on('connection', (connected) => { window.lost ||= !connected; });
+        crgame.connection.interrupt();""")
+    browser.wait('window.lost', 'the loss')
     browser.wait('crgame.store.connected && crgame.store.me.id !== arguments[0]',
                  'the connection', arguments=(clients[0],))
-    t = shown(browser)['t']
+    page.control('start')
     browser.wait('crgame.world.shown.t > arguments[0] + 0.3', arguments=(t,))
 
 
