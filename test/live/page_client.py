@@ -16,6 +16,8 @@ import websocket
 
 STATE, OBJECTS, PLAN = 1, 2, 3
 REPEAT_S = 0.05
+# Documents that every client gets at once.
+FIRST = {'hello', 'scene', 'seats', 'status', 'events'}
 
 
 class PageClient:
@@ -39,8 +41,7 @@ class PageClient:
         self._threads = [threading.Thread(target=self._read), threading.Thread(target=self._hold)]
         for thread in self._threads:
             thread.start()
-        wait_until(lambda: 'scene' in self.documents and 'seats' in self.documents,
-                   'the first documents')
+        wait_until(lambda: FIRST <= self.documents.keys(), 'the first documents')
 
     def _read(self) -> None:
         while not self.closed:

@@ -89,12 +89,10 @@ def _says(pattern: str) -> Callable[[subprocess.Popen[str], list[str]], bool]:
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize(('moment', 'early'), [
-    (_is_python, True), (_loads_numpy, True), (_says('^sim_node: process'), False)],
-    ids=['Python starts', 'imports', 'first node'])
+@pytest.mark.parametrize('moment', [_is_python, _loads_numpy, _says('^sim_node: process')],
+                         ids=['Python starts', 'imports', 'first node'])
 def test_ctrl_c_during_the_start_is_a_line_and_no_traceback(
-        moment: Callable[[subprocess.Popen[str], list[str]], bool], early: bool,
-        tmp_path: Path) -> None:
+        moment: Callable[[subprocess.Popen[str], list[str]], bool], tmp_path: Path) -> None:
     """The run is started as by run.sh; all processes at the terminal get the signal."""
     line = (ROOT / 'run.sh').read_text().splitlines()[-1]
     words = [{'$CRGAME_PYTHON': sys.executable}.get(word, word) for word in shlex.split(line)]
@@ -114,7 +112,9 @@ def test_ctrl_c_during_the_start_is_a_line_and_no_traceback(
             assert process.wait(60.0) == 0, text
             assert 'Traceback' not in text, text
             last = text.splitlines()[-1]
-            assert last == ENDED_EARLY if early else last.startswith('again: ./run.sh'), text
+            # On a busy machine the signal may come later than at the moment that was seen.
+            assert last.startswith('again: ./run.sh') or (
+                last == ENDED_EARLY and 'sim_node: process' not in text), text
             wait_until(lambda: not _of_session(process.pid), 'the end of everybody', 20.0)
         finally:
             process.kill()

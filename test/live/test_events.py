@@ -67,13 +67,19 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launcher, 
         yield launcher, peer
 
 
+def _epoch_of_events(peer: Peer) -> int:
+    """Return the epoch of the newest list of fired events."""
+    return parse_events_document(peer.messages['/scenario/events'][-1].data)[0]
+
+
 @pytest.fixture
 def stage(graph: tuple[Launcher, Peer]) -> Iterator[Stage]:
     """Begin the game again."""
     launcher, peer = graph
     epoch = peer.games[-1].epoch
     assert peer.call('/sim/reset').success
-    peer.wait_until(lambda: peer.games[-1].epoch > epoch and peer.n > 0, 'a new epoch')
+    peer.wait_until(lambda: peer.games[-1].epoch > epoch and peer.n > 0
+                    and _epoch_of_events(peer) == peer.games[-1].epoch, 'a new epoch')
     peer.forget()
     button = peer.publisher('/trigger')
     yield Stage(launcher, peer, button)
@@ -92,13 +98,17 @@ def test_trigger_releases_the_pedestrian(stage: Stage) -> None:
     stage.press('pedestrian')
     (event,) = stage.fired
     assert event == FiredEvent('pedestrian', event.n, event.n // STEPS_PER_TICK, 'trigger')
-    peer.wait_until(lambda: peer.n > event.n + 100, '1 s more')
     scheduler = peer.games[-1].scheduler
-    walked = {}
-    for message in peer.messages['/traffic/objects']:
-        place = list(message.joint_names).index('o201/y')
-        n = scheduler.step_of_stamp(from_time(message.header.stamp))
-        walked[n] = message.points[0].positions[place] + 4.9
+
+    def ways() -> dict[int, float]:
+        found = {}
+        for message in peer.messages['/traffic/objects']:
+            place = list(message.joint_names).index('o201/y')
+            n = scheduler.step_of_stamp(from_time(message.header.stamp))
+            found[n] = message.points[0].positions[place] + 4.9
+        return found
+    peer.wait_until(lambda: max(ways()) >= event.n + 100, '1 s more')
+    walked = ways()
     assert all(way == pytest.approx(0.0, abs=1e-4) for n, way in walked.items() if n <= event.n)
     late = [n for n in walked if event.n < n <= event.n + 100]
     assert len(late) >= 9
@@ -176,12 +186,15 @@ def test_recorded_events_repeat_offline_and_live(tmp_path: Path) -> None:
     Live, the folder's game file says at which step the pedestrian goes.
     """
     folder = tmp_path / 'first'
-    with Launcher([CROSSING, '--duration', 6, '--real-time-factor', 2], folder) as launcher, \
+    # Slowly at first: the run must not end before the buttons are pressed.
+    with Launcher([CROSSING, '--duration', 6, '--real-time-factor', 0.1], folder) as launcher, \
             Peer(launcher.domain, *TOPICS) as peer:
-        peer.wait_until(lambda: peer.n > 0, 'the first step')
+        peer.wait_until(lambda: peer.n > 0 and peer.messages['/scenario/events'],
+                        'the first step')
         stage = Stage(launcher, peer, peer.publisher('/trigger'))
         stage.press('pedestrian')
         stage.press('leader-brakes')
+        assert peer.set_parameter('real_time_factor', 2.0).successful
         assert launcher.wait() == 0, launcher.text
     known, fired = read_run_events(folder / 'bag')
     assert [event.name for event in fired] == ['pedestrian', 'leader-brakes']

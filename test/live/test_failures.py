@@ -5,6 +5,7 @@
 import os
 from pathlib import Path
 import resource
+import signal
 
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import run_folder
@@ -69,8 +70,13 @@ def test_killed_driver_is_started_again_and_drives(run: Run) -> None:
     """The seat releases meanwhile; the successor continues where the timeline is by then."""
     launcher, peer = run
     starts = len(launcher.started)
-    launcher.kill('driver_node_hv0')
-    peer.wait_until(lambda: peer.cycles().commands('hv0')[-1, 0] < THROTTLE, 'the release')
+    # Meanwhile the launcher starts nobody: the release is seen, however late this test looks.
+    launcher.signal(signal.SIGSTOP)
+    try:
+        launcher.kill('driver_node_hv0')
+        peer.wait_until(lambda: peer.cycles().commands('hv0')[-1, 0] < THROTTLE, 'the release')
+    finally:
+        launcher.signal(signal.SIGCONT)
     wait_until(lambda: len(launcher.started) > starts, 'another driver')
     peer.wait_until(lambda: peer.cycles().commands('hv0')[-1, 0] == THROTTLE, 'the driver again')
     assert peer.cycles().commands('hv0')[-1, 1] == 0.0
@@ -129,6 +135,8 @@ def _computed_s(pid: int) -> float:
 def test_replacement_has_everything_loaded(run: Run) -> None:
     """Any node, twice in a row: its replacement works after less computing than imports take."""
     launcher, peer = run
+    # So slowly that what it computes from its first message on does not count.
+    assert peer.set_parameter('real_time_factor', 0.1).successful
     for name, topic in (('planner_node_av0', '/<av>/plan'), ('planner_node_av0', '/<av>/plan'),
                         ('drivability_node', '/<v>/drivability')):
         killed = launcher.node(name)

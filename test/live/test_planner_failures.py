@@ -10,10 +10,11 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.ros.messages import from_time, to_joint_trajectory
 from crgame_ros.vehicle.state import VehicleState
 from live_peer import Peer
-from live_support import wait_until
+from live_support import PATIENCE_S, wait_until
 import numpy as np
 from numpy.typing import NDArray
 import pytest
+from rclpy.duration import Duration as RosDuration
 from rclpy.publisher import Publisher
 from steady_game import Run, STEP_NS, STEP_S
 from trajectory_msgs.msg import JointTrajectory
@@ -131,12 +132,26 @@ LIES: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
 }
 
 
-def _answer(run: Run, rogue: Publisher, lie: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-            late_ns: int = 0) -> None:
-    """Answer the next request for av0 with a plan at constant speed, distorted."""
-    peer = run.peer
-    seen = len(peer.messages['/<av>/plan_request'])
-    peer.wait_until(lambda: len(peer.messages['/<av>/plan_request']) > seen, 'a request')
+def _step(peer: Peer) -> int:
+    """Go on by one tick in a pause; return the step n after it."""
+    n = peer.n + STEPS_PER_TICK
+    assert peer.call('/sim/step').success
+    peer.wait_until(lambda: peer.n == n, f'n = {n}')
+    return n
+
+
+def _ask_again(peer: Peer) -> None:
+    """Go on by one tick in a pause, and wait until av0's planner is asked at it."""
+    n = _step(peer)
+    step_of_stamp = peer.games[-1].scheduler.step_of_stamp
+    peer.wait_until(lambda: step_of_stamp(from_time(
+        peer.messages['/<av>/plan_request'][-1].header.stamp)) == n - n % STEPS_PER_TICK,
+        f'the request of the tick before n = {n}')
+
+
+def _answer(peer: Peer, rogue: Publisher,
+            lie: Callable[[NDArray[np.float64]], NDArray[np.float64]], late_ns: int = 0) -> None:
+    """Answer the last request for av0 with a plan at constant speed, distorted."""
     request: JointTrajectory = peer.messages['/<av>/plan_request'][-1]
     point = request.points[0]
     x, y, yaw, steering = point.positions[:4]
@@ -147,6 +162,7 @@ def _answer(run: Run, rogue: Publisher, lie: Callable[[NDArray[np.float64]], NDA
     states[:, 3], states[:, 4] = np.hypot(vx, vy), steering
     plan = Plan(from_time(request.header.stamp) + late_ns, lie(states))
     rogue.publish(to_joint_trajectory(plan_to_joints(plan, 'av0', TICK_NS)))
+    assert rogue.wait_for_all_acked(RosDuration(seconds=PATIENCE_S))
 
 
 @pytest.mark.exhaustive
@@ -155,28 +171,35 @@ def test_lies_of_a_planner_are_refused_with_the_reason(run: Run) -> None:
     Each bad plan (NaN, another start, a jump, 90 m/s, a wrong stamp) is named; the good one stays.
 
     The real planner is frozen, so that the plans of another node answer the open requests. Its
-    last plan reaches 3 s: the open request is repeated after 1 s, a refused one after 0.1 s.
+    last plan reaches 3 s, so that the run goes on tick by tick: a refused request is repeated at
+    the next one.
     """
     launcher, peer = run
-    peer.set_parameter('real_time_factor', 0.5)
     rogue = peer.publisher('/<av>/plan', 'av0')
-    launcher.freeze('planner_node_av0')
-    peer.listen_for(0.1)
-    good = _plans(peer)[-1]
-    reasons = {**LIES, 'answers no request': lambda states: states}
-    for count, (reason, lie) in enumerate(reasons.items(), 1):
-        _answer(run, rogue, lie, TICK_NS // 2 if reason == 'answers no request' else 0)
-        peer.wait_until(lambda count=count: len(peer.statuses('sim_node: av0 plan refused'))
-                        >= count, f'the refusal: {reason}')
-        assert reason in peer.statuses('sim_node: av0 plan refused')[-1][0].message
-    refusals = peer.statuses('sim_node: av0 plan refused')
-    assert len(refusals) == len(reasons)
-    # Each refusal took a tick at least, and the AV still follows the plan from before.
-    run.wait_for_steps(STEPS_PER_TICK)
-    assert _followed(good, peer.states('av0')) >= len(reasons)
-    assert peer.states('av0')[-1, 4] > 5.0
-    peer.set_parameter('real_time_factor', 4.0)
-    launcher.thaw('planner_node_av0')
+    assert peer.call('/sim/pause').success
+    try:
+        peer.wait_for_pause()
+        peer.wait_until(lambda: peer.messages['/<av>/plan'][-1].header.stamp
+                        == peer.messages['/<av>/plan_request'][-1].header.stamp, 'the last answer')
+        launcher.freeze('planner_node_av0')
+        _ask_again(peer)
+        good = _plans(peer)[-1]
+        reasons = {**LIES, 'answers no request': lambda states: states}
+        for count, (reason, lie) in enumerate(reasons.items(), 1):
+            _answer(peer, rogue, lie, TICK_NS // 2 if reason == 'answers no request' else 0)
+            # A plan that answers no request leaves the request open for a second.
+            (_step if reason == 'answers no request' else _ask_again)(peer)
+            peer.wait_until(lambda count=count: len(peer.statuses('sim_node: av0 plan refused'))
+                            >= count, f'the refusal: {reason}')
+            assert reason in peer.statuses('sim_node: av0 plan refused')[-1][0].message
+        refusals = peer.statuses('sim_node: av0 plan refused')
+        assert len(refusals) == len(reasons)
+        # Each refusal took a tick, and the AV still follows the plan from before.
+        assert _followed(good, peer.states('av0')) >= len(reasons)
+        assert peer.states('av0')[-1, 4] > 5.0
+    finally:
+        launcher.thaw('planner_node_av0')
+        assert peer.call('/sim/start').success
     peer.wait_until(lambda: int(run.counters()['refused']) >= len(reasons), 'the count')
     accepted = int(run.counters()['accepted'])
     peer.wait_until(lambda: int(run.counters()['accepted']) > accepted, 'good plans again')

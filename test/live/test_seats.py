@@ -83,14 +83,30 @@ def _last(taker: Taker, column: int, value: float) -> bool:
     return bool(taker.peer.messages['/timing/cycle']) and taker.consumed()[-1, column] == value
 
 
+def _by_hand(peer: Peer) -> np.ndarray:
+    """Return the steps n at which a driver drove av0, since the last `forget`."""
+    cycles = peer.cycles()
+    return cycles.column('n')[cycles.drove('av0')]
+
+
+def _steps(peer: Peer) -> np.ndarray:
+    """Return the steps n of the states since the last `forget`; -1 before the first."""
+    scheduler = peer.games[-1].scheduler
+    return np.array([scheduler.step_of_stamp(from_time(message.header.stamp))
+                     for message in peer.messages['/vehicles/state']] or [-1])
+
+
 def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
     """The vehicle obeys the holder of the seat only; its own driver falls silent."""
     taker = Taker(peer, 'hv0')
     assert _seats(peer)['hv0'] == {'source': 'game', 'driver': _seats(peer)['hv0']['driver']}
     # Before the order no node listens to a stranger.
     peer.forget()
-    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 20, 'twenty cycles')
-    assert np.all(taker.consumed()[:, :2] == (THROTTLE, 0.0))
+    # On a busy machine the script may be late, and the seat lets go for a moment.
+    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 20
+               and np.all(taker.consumed()[-20:, :2] == (THROTTLE, 0.0)),
+               'twenty cycles of nothing but the script')
+    assert np.all(taker.consumed()[:, 1] != BRAKE.brake)
     taker.order('tester', 'tester')
     taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who has the seat')
     peer.forget()
@@ -100,8 +116,11 @@ def test_a_seat_is_taken_from_the_script_and_given_back(peer: Peer) -> None:
                'fifty cycles of nothing but that brake')
     # No other pedal was ever obeyed, not the script's either.
     assert np.all(taker.consumed()[5:, 0] == 0.0)
-    spoken = [message.header.frame_id for message in peer.messages['/<v>/driver_command']]
-    assert 'game' not in spoken[10:]
+
+    def spoken() -> list[str]:
+        return [message.header.frame_id for message in peer.messages['/<v>/driver_command']]
+    taker.hold(BRAKE, lambda: len(spoken()) > 100 and 'game' not in spoken()[-100:],
+               'silence of the script')
     taker.order('game', 'game')
     peer.wait_until(lambda: _last(taker, 0, THROTTLE), 'the script in the seat again')
 
@@ -113,20 +132,25 @@ def test_an_av_is_taken_over_and_given_back(peer: Peer) -> None:
     peer.wait_until(lambda: len(peer.messages['/timing/cycle']), 'a cycle')
     # There are no pedals and no steering wheel; its lights are those of its plan.
     assert np.isnan(taker.consumed()[-1, :4]).all()
+    peer.forget()
     taker.order('tester', 'tester')
     taker.hold(BRAKE, lambda: _last(taker, 1, 0.25), 'the brake of the one who took over')
-    peer.forget()
-    taker.hold(BRAKE, lambda: len(peer.messages['/timing/cycle']) > 100, 'a second')
-    speeds = peer.states('av0')[:, 4]
-    # 0.25 of the pedal brake with clearly more than 0.5 m/s^2 for about a second.
+    cycles = peer.cycles()
+    first = int(cycles.column('n')[cycles.commands('av0')[:, 1] > 0.0][0])
+    taker.hold(BRAKE, lambda: _steps(peer)[-1] >= first + 110, 'a second')
+    steps, rows = _steps(peer), peer.states('av0')
+    speeds = rows[(steps >= first) & (steps <= first + 110), 4]
+    # 0.25 of the pedal brake with clearly more than 0.5 m/s^2 for about a second; the watchdog's
+    # 0.15 does, too, which brakes while this test is late.
     assert speeds[-1] < speeds[0] - 0.5
     assert np.all(np.diff(speeds) <= 1e-9)
-    assert len(peer.messages['/<av>/plan_request']) >= 8
+    peer.wait_until(lambda: len(peer.messages['/<av>/plan_request']) >= 8, 'requests meanwhile')
     taker.order('game', 'planner')
-    peer.forget()
-    peer.wait_until(lambda: len(peer.messages['/timing/cycle']) > 150, 'a second and a half')
-    assert np.isnan(taker.consumed()[5:, :4]).all()
-    rows = peer.states('av0')
+    peer.wait_until(lambda: peer.cycles().column('n')[-1] >= _by_hand(peer)[-1] + 150
+                    and _steps(peer)[-1] >= _by_hand(peer)[-1] + 150, 'a second and a half')
+    by_hand = _by_hand(peer)
+    assert np.array_equal(by_hand, np.arange(by_hand[0], by_hand[-1] + 1))
+    rows = peer.states('av0')[_steps(peer) >= by_hand[-1]]
     ways = np.hypot(np.diff(rows[:, 1]), np.diff(rows[:, 2]))
     steps = np.diff(rows[:, 0]) * 1e-9
     # No jump at the give-back: each way agrees with the speeds around it within 2 cm.
@@ -183,14 +207,15 @@ def test_planner_stop_and_go(peer: Peer) -> None:
         assert future.result().success
 
     order(False)
+    peer.forget()
+    peer.wait_until(lambda: peer.statuses('sim_node: av0 plans')[-1:]
+                    and peer.statuses('sim_node: av0 plans')[-1][1]['running'] == 'false',
+                    'a report that the planner is stopped')
     n = peer.n
     peer.wait_until(lambda: peer.n > n + 30, 'three ticks')
     peer.forget()
     peer.wait_until(lambda: peer.n > n + 100, 'seven ticks')
     assert not peer.messages['/<av>/plan_request']
-    peer.wait_until(lambda: peer.statuses('sim_node: av0 plans')[-1:]
-                    and peer.statuses('sim_node: av0 plans')[-1][1]['running'] == 'false',
-                    'a report that the planner is stopped')
     order(True)
     peer.wait_until(lambda: len(peer.messages['/<av>/plan_request']) > 3, 'requests again')
     stamps = [from_time(m.header.stamp) for m in peer.messages['/<av>/plan_request']]

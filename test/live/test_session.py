@@ -87,7 +87,8 @@ def test_an_undriven_game_one_that_ends_and_the_same_again(tmp_path: Path) -> No
                 assert not reply['ok'] and 'the run is over' in reply['text']
             assert page.request('control', action='reset')['ok']
             ended(page, 2)
-            assert page.documents['status']['timing']['cycles'] == round(100 * SHORT_S)
+            wait_until(lambda: page.documents['status']['timing']['cycles']
+                       == round(100 * SHORT_S), 'all cycles of it')
         launcher.signal(signal.SIGINT)
         assert launcher.wait() == 0, launcher.text
     assert launcher.says(f'{out}: nothing was recorded: the run ended before its first step')

@@ -27,6 +27,8 @@ import pytest
 pytestmark = pytest.mark.exhaustive
 
 DURATION_S = 2.5
+# The least real-time factor: a drive that is to be interrupted must not end before.
+SLOWEST = 0.1
 
 
 class Participant:
@@ -72,8 +74,8 @@ class Participant:
         wait_until(lambda: self.drives.state.phase is phase and self.drives.state.item == item,
                    f'{item} to be {phase}; it is {self.drives.state}')
 
-    def begin(self, item: str) -> None:
-        """Claim the seat of a trial that is ready, and confirm to be ready."""
+    def begin(self, item: str, factor: float = 1.0) -> None:
+        """Claim the seat of a trial that is ready, set its pace, and confirm to be ready."""
         self.wait_for(DrivePhase.READY, item)
         graph = self.drives._graph
         assert graph is not None
@@ -86,6 +88,7 @@ class Participant:
         wait_until(lambda: self._page is not None and self._page.request(
             'claim', seat='hv0', device='')['ok'], 'the seat')
         self._page.hold_keys('hv0', [1, 0, 0, 0])
+        self._page.order('rate', factor=factor)
         self.loop.call_soon_threadsafe(self.drives.ready, item)
 
     @property
@@ -109,24 +112,24 @@ def journal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[dict[str,
     """Drive four trials: one is killed, one aborted, one skipped, one stopped and reset."""
     folder = tmp_path_factory.mktemp('study') / 'participants' / 'P01'
     with Participant(folder) as person:
-        person.begin('main/1')
+        person.begin('main/1', SLOWEST)
         person.wait_for(DrivePhase.DRIVING, 'main/1')
         # The launcher is killed: its nodes end with it.
         os.kill(person.graphs[-1], signal.SIGKILL)
         person.begin('main/1')
-        person.begin('main/2')
+        person.begin('main/2', SLOWEST)
         person.wait_for(DrivePhase.DRIVING, 'main/2')
-        wait_until(lambda: (person.drives.state.time_s or 0.0) > 1.0, 'a second of the run')
+        wait_until(lambda: (person.drives.state.time_s or 0.0) > 0.5, 'some of the run')
         person.call(person.drives.abort, 'a telephone rang')
         person.wait_for(DrivePhase.READY, 'main/2')
         person.stands()
         person.begin('main/2')
-        person.begin('main/3')
+        person.begin('main/3', SLOWEST)
         person.wait_for(DrivePhase.DRIVING, 'main/3')
         person.call(person.session.skip, 'no time left')
         person.call(person.drives.wake)
         for action in ('stop', 'reset'):
-            person.begin('main/4')
+            person.begin('main/4', SLOWEST)
             person.wait_for(DrivePhase.DRIVING, 'main/4')
             assert person.page.request('control', action=action)['ok']
             person.wait_for(DrivePhase.READY, 'main/4')
