@@ -60,7 +60,9 @@ class Graph:
         new = {topic: self.peer._endpoints.publisher(*topic)
                for topic in topics if topic not in self._publishers}
         for (name, _), publisher in new.items():
-            await self.until(publisher.get_subscription_count, f'a listener of {name}')
+            # By the cockpit's own count: the first listener may be the peer itself.
+            await self.until(lambda to=publisher: 0 < self.node.count_subscribers(to.topic_name)
+                             <= to.get_subscription_count(), f'the listeners of {name}')
         if new:
             await asyncio.sleep(0.2)
         self._publishers |= new
@@ -122,6 +124,16 @@ class Graph:
             assert loop.time() < until_s, f'waited in vain for {what}'
             self.peer.listen()
             await asyncio.sleep(0.005)
+
+    async def hold(self, client: Client, seat: str, condition: Callable[[], object],
+                   what: str, **keys: Any) -> None:
+        """Repeat the keys of a page, as it does, until a condition holds."""
+        loop = asyncio.get_running_loop()
+        until_s = loop.time() + PATIENCE_S
+        while not condition():
+            assert loop.time() < until_s, f'waited in vain for {what}'
+            await self.ask(client, 'input', seat=seat, **keys)
+            await self.pause(0.05)
 
     async def pause(self, seconds: float) -> None:
         """Run backend and peer for a time."""

@@ -100,7 +100,7 @@ def test_no_message_stops_the_pump(setup: Setup, name: str, vehicle: str,
         await graph.until(lambda: graph.hub._frames.get('state') is not before, 'the state')
         frame = np.frombuffer(graph.hub._frames['state'].data)
         assert frame[2] == 10 and frame[6:9].tolist() == [*setup.humans[0].state[:3]]
-        await graph.until(lambda: any(graph.throttles()), 'the throttle')
+        await graph.hold(page, 'hv0', lambda: any(graph.throttles()), 'the throttle', **FULL)
         assert 'hv9' not in graph.document('status').get('drivability', {})
     lived(check)
 
@@ -132,11 +132,9 @@ def test_giving_back_lets_go_of_the_pedals(setup: Setup) -> None:
         # During a pause: no cycle comes, the page repeats its keys.
         await graph.until(lambda: graph.peer.node.count_publishers('/hv0/driver_command'),
                           'the cockpit as a driver')
-        for _ in range(5):
-            await graph.ask(page, 'input', seat='hv0', **FULL)
-            await graph.pause(0.05)
-        assert graph.throttles()[-1] > 0.0
+        await graph.hold(page, 'hv0', lambda: any(graph.throttles()), 'the throttle', **FULL)
         await graph.ask(page, 'release', seat='hv0')
+        await graph.until(lambda: graph.throttles()[-1] == 0.0, 'the pedal released')
         await graph.pause(0.3)
         assert graph.throttles()[-1] == 0.0
     lived(check)
@@ -155,6 +153,7 @@ def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
         await graph.begin(setup)
         await graph.seats('cockpit')
         await graph.state(setup, 20)
+        await graph.until(lambda: 'state' in graph.hub._frames, 'the state')
         other.sound = Sound(True, 1.0, 1.0)
         await graph.pause(0.3)
         assert told(graph) == []
@@ -187,13 +186,15 @@ def test_an_order_is_repeated_until_it_is_answered(setup: Setup) -> None:
         await graph.begin(setup)
         await graph.seats('game')
         await graph.ask(page, 'claim', seat='hv0')
-        await graph.until(lambda: graph.orders() == ['cockpit'] * 3, 'the order three times')
+        await graph.until(lambda: graph.orders()[:3] == ['cockpit'] * 3, 'the order three times')
         # Messages from before the order arrived take nothing away; its result ends the repetition.
         await graph.seats('other')
         assert graph.seat()['holder'] == page.id
         await graph.seats('cockpit', page=page)
+        # One may be on its way.
+        most = len(graph.orders()) + 1
         await graph.pause(1.2)
-        assert len(graph.orders()) <= 4
+        assert len(graph.orders()) <= most
         assert graph.seat()['holder'] == page.id
         # Now an outside driver takes the seat.
         await graph.seats('other')

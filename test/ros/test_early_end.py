@@ -3,6 +3,7 @@
 """Ctrl-C while a node still imports ends it like any other time: without a traceback."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -23,4 +24,5 @@ def test_ctrl_c_during_imports_is_no_traceback(after_s: float) -> None:
     _, errors = process.communicate(timeout=60.0)
     # Before Python has started, the system itself ends the process.
     assert process.returncode in (0, 1, 130, -signal.SIGINT)
-    assert 'planner_node' not in errors and 'rclpy' not in errors
+    # A line of a traceback, and not of the log: on a busy machine the node may have begun.
+    assert not re.search(r'File ".*(planner_node|rclpy)', errors), errors
