@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 import hashlib
 import json
-from typing import Any
+from typing import Any, NamedTuple
 
 from crgame_ros.evaluation.content import digests_in
 
@@ -17,9 +17,9 @@ FACTORS = ('scenario', 'game', 'human', 'planner', 'perception', 'traffic', 'see
 
 
 @dataclass(frozen=True)
-class Cell:
+class Condition:
     """
-    The complete description of a run to compute: with its contents, nothing else is needed.
+    All that cells of different seeds share: with its contents, nothing but a seed is needed.
 
     :param scenario: benchmark id.
     :param game: name of the game's file, or empty.
@@ -27,7 +27,6 @@ class Cell:
     :param planner: label of the AVs' planner.
     :param perception: label of the AVs' perception.
     :param traffic: label of the traffic.
-    :param seed: seed of all random values.
     :param values: values of the game; files are references to contents.
     :param inputs: digest of the recorded humans' inputs, or empty.
     :param planner_choice: `planner` and `options` of all AVs; None keeps the game's.
@@ -46,7 +45,6 @@ class Cell:
     planner: str
     perception: str
     traffic: str
-    seed: int
     values: Mapping[str, Any]
     inputs: str
     planner_choice: Mapping[str, Any] | None
@@ -59,34 +57,70 @@ class Cell:
 
     @cached_property
     def text(self) -> str:
-        """Return the cell as JSON, the same for equal cells."""
+        """Return the condition as JSON, the same for equal conditions."""
         return json.dumps({item.name: getattr(self, item.name) for item in fields(self)},
                           sort_keys=True, separators=(',', ':'), allow_nan=True)
 
     @cached_property
-    def key(self) -> str:
-        """Return the key: a hash over everything that the results depend on."""
-        return hashlib.sha256(self.text.encode()).hexdigest()[:KEY_DIGITS]
+    def contents(self) -> frozenset[str]:
+        """Return the digests of the contents that it needs."""
+        return frozenset(digests_in(self.text) | ({self.inputs} if self.inputs else set()))
+
+    @cached_property
+    def begun_hash(self) -> 'hashlib._Hash':
+        """Return the hash of the part of a cell's text that comes before its seed."""
+        return hashlib.sha256(self.text[:-1].encode())
+
+
+class Cell(NamedTuple):
+    """
+    The complete description of a run to compute.
+
+    :param condition: all but the seed.
+    :param seed: seed of all random values.
+    """
+
+    condition: Condition
+    seed: int
 
     @property
-    def contents(self) -> set[str]:
-        """Return the digests of the contents that it needs."""
-        return digests_in(self.text) | ({self.inputs} if self.inputs else set())
+    def text(self) -> str:
+        """Return the cell as JSON, the same for equal cells; the seed is last."""
+        return self.condition.text[:-1] + self._end
+
+    @property
+    def key(self) -> str:
+        """Return the key: a hash over the text, everything that the results depend on."""
+        total = self.condition.begun_hash.copy()
+        total.update(self._end.encode())
+        return total.hexdigest()[:KEY_DIGITS]
+
+    @property
+    def _end(self) -> str:
+        return f',"seed":{self.seed}}}'
 
     @property
     def factors(self) -> dict[str, Any]:
         """Return the values of the columns that identify it."""
-        return {name: getattr(self, name) for name in FACTORS}
+        return {name: getattr(self if name == 'seed' else self.condition, name)
+                for name in FACTORS}
 
     @property
     def label(self) -> str:
         """Return a name for people."""
-        place = self.human or self.game or self.scenario
-        more = [text for text in (self.perception, self.traffic) if text != 'own']
-        return ' · '.join((place, self.planner, *more, f'seed {self.seed}'))
+        given = self.condition
+        place = given.human or given.game or given.scenario
+        more = [text for text in (given.perception, given.traffic) if text != 'own']
+        return ' · '.join((place, given.planner, *more, f'seed {self.seed}'))
+
+
+def condition_of(values: Mapping[str, Any]) -> Condition:
+    """Build the condition from the values of its JSON."""
+    return Condition(**{**values, 'code': tuple(values['code'])})
 
 
 def cell_of(text: str) -> Cell:
     """Build the cell from its JSON."""
     values = json.loads(text)
-    return Cell(**values | {'code': tuple(values['code'])})
+    seed = values.pop('seed')
+    return Cell(condition_of(values), seed)

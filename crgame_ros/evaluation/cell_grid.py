@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell import Cell
+from crgame_ros.evaluation.cell import Cell, Condition
 from crgame_ros.evaluation.cell_scene import (
     CellScene,
     files_of,
@@ -75,16 +75,17 @@ class CellGrid:
             * len(self.traffic) * len(self.seeds)
 
     def __iter__(self) -> Iterator[Cell]:
-        for seed in self.seeds:
-            for scene in self.scenes:
-                for planner in self.planners:
-                    for perception, seen in self.perception.items():
-                        for traffic, flow in self.traffic.items():
-                            yield Cell(
-                                scene.scenario, scene.game, scene.human, planner.label,
-                                perception, traffic, seed, scene.values, scene.inputs,
-                                planner.choice, seen, flow, self.duration_s, self.latency_steps,
-                                self.commonroad_scores, (self.engine, *self._code(scene, planner)))
+        """Yield the cells of a scene together, so that its contents are sent once."""
+        for scene in self.scenes:
+            for planner in self.planners:
+                for perception, seen in self.perception.items():
+                    for traffic, flow in self.traffic.items():
+                        condition = Condition(
+                            scene.scenario, scene.game, scene.human, planner.label, perception,
+                            traffic, scene.values, scene.inputs, planner.choice, seen, flow,
+                            self.duration_s, self.latency_steps, self.commonroad_scores,
+                            (self.engine, *self._code(scene, planner)))
+                        yield from (Cell(condition, seed) for seed in self.seeds)
 
     def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
         return (planner.digest,) if planner.choice is not None else scene.digests

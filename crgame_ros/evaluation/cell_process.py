@@ -245,7 +245,7 @@ def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
     :raises CrgameError: if this worker's version differs from the client's.
     """
     worker = get_worker()
-    if cell_of(text).code[0] != engine_digest():
+    if cell_of(text).condition.code[0] != engine_digest():
         raise CrgameError(f'worker {worker.address} has another crgame_ros than this one, or '
                           'other packages: install the same there')
     store = ContentStore(Path(worker.local_directory) / 'crgame-contents')

@@ -44,9 +44,9 @@ def run_cell(cell: Cell, contents: Path) -> OfflineResult:
     """
     setup = cell_setup(cell, contents)
     inputs = _inputs(cell, contents)
-    return run_offline(setup, duration_s=cell.duration_s, latency_steps=cell.latency_steps,
-                       drivers=inputs.drivers, intervals_s=inputs.intervals_s,
-                       clock_s=time.perf_counter)
+    return run_offline(setup, duration_s=cell.condition.duration_s,
+                       latency_steps=cell.condition.latency_steps, drivers=inputs.drivers,
+                       intervals_s=inputs.intervals_s, clock_s=time.perf_counter)
 
 
 def cell_setup(cell: Cell, contents: Path) -> Setup:
@@ -55,23 +55,24 @@ def cell_setup(cell: Cell, contents: Path) -> Setup:
 
     :raises InputError: if a part of it cannot be used.
     """
-    game = parse_game(_resolved(cell.values, contents), cell.label, contents)
+    game = parse_game(_resolved(cell.condition.values, contents), cell.label, contents)
     loaded = load_scenario(game.scenario)
     return build_setup(_adapted(game, loaded, cell, contents), loaded)
 
 
 def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> Game:
     """Return a game with the cell's AVs and traffic."""
+    given = cell.condition
     choice: dict[str, Any] = {'planner': OWN, 'options': None} \
-        if cell.planner_choice is None else _resolved(cell.planner_choice, contents)
+        if given.planner_choice is None else _resolved(given.planner_choice, contents)
 
     def spec(kind: type[Any], values: Any, name: str) -> Any:
         return values if values is None or values == OWN else read(
             kind, _resolved(values, contents), name, contents)
     return adapt_game(
         game, loaded, seed=cell.seed, planner=choice['planner'], options=choice['options'],
-        perception=spec(PerceptionSpec, cell.perception_values, 'perception'),
-        traffic=spec(TrafficSpec, cell.traffic_values, 'traffic'))
+        perception=spec(PerceptionSpec, given.perception_values, 'perception'),
+        traffic=spec(TrafficSpec, given.traffic_values, 'traffic'))
 
 
 def _resolved(value: Any, contents: Path) -> Any:
@@ -83,9 +84,9 @@ def _resolved(value: Any, contents: Path) -> Any:
 
 
 def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
-    if not cell.inputs:
+    if not cell.condition.inputs:
         return RecordedInputs({}, None)
-    with np.load(contents / cell.inputs / INPUTS, allow_pickle=False) as file:
+    with np.load(contents / cell.condition.inputs / INPUTS, allow_pickle=False) as file:
         return RecordedInputs(
             {name.removeprefix('command_'): ReplayDriver(file[name]) for name in file.files
              if name.startswith('command_')}, file['intervals_s'])
@@ -97,7 +98,7 @@ def measured(cell: Cell, result: OfflineResult) -> TableRun:
     run = TableRun(cell.key, record, offline=offline_outcome(result))
     found = measure_log(record.log)
     run.criticality.update({item.vehicle_id: item for item in found.report()})
-    score_vehicles(run, drives_only=not cell.commonroad_scores)
+    score_vehicles(run, drives_only=not cell.condition.commonroad_scores)
     return run
 
 

@@ -39,7 +39,7 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     from crgame_ros.recording.run_record import run_record_of
     place = EvaluationFolder(folder)
     cell = place.find(key)
-    if cell.code[0] != engine_digest():
+    if cell.condition.code[0] != engine_digest():
         say('note: another version of crgame_ros planned this cell; its run may differ')
     say(f'running {cell.label}')
     result = run_cell(cell, place.store.folder)

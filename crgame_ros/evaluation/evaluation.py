@@ -191,7 +191,7 @@ class _Flight:
     def _send(self, cell: Cell, rounds: int) -> Any:
         from crgame_ros.evaluation.cell_process import compute
         contents = {}
-        for digest in sorted(cell.contents):
+        for digest in sorted(cell.condition.contents):
             contents[digest] = self._content(digest)
             if not rounds:
                 self._uses[digest] = self._uses.get(digest, 0) + 1
@@ -208,7 +208,7 @@ class _Flight:
         return self._contents[digest]
 
     def _release(self, cell: Cell) -> None:
-        for digest in cell.contents:
+        for digest in cell.condition.contents:
             self._uses[digest] -= 1
             if not self._uses[digest]:
                 del self._uses[digest]

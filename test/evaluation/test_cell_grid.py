@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cells of a plan, and the inputs of their keys."""
 
+from hashlib import sha256
 import json
 from pathlib import Path
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.cell import cell_of
+from crgame_ros.evaluation.cell import cell_of, KEY_DIGITS
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.plan import load_plan, parse_plan
@@ -38,7 +39,7 @@ def grid(values: dict[str, Any], folder: Path) -> CellGrid:
 
 def keys(values: dict[str, Any], folder: Path) -> dict[tuple[str, int], str]:
     """Return the keys of a plan's cells by planner and seed."""
-    return {(cell.planner, cell.seed): cell.key for cell in grid(values, folder)}
+    return {(cell.condition.planner, cell.seed): cell.key for cell in grid(values, folder)}
 
 
 def test_every_scene_meets_everything(plan: dict[str, Any], tmp_path: Path) -> None:
@@ -52,6 +53,17 @@ def test_every_scene_meets_everything(plan: dict[str, Any], tmp_path: Path) -> N
     again = CellGrid.from_dict(json.loads(json.dumps(found.as_dict())))
     assert [cell.key for cell in again] == [cell.key for cell in cells]
     assert all(cell_of(cell.text) == cell for cell in again)
+    assert all(cell.key == sha256(cell.text.encode()).hexdigest()[:KEY_DIGITS] for cell in again)
+
+
+def test_cells_of_a_scene_come_together(plan: dict[str, Any], tmp_path: Path) -> None:
+    """And those of one condition, so that its text and contents are made once."""
+    plan['games'].append(str(GAME.with_name('merge.yaml')))
+    cells = list(grid(plan, tmp_path))
+    assert [(cell.condition.game, cell.condition.planner, cell.seed) for cell in cells] == [
+        (game, planner, seed) for game in ('cut_in', 'merge')
+        for planner in ('idm', 'mine.py:Mine') for seed in (0, 1)]
+    assert len({id(cell.condition) for cell in cells}) == 4
 
 
 def test_a_changed_planner_changes_its_own_cells_alone(plan: dict[str, Any],

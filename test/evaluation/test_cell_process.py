@@ -81,7 +81,8 @@ def cells(process: CellProcess) -> dict[str, Cell]:
     folder = process._contents.parent
     plan = parse_plan({'games': [str(GAME)], 'duration': 0.5, 'planners': [
         'idm', *({'planner': f'bad.py:{kind}', 'label': kind} for kind in KINDS)]}, 'plan', folder)
-    return {cell.planner: cell for cell in make_grid(plan, ContentStore(folder / 'files'))}
+    grid = make_grid(plan, ContentStore(folder / 'files'))
+    return {cell.condition.planner: cell for cell in grid}
 
 
 @pytest.mark.slow
