@@ -20,7 +20,7 @@ import traceback
 from typing import Any, BinaryIO, NamedTuple, NoReturn
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.evaluation.cell import cell_of
+from crgame_ros.evaluation.cell import Cell, condition_of
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.source_digest import engine_digest
 from distributed import get_worker
@@ -219,14 +219,17 @@ def dask_setup(_worker: Any) -> None:
 
 class Limits(NamedTuple):
     """
-    The limits of a cell.
+    The limits of a cell, and of a batch of them.
 
-    :param timeout_s: wall time [s]
-    :param memory_bytes: size of data.
+    :param timeout_s: wall time of a cell [s]
+    :param memory_bytes: size of a cell's data.
+    :param batch_s: wall time that a batch should take; after twice this, no further cell of it is
+        begun [s]
     """
 
     timeout_s: float
     memory_bytes: int
+    batch_s: float
 
 
 def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
@@ -234,18 +237,22 @@ def packed_content(packed: Mapping[str, bytes]) -> Mapping[str, bytes]:
     return packed
 
 
-def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
-            limits: Limits) -> dict[str, Any]:
+def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]],
+            limits: Limits) -> list[str]:
     """
-    Compute a cell in the process of this worker's thread.
+    Compute a batch of cells in the process of this worker's thread, one after the other.
 
-    :param text: the cell as JSON.
-    :param contents: its contents, packed, by digest.
-    :return: its rows.
+    :param batch: the conditions of its cells, each with its seeds, as JSON.
+    :param contents: their contents, packed, by digest.
+    :return: the rows of each cell, as JSON: small to transfer, and the scheduler needs none of
+        the project's classes; the last cells have none where there was no time for them.
     :raises CrgameError: if this worker's version differs from the client's.
     """
+    end_s = time.monotonic() + 2.0 * limits.batch_s
     worker = get_worker()
-    if cell_of(text).condition.code[0] != engine_digest():
+    cells = [Cell(condition, seed) for values, seeds in json.loads(batch)
+             for condition in (condition_of(values),) for seed in seeds]
+    if any(cell.condition.code[0] != engine_digest() for cell in cells):
         raise CrgameError(f'worker {worker.address} has another crgame_ros than this one, or '
                           'other packages: install the same there')
     store = ContentStore(Path(worker.local_directory) / 'crgame-contents')
@@ -258,7 +265,11 @@ def compute(text: str, contents: Mapping[str, Mapping[str, bytes]],
             other.close()
         kept.clear()
         kept[place] = CellProcess(*place)
-    rows = kept[place].compute(text, limits.timeout_s)
-    rows['work']['worker'] = worker.address
-    # Text is small to transfer, and the scheduler needs none of the project's classes.
-    return {'rows': json.dumps(rows)}
+    done: list[str] = []
+    for cell in cells:
+        rows = kept[place].compute(cell.text, limits.timeout_s)
+        rows['work']['worker'] = worker.address
+        done.append(json.dumps(rows))
+        if time.monotonic() > end_s:
+            break
+    return done

@@ -10,6 +10,7 @@ import time
 from typing import Any
 
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation import results
 from crgame_ros.evaluation.results.parts import EARLIER, ResultParts
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 import pyarrow as pa
@@ -19,6 +20,7 @@ import pytest
 FILL = """
 import os, sys
 from pathlib import Path
+from crgame_ros.evaluation import results
 from crgame_ros.evaluation.results.parts import ResultParts
 sys.path.insert(0, sys.argv[2])
 from test_result_parts import rows
@@ -139,8 +141,24 @@ def test_a_second_of_cells_is_written_to_the_disk_at_once(
             assert len(next(tmp_path.glob('journal*')).read_text().splitlines()) == number + 1
         assert not synced
         monkeypatch.setattr(time, 'monotonic', lambda: 1e12)
-        parts.add(rows(100))
+        parts.add(*map(rows, range(100, 200)))
+        assert len(next(tmp_path.glob('journal*')).read_text().splitlines()) == 200
     assert len(synced) == 1
+
+
+def test_a_batch_is_one_write_and_one_part(tmp_path: Path,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[str] = []
+    lines = results.parts._lines
+    monkeypatch.setattr(results.parts, '_lines', lambda cells: written.append('') or lines(cells))
+    with ResultParts(tmp_path, part_cells=4) as parts:
+        parts.add(*map(rows, range(3)))
+        parts.add(*map(rows, range(3, 10)))
+        parts.add(rows(10))
+    assert len(written) == 3
+    assert seeds(tmp_path) == [*range(10)]
+    with ResultParts(tmp_path, part_cells=4) as parts:
+        assert list(parts.keys()) == [f'{number:032x}' for number in range(11)]
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of an evaluation on disk: complete parts, and a journal of newer rows."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 import fcntl
 from functools import partial
@@ -42,11 +42,12 @@ class ResultParts:
 
     A machine that fails may lose those that were added within a second of the last write to disk.
 
-    Rows are appended to a journal, a line for each cell. Every `part_cells` of them are written
-    as a part of each table. The part of `cells` is written last: if it exists, all are complete.
+    Rows are appended to a journal, a line for each cell. Once there are `part_cells` of them, they
+    are written as a part of each table. The part of `cells` is written last: if it exists, all are
+    complete.
 
     :param folder: folder of the evaluation; it is created.
-    :param part_cells: number of cells in a part.
+    :param part_cells: number of cells in a part, at least.
     :raises InputError: if it cannot be written, or another process writes there.
     """
 
@@ -62,7 +63,7 @@ class ResultParts:
                              'wait for it, or name another folder') from error
         except OSError as error:
             raise _refusal(folder, error) from error
-        self._rows: list[dict[str, Any]] = []
+        self._rows: list[Mapping[str, Any]] = []
         self._journal: IO[str] | None = None
         self._synced_s = 0.0
         self._journal_path = folder
@@ -75,21 +76,21 @@ class ResultParts:
                  trace: TracebackType | None) -> None:
         self.close()
 
-    def add(self, rows: Mapping[str, Any]) -> None:
+    def add(self, *cells: Mapping[str, Any]) -> None:
         """
-        Store the rows of a cell.
+        Store the rows of cells, by one write to the journal.
 
-        :param rows: `cell`, `vehicles`, `work`, with all columns of the tables.
+        :param cells: `cell`, `vehicles`, `work` of each, with all columns of the tables.
         :raises InputError: if they cannot be written.
         """
         try:
             assert self._journal is not None
-            self._journal.write(json.dumps(rows) + '\n')
+            self._journal.write(_lines(cells))
             self._journal.flush()
             if time.monotonic() - self._synced_s > SYNC_S:
                 os.fsync(self._journal.fileno())
                 self._synced_s = time.monotonic()
-            self._rows.append(dict(rows))
+            self._rows += cells
             if len(self._rows) >= self._part_cells:
                 self.finish_part()
         except OSError as error:
@@ -166,9 +167,14 @@ class ResultParts:
         return number
 
 
-def _write_lines(path: Path, rows: list[dict[str, Any]]) -> None:
+def _lines(cells: Iterable[Mapping[str, Any]]) -> str:
+    """Return the rows of cells as lines of a journal."""
+    return ''.join(json.dumps(rows) + '\n' for rows in cells)
+
+
+def _write_lines(path: Path, cells: Iterable[Mapping[str, Any]]) -> None:
     part = path.with_suffix('.part')
-    part.write_text(''.join(json.dumps(row) + '\n' for row in rows), encoding='utf-8')
+    part.write_text(_lines(cells), encoding='utf-8')
     part.replace(path)
 
 
@@ -219,7 +225,7 @@ def _journal_lines(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _write_rows(table: TableDeclaration, cells: list[dict[str, Any]],
+def _write_rows(table: TableDeclaration, cells: Sequence[Mapping[str, Any]],
                 sink: Path | pa.NativeFile) -> None:
     """Write the rows of cells in a table."""
     rows = [row for each in cells for row in _rows_of(table, each)]
@@ -236,7 +242,7 @@ def _rows_of(table: TableDeclaration, cell: Mapping[str, Any]) -> list[dict[str,
     return [cell['cell'] if table is CELLS else cell['work']]
 
 
-def _write_part(folder: Path, number: int, cells: list[dict[str, Any]]) -> None:
+def _write_part(folder: Path, number: int, cells: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as a part of every table."""
     def write(table: TableDeclaration, path: Path) -> None:
         _write_rows(table, cells, path)
