@@ -98,7 +98,7 @@ def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = N
         tally.before = len(finished)
         if tally.before < tally.total:
             _compute(grid, finished, parts, place.store, computing, tally, told)
-        parts.finish_part()
+        parts.join_parts()
     return tally
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation import results
+from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.evaluation.results.parts import EARLIER, ResultParts
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 import pyarrow as pa
@@ -21,6 +22,7 @@ FILL = """
 import os, sys
 from pathlib import Path
 from crgame_ros.evaluation import results
+from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.evaluation.results.parts import ResultParts
 sys.path.insert(0, sys.argv[2])
 from test_result_parts import rows
@@ -126,6 +128,86 @@ def test_each_part_that_was_put_away_is_read_as_often_as_one(
     # Ten parts are empty now, and two are not.
     assert len(reads) == 22
     assert max(reads.values()) <= 2
+
+
+def names(folder: Path, table: str = 'cells') -> list[str]:
+    """Return the names of all files of a table."""
+    return sorted(path.name for path in (folder / table).iterdir())
+
+
+def test_parts_become_few_large_ones_with_the_same_rows(tmp_path: Path) -> None:
+    """A large part has 64 small ones' cells; later cells join the last large part."""
+    with ResultParts(tmp_path, part_cells=1) as parts:
+        for number in range(70):
+            parts.add(rows(number))
+        parts.join_parts()
+        for table in TABLES_OF_CELLS:
+            assert names(tmp_path, table.name) == ['part-000000-000063.parquet',
+                                                   'part-000064-000069.parquet']
+        parts.add(rows(70))
+        parts.join_parts()
+        parts.join_parts()
+        assert list(parts.keys()) == [f'{number:032x}' for number in range(71)]
+    assert names(tmp_path)[1:] == ['part-000064-000070.parquet']
+    assert seeds(tmp_path) == [*range(71)]
+    assert seeds(tmp_path, 'vehicles', 'distance') == [n + 0.1 for n in range(71) for _ in (0, 1)]
+    with ResultParts(tmp_path) as parts:
+        assert parts.keep_wanted(lambda key, status: int(key, 16) != 3) == 1
+        parts.add(rows(71))
+    assert seeds(tmp_path) == [*range(3), *range(4, 71)]
+    assert seeds(tmp_path / EARLIER) == [3]
+
+
+def test_parts_of_other_columns_stay_apart(tmp_path: Path) -> None:
+    """A column that a part lacks is unknown there, not empty."""
+    with ResultParts(tmp_path, part_cells=2) as parts:
+        for number in range(8):
+            parts.add(rows(number))
+        for name in names(tmp_path, 'vehicles')[:2]:
+            file = tmp_path / 'vehicles' / name
+            pq.write_table(pq.read_table(file).drop_columns(['role']), file)
+        parts.join_parts()
+    assert names(tmp_path) == ['part-000000-000001.parquet', 'part-000002-000003.parquet']
+    assert seeds(tmp_path) == [*range(8)]
+
+
+class Killed(BaseException):
+    """Stands for a kill: nothing is done afterwards."""
+
+
+# Three new parts take the place of nine.
+@pytest.mark.parametrize('step', range(12))
+def test_a_kill_while_parts_are_joined_loses_and_doubles_nothing(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    with ResultParts(tmp_path, part_cells=2) as parts:
+        for number in range(6):
+            parts.add(rows(number))
+        steps = iter(range(12))
+
+        def killed_at(change: Any) -> Any:
+            def changed(path: Path, *given: Any) -> Any:
+                if next(steps) == step:
+                    raise Killed
+                return change(path, *given)
+            return changed
+
+        with monkeypatch.context() as patch, pytest.raises(Killed):
+            patch.setattr(Path, 'replace', killed_at(Path.replace))
+            patch.setattr(Path, 'unlink', killed_at(Path.unlink))
+            parts.join_parts()
+    known = EvaluatedParts(tmp_path)
+    for table, column, kind, wanted in (
+            ('cells', 'seed', pa.int64(), [*range(6)]),
+            ('vehicles', 'distance', pa.float64(), [n + 0.1 for n in range(6) for _ in (0, 1)])):
+        assert [value for batch in known.batches(table, {column: kind})
+                for value in batch.rows[column].to_pylist()] == wanted
+    with ResultParts(tmp_path) as parts:
+        assert list(parts.keys()) == [f'{number:032x}' for number in range(6)]
+        assert seeds(tmp_path) == [*range(6)]
+        parts.join_parts()
+    for table in TABLES_OF_CELLS:
+        assert names(tmp_path, table.name) == ['part-000000-000002.parquet']
+    assert seeds(tmp_path, 'vehicles', 'distance') == [n + 0.1 for n in range(6) for _ in (0, 1)]
 
 
 def test_a_second_of_cells_is_written_to_the_disk_at_once(

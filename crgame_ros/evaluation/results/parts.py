@@ -25,15 +25,35 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 PART_CELLS = 256
+# A large part has as many cells as this number of parts.
+PARTS_TOGETHER = 64
 JOURNAL, LOCK = 'journal', '.lock'
 EARLIER = 'earlier'
 # The journal is written to the disk at most this often [s].
 SYNC_S = 1.0
 
 
-def part_name(number: int) -> str:
-    """Return the file name of a part."""
-    return f'part-{number:06}.parquet'
+def part_name(number: int, last: int | None = None) -> str:
+    """Return the file name of a part, or of the large part of those from one to a last one."""
+    return f'part-{number:06}.parquet' if last is None else f'part-{number:06}-{last:06}.parquet'
+
+
+def _numbers(name: str) -> tuple[int, int]:
+    """Return the numbers of the first and the last part that a part stands for."""
+    numbers = [int(number) for number in Path(name).stem.split('-')[1:]]
+    return numbers[0], numbers[-1]
+
+
+def part_paths(table: Path) -> list[Path]:
+    """Return the parts in the folder of a table, in order; not those that a large one contains."""
+    found: list[Path] = []
+    last = -1
+    for path in sorted(table.glob('part-[0-9]*.parquet'), key=lambda path: (
+            _numbers(path.name)[0], -_numbers(path.name)[1])):
+        if _numbers(path.name)[1] > last:
+            found.append(path)
+            last = _numbers(path.name)[1]
+    return found
 
 
 class ResultParts:
@@ -44,7 +64,8 @@ class ResultParts:
 
     Rows are appended to a journal, a line for each cell. Once there are `part_cells` of them, they
     are written as a part of each table. The part of `cells` is written last: if it exists, all are
-    complete.
+    complete. A large part replaces those that it contains in the same way: where its part of
+    `cells` does not exist, it does not count; where it does, the others do not.
 
     :param folder: folder of the evaluation; it is created.
     :param part_cells: number of cells in a part, at least.
@@ -104,6 +125,14 @@ class ResultParts:
         self._rows = []
         self._start_journal(self._number + 1)
 
+    def join_parts(self) -> None:
+        """Write all rows as few large parts, in the order in which they were added."""
+        self.finish_part()
+        for names in _joinable(self.folder, PARTS_TOGETHER * self._part_cells):
+            name = part_name(_numbers(names[0])[0], _numbers(names[-1])[1])
+            _replace_part(self.folder, name, partial(_write_joined, self.folder, names))
+            _remove_others(self.folder)
+
     def close(self) -> None:
         """Release the folder without writing a part."""
         if self._journal is not None:
@@ -115,7 +144,7 @@ class ResultParts:
 
     def keys(self) -> Iterator[str]:
         """Yield the keys of all stored cells."""
-        for path in sorted((self.folder / CELLS.name).glob('part-*.parquet')):
+        for path in part_paths(self.folder / CELLS.name):
             yield from _column(path, 'cell')
         for rows in self._rows:
             yield rows['cell']['cell']
@@ -156,6 +185,7 @@ class ResultParts:
 
     def _recover(self) -> int:
         """Recover the state that an earlier process left; return the next part's number."""
+        _remove_others(self.folder)
         number = _next_number(self.folder)
         for path in sorted(self.folder.glob(f'{JOURNAL}-*.jsonl')):
             if _journal_number(path) < number:
@@ -179,12 +209,42 @@ def _write_lines(path: Path, cells: Iterable[Mapping[str, Any]]) -> None:
 
 
 def _part_names(folder: Path) -> list[str]:
-    return sorted(path.name for path in (folder / CELLS.name).glob('part-*.parquet'))
+    return [path.name for path in part_paths(folder / CELLS.name)]
 
 
 def _next_number(folder: Path) -> int:
-    return max((int(Path(name).stem.rpartition('-')[2]) for name in _part_names(folder)),
-               default=-1) + 1
+    return max((_numbers(name)[1] for name in _part_names(folder)), default=-1) + 1
+
+
+def _remove_others(folder: Path) -> None:
+    """Remove files of parts that do not count: contained in a large one, or never complete."""
+    names = {*_part_names(folder)}
+    for table in TABLES_OF_CELLS:
+        for path in (folder / table.name).glob('part-[0-9]*'):
+            if path.name not in names:
+                path.unlink()
+
+
+def _joinable(folder: Path, most_cells: int) -> list[list[str]]:
+    """Return the names of successive parts that can be one: of equal columns, and not too big."""
+    groups: list[list[str]] = []
+    size, columns = 0, None
+    for name in _part_names(folder):
+        cells = pq.read_metadata(folder / CELLS.name / name).num_rows
+        schemas = [pq.read_schema(folder / table.name / name) for table in TABLES_OF_CELLS]
+        if not groups or schemas != columns or size + cells > most_cells:
+            groups.append([])
+            size, columns = 0, schemas
+        groups[-1].append(name)
+        size += cells
+    return [names for names in groups if len(names) > 1]
+
+
+def _write_joined(folder: Path, names: Sequence[str], table: TableDeclaration,
+                  path: Path) -> None:
+    """Write the rows of some parts of a table, in their order."""
+    rows = pa.concat_tables([pq.ParquetFile(folder / table.name / name).read() for name in names])
+    pq.write_table(rows.combine_chunks(), path, compression='zstd')
 
 
 def newest_parts(folder: Path) -> Mapping[str, pa.Buffer]:
@@ -252,6 +312,7 @@ def _write_part(folder: Path, number: int, cells: Sequence[Mapping[str, Any]]) -
 def _replace_part(folder: Path, name: str,
                   write: Callable[[TableDeclaration, Path], object]) -> None:
     """Write a part of every table, completely or not at all; that of `cells` is last."""
+    written: list[tuple[Path, Path]] = []
     for table in reversed(TABLES_OF_CELLS):
         (folder / table.name).mkdir(parents=True, exist_ok=True)
         path = folder / table.name / name
@@ -259,13 +320,16 @@ def _replace_part(folder: Path, name: str,
         write(table, part)
         with part.open('rb') as stream:
             os.fsync(stream.fileno())
+        written.append((part, path))
+    for part, path in written:
         part.replace(path)
 
 
 def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bool]) -> int:
     """Move the chosen cells of a part into a part of another folder; return their number."""
     cells = pq.read_table(source / CELLS.name / name, columns=['cell', 'status'])
-    keys = {row['cell'] for row in cells.to_pylist() if chosen(row['cell'], row['status'])}
+    keys = {key for key, status in zip(*(column.to_pylist() for column in cells.columns),
+                                       strict=True) if chosen(key, status)}
     if keys:
         for folder, new, inside in ((target, part_name(_next_number(target)), True),
                                     (source, name, False)):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.evaluation.results.parts import newest_parts
+from crgame_ros.evaluation.results.parts import newest_parts, part_paths
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -44,8 +44,8 @@ class EvaluatedParts:
             raise InputError('no such folder', str(folder), 'give the folder of an evaluation')
         newest = newest_parts(folder)
         self._parts: dict[str, list[Path | pa.Buffer]] = {
-            table: [*sorted((folder / table).glob('part-*.parquet'))]
-            + ([newest[table]] if table in newest else []) for table in _REQUIRED}
+            table: [*part_paths(folder / table)] + ([newest[table]] if table in newest else [])
+            for table in _REQUIRED}
         if not self._parts['cells']:
             raise InputError('no cell is finished', str(folder),
                              'give the folder of an evaluation, or wait until its first cells are')
@@ -117,6 +117,9 @@ def _named(part: Path | pa.Buffer) -> str:
 
 
 def _unreadable(part: Path | pa.Buffer, error: Exception) -> InputError:
+    if isinstance(part, Path) and not part.exists():
+        return InputError('was joined with others, because the evaluation has ended', str(part),
+                          'give the command again')
     reason = str(error).partition('\n')[0]
     return InputError(f'cannot be read ({reason})', _named(part),
                       'take it out of the folder: the cells in it are then missing')
