@@ -58,8 +58,16 @@ class Condition:
     @cached_property
     def text(self) -> str:
         """Return the condition as JSON, the same for equal conditions."""
-        return json.dumps({item.name: getattr(self, item.name) for item in fields(self)},
-                          sort_keys=True, separators=(',', ':'), allow_nan=True)
+        return ','.join(self.around_seed)
+
+    @cached_property
+    def around_seed(self) -> tuple[str, str]:
+        """Return what comes before and after the seed in a cell's JSON, with sorted keys."""
+        names = [sorted(item.name for item in fields(self) if (item.name > 'seed') is after)
+                 for after in (False, True)]
+        before, after = (json.dumps({name: getattr(self, name) for name in part}, sort_keys=True,
+                                    separators=(',', ':'), allow_nan=True) for part in names)
+        return before[:-1], after[1:]
 
     @cached_property
     def contents(self) -> frozenset[str]:
@@ -69,7 +77,7 @@ class Condition:
     @cached_property
     def begun_hash(self) -> 'hashlib._Hash':
         """Return the hash of the part of a cell's text that comes before its seed."""
-        return hashlib.sha256(self.text[:-1].encode())
+        return hashlib.sha256(self.around_seed[0].encode())
 
 
 class Cell(NamedTuple):
@@ -85,8 +93,8 @@ class Cell(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Return the cell as JSON, the same for equal cells; the seed is last."""
-        return self.condition.text[:-1] + self._end
+        """Return the cell as JSON, the same for equal cells."""
+        return self.condition.around_seed[0] + self._end
 
     @property
     def key(self) -> str:
@@ -97,7 +105,7 @@ class Cell(NamedTuple):
 
     @property
     def _end(self) -> str:
-        return f',"seed":{self.seed}}}'
+        return f',"seed":{self.seed},{self.condition.around_seed[1]}'
 
     @property
     def factors(self) -> dict[str, Any]:

@@ -104,7 +104,8 @@ class CellBatches:
     def threads(self) -> int:
         """Return the number of computing threads, counted every few seconds."""
         if time.monotonic() - self._counted_s > COUNT_S:
-            workers = self._client.scheduler_info(n_workers=-1)['workers']
+            # Without a scheduler there are none; the next result tells of it.
+            workers = self._client.scheduler_info(n_workers=-1).get('workers', {})
             self._threads = sum(worker['nthreads'] for worker in workers.values())
             self._counted_s = time.monotonic()
         return self._threads

@@ -54,6 +54,9 @@ def test_every_scene_meets_everything(plan: dict[str, Any], tmp_path: Path) -> N
     assert [cell.key for cell in again] == [cell.key for cell in cells]
     assert all(cell_of(cell.text) == cell for cell in again)
     assert all(cell.key == sha256(cell.text.encode()).hexdigest()[:KEY_DIGITS] for cell in again)
+    # Evaluations of before are found by it: the keys are sorted.
+    assert all(cell.text == json.dumps(json.loads(cell.text), sort_keys=True,
+                                       separators=(',', ':')) for cell in again)
 
 
 def test_cells_of_a_scene_come_together(plan: dict[str, Any], tmp_path: Path) -> None:
