@@ -52,7 +52,8 @@ def sockets_of(pid: int) -> list[Endpoint]:
             family = socket.AF_INET if len(raw) == 4 else socket.AF_INET6
             found.append(Endpoint(table, socket.inet_ntop(family, raw), int(port, 16),
                                   int(fields[4].partition(':')[2], 16)))
-    return found
+    # While a socket is bound, Linux shows its port as 0 for a moment.
+    return found if all(item.port for item in found) else sockets_of(pid)
 
 
 @pytest.fixture(scope='module')
@@ -82,7 +83,8 @@ def test_every_receiving_socket_is_on_loopback(graph: Launcher) -> None:
             endpoints = sockets_of(pid)
             assert {item.table for item in endpoints} == {'udp'}, name
             beyond = [item for item in endpoints if not item.on_loopback]
-            assert all(item.port >= lowest for item in beyond), name
+            low = [item for item in beyond if item.port < lowest]
+            assert not low, f'{name} binds {low}'
             inbound = [item for item in endpoints if item.on_loopback and item.port in domain]
             # Discovery and user traffic of the participant, as DDSI-RTPS numbers them.
             assert len(inbound) >= 2, name

@@ -41,7 +41,8 @@ def test_the_recorded_planner_gives_the_recorded_run(recorded: tuple[Path, Offli
                        'seeds': [result.setup.game.seed]}, 'plan', tmp_path)
     store = ContentStore(tmp_path / 'files')
     same, other = make_grid(plan, store)
-    assert same.human == other.human == 'somebody' and same.game == ''
+    assert same.factors['human'] == other.factors['human'] == 'somebody'
+    assert same.factors['game'] == ''
     again, another = (run_cell(cell, store.folder) for cell in (same, other))
     assert again.state_hash == result.state_hash
     humans = len(result.setup.humans)
