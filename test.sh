@@ -62,9 +62,9 @@ run_tests() {
     return "$code"
 }
 
-# A worker more than cores, for tests of graphs wait more than they compute; four at most.
+# A worker for each core, four at most: one more makes tests of graphs wait for each other.
 cores=$(getconf _NPROCESSORS_ONLN)
-workers=(-n "$((cores < 3 ? cores + 1 : 4))" --dist=loadgroup --no-loadscope-reorder)
+workers=(-n "$((cores < 4 ? cores : 4))" --dist=loadgroup --no-loadscope-reorder)
 if (($# > 0)); then
     run_tests -v "$@"
 elif [[ $tier == all ]]; then

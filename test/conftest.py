@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixtures and tiers of all tests; ROS traffic is local, and each test has its own domain."""
 
+import gc
 import os
 from pathlib import Path
 import signal
 import sys
+import zlib
 
 from crgame_ros.ros.environment import prepare_environment
 import pytest
@@ -16,8 +18,7 @@ from ros_domains import own_domain_id  # noqa: E402 - importable from here on
 
 LONGEST_ID = 100
 ROOT = Path(__file__).resolve().parents[1]
-# Their tests start ROS graphs, servers or browsers; they come first, because they wait more
-# than they compute.
+# Their tests start ROS graphs, servers or browsers.
 GRAPH_FOLDERS = ('live', 'browser', 'ros', 'cockpit')
 # Published scenarios beside the project; tests that need them skip where they are absent.
 PUBLISHED = ROOT.parent / 'shared' / 'scenarios'
@@ -48,7 +49,12 @@ def pytest_configure() -> None:
 # Before xdist reads the groups.
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out tests of other tiers; graphs come first; each file has a worker to itself."""
+    """
+    Leave out tests of other tiers, and give each file to one worker.
+
+    Files are in the order of a digest of their names, which mixes folders: few graphs run at the
+    same time.
+    """
     tier = config.getoption('--tier')
     kept, left_out, cases = [], [], dict[str, set[str]]()
     for item in items:
@@ -61,10 +67,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         _check_named_cases(items, cases)
     if left_out:
         config.hook.pytest_deselected(items=left_out)
-    items[:] = sorted(kept, key=lambda item: item.get_closest_marker('graph') is None)
+    items[:] = sorted(kept, key=lambda item: zlib.crc32(_file_of(item).encode()))
     for item in items:
         if item.get_closest_marker('xdist_group') is None:
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition('::')[0]))
+            item.add_marker(pytest.mark.xdist_group(_file_of(item)))
+
+
+def pytest_collection_finish() -> None:
+    """Let no garbage collection search the modules and tests, which stay to the end."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000)
+
+
+def _file_of(item: pytest.Item) -> str:
+    return item.nodeid.partition('::')[0]
 
 
 def _is_in(item: pytest.Item, tier: str, case: str, is_first: bool) -> bool:

@@ -51,7 +51,6 @@ def test_a_full_disk_is_told_at_the_start(command: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.exhaustive
-@pytest.mark.matrix
 @pytest.mark.skipif(shutil.which('mount') is None, reason='no mount')
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_file_system_without_room(command: str, tmp_path: Path) -> None:

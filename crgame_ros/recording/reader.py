@@ -4,6 +4,7 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 import struct
 from types import TracebackType
@@ -18,6 +19,7 @@ from crgame_ros.recording.schemas import is_foreign
 from crgame_ros.recording.storage import BagMessage, McapStorage, RosbagsStorage, Storage
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores, TypesysError
+from rosbags.typesys.store import Typestore
 
 _WATCHED_EVERY = 1000
 _SUFFIXES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
@@ -80,7 +82,7 @@ class BagReader:
         self.topics = {topic.name: topic for topic in self._storage.topics}
         self.start_ns, self.end_ns = self._storage.start_ns, self._storage.end_ns
         self.notices = self._storage.damages + notices
-        self._types = get_typestore(Stores.ROS2_JAZZY)
+        self._types = _standard_types()
         # Count by topic of messages that cannot belong to a run.
         self.foreign: Counter[str] = Counter()
 
@@ -203,6 +205,9 @@ class BagReader:
                              'recording does not define', str(self.path),
                              'leave this topic out, or record in MCAP storage')
         found = get_types_from_msg(definition, type_name)
+        if self._types is _standard_types():
+            # Recordings may define a type differently.
+            self._types = get_typestore(Stores.ROS2_JAZZY)
         self._types.register({name: fields for name, fields in found.items()
                               if name not in self._types.fielddefs})
 
@@ -216,6 +221,12 @@ class BagReader:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         self.close()
+
+
+@cache
+def _standard_types() -> Typestore:
+    """Return the types of ROS 2 Jazzy, whose code is generated once for all recordings."""
+    return get_typestore(Stores.ROS2_JAZZY)
 
 
 def _files_of(family: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:

@@ -93,6 +93,7 @@ def test_the_run_waits_for_a_person_and_shows_what_will_be_driven(only_page: Liv
     assert page.vehicle(0)[3] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.exhaustive
 def test_holding_w_moves_the_car_and_the_picture(page: LivePage) -> None:
     """No pixel changes before the key press; a release closes the throttle."""
     page.follow('hv0')

@@ -97,6 +97,7 @@ def seek(page: Browser, t: float) -> dict[str, Any]:
     return drawn(page)
 
 
+@pytest.mark.exhaustive
 def test_poses_are_those_of_the_bag(page: Browser, log: RunTrajectories,
                                     first_run: OfflineResult) -> None:
     """At ten seeded ticks, in any order, vehicles and objects agree to the last bit."""

@@ -148,7 +148,7 @@ def test_lines_are_where_the_map_has_them(page: Browser, shared_scenarios: Path,
         assert beside, 'no asphalt on either side of the line'
 
 
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('name', PUBLISHED)
 def test_published_maps_are_cheap(page: Browser, shared_scenarios: Path, name: str) -> None:
     scene = scene_of(shared_scenarios / f'{name}.xml')
@@ -163,6 +163,7 @@ def test_published_maps_are_cheap(page: Browser, shared_scenarios: Path, name: s
     assert (np.ptp(picture, axis=2) < 14).sum() > 15
 
 
+@pytest.mark.exhaustive
 def test_lights_show_the_signals(page: Browser, shared_scenarios: Path) -> None:
     scene = scene_of(shared_scenarios / 'USA_Lanker-1_3_T-1.xml')
     show(page, scene)
@@ -185,6 +186,7 @@ def test_lights_show_the_signals(page: Browser, shared_scenarios: Path) -> None:
             assert (count > dark[color] + 4) == (color in lit), (state, counts, dark)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(('light', 'visibility'), [('day', 120.0), ('dusk', 60.0)])
 def test_fog_leaves_the_contrast_that_it_should(page: Browser, light: str,
                                                 visibility: float) -> None:
@@ -239,6 +241,7 @@ def test_the_game_says_light_and_air(page: Browser) -> None:
     assert np.ptp(means['day', 40.0]) < 12 < np.ptp(means['day', 30_000.0])
 
 
+@pytest.mark.exhaustive
 def test_what_was_shown_is_freed(page: Browser) -> None:
     scene = scene_of(scenarios_directory() / 'roundabout.yaml')
     show(page, scene)

@@ -94,6 +94,7 @@ def test_a_motor_sings_eight_times_a_turn(page: Browser) -> None:
         8 * 9.0 * 20.0 / WHEEL_RADIUS_M / math.tau, rel=5e-3)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(('powertrain', 'gear', 'gained_dB'), [
     # No pedal. 0.07 + 0.16 s from 20 to 44 % of the turns above idling; 1 + s from 51 to 89 %.
     ('combustion', 5, 2.84), ('electric', 0, 1.92)])

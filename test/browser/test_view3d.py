@@ -222,6 +222,7 @@ def test_the_map_rests_while_it_is_covered_and_few_calls_draw_the_view(page: Bro
     assert page.run_async('return await crgame.view3d.show(true)')
 
 
+@pytest.mark.exhaustive
 def test_what_a_camera_cannot_see_is_left_out_and_nothing_else(page: Browser) -> None:
     """A fraction of the triangles gives the same pixels as all of them."""
     found = page.run_async("""
@@ -269,6 +270,7 @@ def test_what_a_camera_cannot_see_is_left_out_and_nothing_else(page: Browser) ->
         assert view['colors'] > 10
 
 
+@pytest.mark.exhaustive
 def test_what_is_left_out_of_pictures_is_hardly_seen(page: Browser) -> None:
     """The least detail at the same size has fewer triangles and 97 % of the pixels alike."""
     found = page.run_async("""

@@ -113,6 +113,7 @@ def test_pause_holds_the_last_state_exactly(
     assert second['frames'] - first['frames'] < 10
 
 
+@pytest.mark.exhaustive
 def test_single_step_shows_the_next_step(page: Served, browser: Browser) -> None:
     page.control('step')
     browser.wait('crgame.world.shown.n === 1', 'the first step')
@@ -121,6 +122,7 @@ def test_single_step_shows_the_next_step(page: Served, browser: Browser) -> None
     assert shown(browser)['t'] == pytest.approx(0.02)
 
 
+@pytest.mark.exhaustive
 def test_reset_shows_the_new_epoch_only(
         run: RecordedRun, page: Served, browser: Browser) -> None:
     page.control('start')

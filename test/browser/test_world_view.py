@@ -106,6 +106,7 @@ def test_vehicles_and_ground_have_the_colours_of_the_theme(
     assert browser.console_errors() == []
 
 
+@pytest.mark.exhaustive
 def test_theme_that_changes_repaints_a_world_that_stands_still(
         page: Served, browser: Browser) -> None:
     browser.run("document.documentElement.dataset.theme = 'dark'")
@@ -128,6 +129,7 @@ def test_begins_behind_the_first_human_with_its_heading_up(
     assert browser.run('return crgame.world.camera.anchorY / crgame.world.camera.height') > 0.5
 
 
+@pytest.mark.exhaustive
 def test_camera_keeps_up_with_the_vehicle_it_follows(page: Served, browser: Browser) -> None:
     page.control('start')
     browser.wait('crgame.world.shown.t > 1')
@@ -163,6 +165,7 @@ def test_keys_follow_fit_turn_and_zoom(page: Served, browser: Browser) -> None:
     assert inside
 
 
+@pytest.mark.exhaustive
 def test_keys_that_drive_leave_the_camera_alone(page: Served, browser: Browser) -> None:
     before = camera(browser)
     for key in ('w', 'a', 's', 'd', 'r', ' ', Keys.ARROW_UP, Keys.ARROW_LEFT):
@@ -170,6 +173,7 @@ def test_keys_that_drive_leave_the_camera_alone(page: Served, browser: Browser) 
     assert camera(browser) == before
 
 
+@pytest.mark.exhaustive
 def test_wheel_zooms_about_the_pointer(page: Served, browser: Browser) -> None:
     browser.run('crgame.world.fit(false)')
     still(browser)
@@ -186,6 +190,7 @@ def test_wheel_zooms_about_the_pointer(page: Served, browser: Browser) -> None:
         under, abs=1.0 / scale)
 
 
+@pytest.mark.exhaustive
 def test_drag_moves_the_map_with_the_hand_and_right_drag_turns_it(
         page: Served, browser: Browser) -> None:
     canvas = browser.driver.find_element(By.ID, 'world')
@@ -209,6 +214,7 @@ def test_drag_moves_the_map_with_the_hand_and_right_drag_turns_it(
     assert 0.2 < camera(browser)['up'] - up < 0.8
 
 
+@pytest.mark.exhaustive
 def test_two_fingers_zoom(page: Served, browser: Browser) -> None:
     browser.run('crgame.world.fit(false)')
     still(browser)
@@ -255,6 +261,7 @@ def test_plan_is_drawn_until_an_event_hides_it(
     assert pixel(browser, *beside) == road
 
 
+@pytest.mark.exhaustive
 def test_predictions_are_asked_for_when_they_are_shown(page: Served, browser: Browser) -> None:
     client = next(iter(page.backend.hub.clients.values()))
     assert not client.wants_predictions
@@ -265,6 +272,7 @@ def test_predictions_are_asked_for_when_they_are_shown(page: Served, browser: Br
         time.sleep(0.02)
 
 
+@pytest.mark.exhaustive
 def test_layers_of_others_are_drawn_in_metres(page: Served, browser: Browser) -> None:
     browser.run("""
         crgame.world.addLayer('rays', (context, { camera, ratio, shown }) => {
@@ -281,6 +289,7 @@ def test_layers_of_others_are_drawn_in_metres(page: Served, browser: Browser) ->
     assert pixel(browser, *at) != [1, 2, 250]
 
 
+@pytest.mark.exhaustive
 def test_canvas_has_the_pixels_of_the_screen(page: Served, browser: Browser) -> None:
     for width, height, ratio in ((1280, 720, 1.0), (1920, 1080, 2.0)):
         browser.resize(width, height, ratio)

@@ -176,6 +176,7 @@ def test_chunks_are_built_when_asked_for(bag: Path, monkeypatch: pytest.MonkeyPa
         backend.close()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
 def test_recordings_of_ros2_bag(tmp_path: Path, parked: OfflineResult, backend: ReplayBackend,
                                 storage: str) -> None:

@@ -46,6 +46,7 @@ def slips(states: Array, dt_s: float = DT) -> tuple[float, float]:
             float(np.abs(aside).max()))
 
 
+@pytest.mark.matrix('0.0-3.0-0.3', '0.02--8.0--3.0', '0.02-0.0-15.0')
 @pytest.mark.parametrize('speed', [0.0, 0.3, 15.0, -3.0])
 @pytest.mark.parametrize('acceleration', [-8.0, -1.0, 0.0, 3.0])
 @pytest.mark.parametrize('curvature', [0.0, 0.02])

@@ -71,6 +71,7 @@ def _keys(out: Path) -> list[str]:
     return sorted(cells['cell'])
 
 
+@pytest.mark.exhaustive
 def test_relative_names_mean_the_same_files_everywhere(project: Path) -> None:
     """A plan named from its folder, from above and by options has the same cell, run once."""
     above = project.parent

@@ -47,6 +47,7 @@ def test_equal_seeds_give_equal_episodes_and_others_do_not(game: str) -> None:
     assert episode(DrivingEnv(game=game, vary={'speed': 2.0}), 7, 15) == first
 
 
+@pytest.mark.exhaustive
 def test_shared_placements_of_traffic_begin_as_if_unused() -> None:
     env = DrivingEnv(game='dense_merge', worlds=1)
     first = episode(env, 1, 10)

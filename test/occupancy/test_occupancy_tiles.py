@@ -57,6 +57,7 @@ def piece(whole: NDArray[np.bool_], grid: OccupancyGrid) -> NDArray[np.bool_]:
     return result
 
 
+@pytest.mark.matrix('folder')
 @pytest.mark.parametrize('kind', ['folder', 'single'])
 def test_near_equals_the_whole_map(tmp_path: Path, kind: str) -> None:
     """300 random places and reaches, inside and outside: cells in reach are those of the map."""

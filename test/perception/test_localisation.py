@@ -53,8 +53,7 @@ def test_covariance_is_that_of_the_errors(spec: LocalisationSpec, steps: int,
     assert inside > 0.85
 
 
-@pytest.mark.matrix('yaw')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('spec', [
     pytest.param(LocalisationSpec(position_bias=(0.2, 0.0)), id='position'),
     pytest.param(LocalisationSpec(yaw_bias=0.02), id='yaw'),

@@ -64,7 +64,7 @@ def drive(game: str, planner: str, spec: PerceptionSpec, steps: int) -> Drive:
     return Drive(seat.record(), np.array(seen), requests, setup)
 
 
-@pytest.mark.matrix('traffic-idm', 'crossing-reactive')
+@pytest.mark.matrix('crossing-reactive')
 @pytest.mark.slow
 @pytest.mark.parametrize('planner', ['idm', 'reactive', 'constant-velocity', 'idm-package'])
 @pytest.mark.parametrize('game', ['traffic', 'crossing'])

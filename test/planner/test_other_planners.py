@@ -38,8 +38,7 @@ def accepted(plans: list[Plan], vehicle: VehicleParameters) -> bool:
                           support.DT) is None for plan in plans)
 
 
-@pytest.mark.slow
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 def test_stops_behind_a_standing_car(name: str, vehicle: VehicleParameters) -> None:
     plans = support.drive(ready(name, 12.0, v0=12.0), ego(vehicle, 12.0), 250,
@@ -69,7 +68,7 @@ def test_starts_from_rest(name: str, vehicle: VehicleParameters) -> None:
     assert plans[-1].states[0, 3] > 2.0
 
 
-@pytest.mark.matrix('USA_US101-reactive', 'ZAM_Over-idm-package')
+@pytest.mark.matrix('ZAM_Over-idm-package')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['idm-package', 'reactive'])
 @pytest.mark.parametrize('scenario', ['USA_US101', 'ZAM_Tjunction', 'ZAM_Over'])

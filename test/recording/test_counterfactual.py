@@ -96,7 +96,7 @@ def test_the_same_human_against_the_same_planner_and_another(
         assert len(written.dynamic_obstacles) >= 2
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_traffic_that_reacts_makes_another_world(
         record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An AV stops in the merge: agents behind it brake, and the table has the time."""

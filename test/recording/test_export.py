@@ -172,8 +172,7 @@ def test_what_cannot_be_exported(runs: Any, tmp_path: Path) -> None:
         assert list(folder.iterdir()) == []
 
 
-@pytest.mark.matrix('False')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('problem', [True, False])
 def test_run_without_a_driven_vehicle(runs: Any, tmp_path: Path, problem: bool) -> None:
     """With recorded vehicles alone the problem is unchanged, or there is one that all meet."""

@@ -20,6 +20,7 @@ CUT_IN = 'ZAM_CutIn-1_1_T-1.xml'
 INTERSECTION = 'ZAM_Intersection-1_1_T-1.xml'
 
 
+@pytest.mark.matrix('ZAM_Zip-2_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['DEU_AAH1-2_76900_T-7049', 'ZAM_Zip-2_1_T-1'])
 def test_published_files_that_the_schema_refuses(

@@ -14,7 +14,7 @@ import pytest
 CUT_IN = 'ZAM_CutIn-1_1_T-1.xml'
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_traffic_lights_keep_their_states(
         runs: Any, tmp_path: Path, shared_scenarios: Path) -> None:
     """The state of a light at k of the original is that at k - k0 of the export."""

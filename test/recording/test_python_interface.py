@@ -113,7 +113,7 @@ def test_a_run_is_that_of_the_command(run: OfflineRun, capsys: pytest.CaptureFix
     assert (again.state_hash, again.summary()['events']) == (told['state_hash'], told['events'])
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_a_recording_is_the_same_kind_of_object(
         run: OfflineRun, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same measures as of the run; those of the commands to the last bit."""

@@ -33,7 +33,7 @@ def recorded(recorder: Any, tmp_path_factory: pytest.TempPathFactory,
     return folder, result
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_the_recorded_planner_gives_the_recorded_run(recorded: tuple[Path, OfflineResult],
                                                      tmp_path: Path) -> None:
     folder, result = recorded

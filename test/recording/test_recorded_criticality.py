@@ -38,8 +38,7 @@ def _flat(found: Any, name: str = '') -> dict[str, Any]:
     return {name: found}
 
 
-@pytest.mark.slow
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 def test_one_code_for_runs_logs_and_recordings(
         observed: tuple[Criticality, OfflineResult], recorder: Any, tmp_path: Path) -> None:
     """Worst moments, times and crossings are the same for each source of the run."""

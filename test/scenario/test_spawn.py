@@ -183,7 +183,7 @@ def test_no_free_place_is_refused() -> None:
                         ObjectStates(np.zeros((1, 3)), np.zeros((1, 3))))
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_problem_pose_is_the_rear_axle_of_a_centre() -> None:
     """The planning problem's position is where the centre of the state is."""
     for name in NAMES:

@@ -69,15 +69,13 @@ def test_idm_brakes_behind_the_human_and_stops(game: Game, latency: int) -> None
     assert 5.5 < human[-1, 0] - av[-1, 0] < 9.5
 
 
-@pytest.mark.slow
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('latency', [0, 5])
 def test_reactive_passes_beside(game: Game, latency: int) -> None:
     check_passed(run(game, 'reactive', latency))
 
 
 @pytest.mark.exhaustive
-@pytest.mark.matrix
 @pytest.mark.parametrize(('ahead', 'speed'), [(-6.0, 26.0), (4.0, 24.0)],
                          ids=['later', 'slower'])
 def test_both_do_so_in_other_games(game: Game, ahead: float, speed: float) -> None:

@@ -81,7 +81,7 @@ def run_into(path: Path, planner: str) -> list[tuple[float, float]]:
     return hits
 
 
-@pytest.mark.matrix('8.0-3.0-90', '14.0-5.0-140')
+@pytest.mark.matrix('8.0-3.0-90')
 @pytest.mark.slow
 @pytest.mark.parametrize('angle', [90, -60, 40, 25, 140, -155])
 @pytest.mark.parametrize(('speed', 'ride'), [(8.0, 3.0), (14.0, 5.0)])

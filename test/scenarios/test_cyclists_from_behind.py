@@ -42,7 +42,6 @@ def drive(path: Path) -> tuple[OfflineResult, list[Contact]]:
 
 
 @pytest.mark.exhaustive
-@pytest.mark.matrix
 @pytest.mark.parametrize('angle', [5.0, -10.0, 20.0])
 @pytest.mark.parametrize(('speed', 'ride'), [(5.0, 10.0), (8.0, 10.0)])
 def test_it_makes_room_for_a_cyclist_from_behind(speed: float, ride: float, angle: float,

@@ -66,8 +66,7 @@ def test_no_bodies_touch(name: str) -> None:
         assert record.accepted_ratio >= 0.95
 
 
-@pytest.mark.slow
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('name', GAMES)
 def test_runs_repeat_bit_for_bit(name: str) -> None:
     """All states, those of agents and objects too."""

@@ -117,7 +117,7 @@ def test_human_makes_the_av_react(name: str, av_id: str) -> None:
     assert expected.gap[0] < _gaps(played, av_id).min() < expected.gap[1]
 
 
-@pytest.mark.matrix('cut_in', 'traffic')
+@pytest.mark.matrix('cut_in')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', sorted({name for name, _ in REACTIONS}))
 def test_no_vehicle_collides_or_leaves_the_road(name: str) -> None:

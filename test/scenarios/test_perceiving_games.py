@@ -80,6 +80,7 @@ def test_pedestrian_is_known_from_the_first_line_of_sight_on() -> None:
     assert _ticks_with_walker()[0] == 0
 
 
+@pytest.mark.exhaustive
 def test_an_av_that_sees_late_brakes_late() -> None:
     """
     Without perception the AV reacts gently to a pedestrian that walks up behind the vans.

@@ -15,7 +15,6 @@ WANTED = 0.8
 
 
 @pytest.mark.exhaustive
-@pytest.mark.matrix
 @pytest.mark.parametrize('name', ['parked_cars', 'roundabout'])
 def test_reactive_planner_answers_and_hits_no_vehicle(name: str, project_root: Path) -> None:
     request = RunRequest(game=project_root / 'scenarios' / f'{name}.yaml')

@@ -26,8 +26,7 @@ def drive(shared_scenarios: Path, spawn: PoseSpawn | None, duration_s: float) ->
     return result
 
 
-@pytest.mark.matrix('7 m behind')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('spawn', [None, PoseSpawn(4.0, BESIDE, 0.0, 20.0),
                                    PoseSpawn(-2.0, BESIDE, 0.0, 24.0)],
                          ids=['0.9 m behind', '7 m behind', 'faster'])

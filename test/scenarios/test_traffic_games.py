@@ -165,7 +165,7 @@ def test_agents_that_do_not_swerve_queue_behind_the_skip() -> None:
     assert touching(result) == []
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_oncoming_av_gives_way_to_the_human_but_not_to_agents() -> None:
     """Agents pass the skip in their own lane; only the human makes the AV brake there."""
     result, alone = played('blocked_lane'), play('blocked_lane', without_human)

@@ -105,6 +105,7 @@ def test_speed_limit_reaches_the_planner(game: Game) -> None:
     assert speeds(result)[600:].min() > 30.0 / 3.6 - 0.5
 
 
+@pytest.mark.exhaustive
 def test_speed_limit_of_one_lanelet(game: Game) -> None:
     """Only behind the crossing (lanelet 21, x > 170 m); in front of it 50 km/h hold."""
     entry = {'name': 'zone', 'speed_limit': {'speed': 5.0, 'lanelets': [21]},
@@ -118,6 +119,7 @@ def test_speed_limit_of_one_lanelet(game: Game) -> None:
     assert states[inside, StateColumn.SPEED].max() < 5.2
 
 
+@pytest.mark.matrix('reactive')
 @pytest.mark.slow
 @pytest.mark.parametrize('planner', ['constant-velocity', 'reactive', 'idm-package'])
 def test_planner_is_replaced_in_the_run(game: Game, planner: str) -> None:
@@ -138,6 +140,7 @@ def test_planner_is_replaced_in_the_run(game: Game, planner: str) -> None:
     assert careless == (planner == 'constant-velocity')
 
 
+@pytest.mark.exhaustive
 def test_hidden_plan_changes_no_motion(game: Game) -> None:
     """The cockpit hides the plan; the run only records the event."""
     hidden = play(game, (100, 'hide-plan'), duration_s=3.0)

@@ -40,8 +40,7 @@ def test_a_turned_game_is_the_same(tmp_path: Path, game: str) -> None:
     assert _moved(tmp_path, scenarios_directory() / f'{game}.yaml', 137.0, (0.0, 0.0)) < 1e-6
 
 
-@pytest.mark.matrix('more/ESP_Toledo-7_5_T-1-137.0')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(('scenario', 'degrees'), [
     # A bend in which places depended on a grid along the map's axes.
     ('DEU_Guetersloh-36_1_T-1', 45.0),

@@ -96,6 +96,7 @@ def test_the_written_game_has_objects_traffic_and_map() -> None:
     assert hashes[0] == hashes[1]
 
 
+@pytest.mark.exhaustive
 def test_agents_drive_otherwise_by_an_event() -> None:
     """
     One hurries, then all crawl; until each event all is as without it, to the last bit.

@@ -35,7 +35,7 @@ def moved(result: OfflineResult) -> NDArray[np.float64]:
     return np.hypot(*np.diff(result.states_of('av0')[:, :2], axis=0).T)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_perfect_sensors_change_nothing() -> None:
     """An AV that sees everything, and knows where it is, drives to the same bits as without."""
     plain = run_offline(perceiving('two_avs', None))

@@ -70,8 +70,7 @@ def test_a_bend_is_driven_along_the_plan(tracker: str, dynamics: str,
     assert result.state_hash != perfect.state_hash
 
 
-@pytest.mark.matrix('ZAM_Tjunction-1_42_T-1-6.0')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(('name', 'metres'), [
     ('DEU_Flensburg-10_1_T-1', 2.5), ('ZAM_Tjunction-1_42_T-1', 6.0)])
 def test_an_av_far_off_its_path_says_so(name: str, metres: float,
@@ -129,7 +128,7 @@ def test_same_inputs_same_bits() -> None:
     assert run_offline(setup).state_hash == run_offline(setup).state_hash
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_yaw_rate_follows_the_slip() -> None:
     """FS 2 in the run itself: the yaw rate of the states is G_s v / L tan(delta)."""
     slip = 0.8
@@ -147,8 +146,7 @@ def test_yaw_rate_follows_the_slip() -> None:
     np.testing.assert_allclose(turned[turning[1:]], expected[1:][turning[1:]], atol=0.01)
 
 
-@pytest.mark.matrix('estimated')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('pose', ['true', 'estimated'])
 def test_a_biased_estimate_puts_the_car_beside_the_lane(pose: str) -> None:
     """Its planner assumes the middle of the lane: the car is beside it by the bias."""

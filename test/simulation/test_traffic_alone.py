@@ -23,7 +23,7 @@ def alone(scenario: Path, seed: int = 0) -> OfflineResult:
     return run_offline(build_setup(game), duration_s=DURATION_S)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_traffic_runs_alone(shared_scenarios: Path, tmp_path: Path) -> None:
     """
     Agents alone drive over a real junction; the hashes of different runs differ.

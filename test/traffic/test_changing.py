@@ -152,6 +152,7 @@ def stream(later: int, cooperative: bool) -> support.Run:
                        [agent(1, 390.0, -3.5, 0.0, 14.0), *cars])
 
 
+@pytest.mark.exhaustive
 def test_a_car_stops_for_an_agent_that_has_stood_at_the_end_of_a_lane() -> None:
     run = stream(25, cooperative=True).ticks(400)
     assert run.overlaps() == []

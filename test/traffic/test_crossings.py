@@ -203,8 +203,7 @@ def test_an_agent_before_a_full_way_turns_off_after_a_while() -> None:
     assert run.overlaps() == []
 
 
-@pytest.mark.matrix
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('name', ['ZAM_Intersection-1_1_T-1.xml', 'ZAM_TJunction-1_1_T-1.xml'])
 def test_a_busy_junction_never_locks_up(maps: Path, name: str) -> None:
     run = support.Run(maps / name, TrafficSpec(agents=20, flow=300.0), 0).ticks(1800)

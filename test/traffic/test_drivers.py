@@ -160,6 +160,7 @@ def test_newcomers_drive_as_all_were_told() -> None:
     np.testing.assert_allclose(run.speeds[-1][np.isfinite(run.speeds[-1])], 6.0, atol=0.3)
 
 
+@pytest.mark.exhaustive
 def test_one_driver_begins_to_ignore_lights_and_one_to_yield_late(maps: Path) -> None:
     """An event in the middle of a run has the effect of shares from the start."""
     car = support.driving(1, [(-150.0, -3.5, 0.0), (190.0, -3.5, 0.0)], 12.0)

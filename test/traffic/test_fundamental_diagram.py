@@ -17,8 +17,7 @@ CIRCUMFERENCE, LIMIT = 400.0, 15.0
 COUNTS = (1, 3, 16, 24, 32, 40, 48, 56)
 
 
-@pytest.mark.matrix('idm')
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('model', ['acc', 'idm'])
 def test_measured_speeds_and_flows_are_those_of_the_equilibrium(model: str) -> None:
     """

@@ -83,6 +83,7 @@ def test_an_av_with_the_right_of_way_meets_them(shared_scenarios: Path) -> None:
     assert in_time[-1] < 0.1 and late[-1] < 0.1 and alone[-1] > 5.0
 
 
+@pytest.mark.exhaustive
 def test_a_late_yielder_alone_drives_like_any_other(shared_scenarios: Path) -> None:
     """Alone over the junctions of a real town, from the side of one: the same bits."""
     path = shared_scenarios / 'ZAM_Tjunction-1_42_T-1.xml'
@@ -95,8 +96,7 @@ def test_a_late_yielder_alone_drives_like_any_other(shared_scenarios: Path) -> N
     assert np.hypot(*(np.nanmax(poses[0], axis=0) - np.nanmin(poses[0], axis=0))[0, :2]) > 30.0
 
 
-@pytest.mark.matrix
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('name', ['more/DEU_TestIntersectionInteract-3_1_T-1',
                                   'more/DEU_AAH1-2_76900_T-7049'])
 def test_in_dense_traffic_they_brake_hard_and_touch_no_vehicle(shared_scenarios: Path,

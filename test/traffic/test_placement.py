@@ -32,6 +32,7 @@ def scattered(graph: LaneGraph, count: int) -> Bodies:
                   rng.choice([0.0, 0.7, 4.0], count), np.where(rng.random(count) < 0.1, lane, -1))
 
 
+@pytest.mark.matrix('USA_Lanker-1_3_T-1', 'more/DEU_Starnberg-1_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', MAPS)
 def test_bodies_left_out_beside_straight_lanes_are_not_in_them(name: str,

@@ -112,6 +112,7 @@ def test_steering_keeps_its_limits() -> None:
     np.testing.assert_allclose(steering, [0.6, -0.5, wanted])
 
 
+@pytest.mark.exhaustive
 def test_a_swerve_of_the_elastic_band_is_driven_with_its_clearance() -> None:
     """Along d(s) of a straight lane at its speed: the centre stays within 0.25 m of the band."""
     band = ElasticBand()

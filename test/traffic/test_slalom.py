@@ -13,6 +13,7 @@ CAR, TRUCK, BUS = (4.5, 1.8), (8.0, 2.5), (12.0, 2.55)
 KINDS = {CAR: 'car', TRUCK: 'truck', BUS: 'bus'}
 
 
+@pytest.mark.matrix('(4.5, 1.8)-15.0-6.0-2.4', '(12.0, 2.55)-25.0-3.75-0.5')
 @pytest.mark.slow
 @pytest.mark.parametrize(('size', 'spacing', 'width', 'reach'), [
     (CAR, 15.0, 6.0, 2.4), (CAR, 40.0, 7.0, 3.4), (TRUCK, 20.0, 3.75, 0.5),

@@ -43,6 +43,7 @@ def test_agents_are_placed_in_lanes_with_gaps_away_from_others(maps: Path) -> No
             assert gap > 3.0 + 1.2 * run.speeds[0][behind] - 0.2
 
 
+@pytest.mark.exhaustive
 def test_the_seed_decides(maps: Path) -> None:
     path = maps / 'ZAM_Intersection-1_1_T-1.xml'
     first, again, other = (support.Run(path, TrafficSpec(agents=10), seed)
@@ -166,6 +167,7 @@ def test_a_restart_goes_on_from_what_was_seen(maps: Path) -> None:
     assert np.nanmax(steps) < 3.0
 
 
+@pytest.mark.exhaustive
 def test_no_agent_arrives_into_a_jam() -> None:
     """Behind a wreck at the road's end the queue doesn't reach back to the road's beginning."""
     wreck = support.human(LANE - 10.0, 0.0, 0.0, kind='parkedVehicle')

@@ -79,6 +79,7 @@ def test_a_lane_that_bends_and_a_band_that_bends_add_up() -> None:
     assert swerving.speed.min() < graph.curve_speed.min() - 0.1
 
 
+@pytest.mark.matrix('40.0')
 @pytest.mark.slow
 @pytest.mark.parametrize('spacing', [15.0, 20.0, 30.0, 40.0])
 def test_a_slalom_is_slow_enough_for_its_clearance(spacing: float) -> None:

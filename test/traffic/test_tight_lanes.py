@@ -50,8 +50,7 @@ def test_a_straight_lane_that_only_large_cars_are_tried_in_is_wide_enough() -> N
     assert not for_cars.any()
 
 
-@pytest.mark.matrix
-@pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('name', ['more/DEU_Moelln-10_2_T-1', 'more/BEL_Putte-8_2_T-1',
                                   'OSC_PedestrianCollision-1_1_T-1'])
 def test_trucks_stay_on_published_roads(name: str, shared_scenarios: Path) -> None:

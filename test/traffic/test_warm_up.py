@@ -67,7 +67,7 @@ def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
     assert kernel_cache.digest.__wrapped__('lane_table') == kernel_cache.digest('lane_table')
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive
 def test_who_comes_while_another_compiles_waits_for_it(tmp_path: Path) -> None:
     """It reports this, leaves processor time to the other, and then compiles nothing itself."""
     with (tmp_path / 'compiling.lock').open('a') as lock, \

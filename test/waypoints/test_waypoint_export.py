@@ -80,6 +80,7 @@ def rejoined(roads: WaypointRoads, exported: ExportedRoads, number: int) -> Wayp
     return WaypointLane.from_rows(np.concatenate([*(part[:-1] for part in rows[:-1]), rows[-1]]))
 
 
+@pytest.mark.matrix('ZAM_Merge-1_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('source', ['town', 'ZAM_Roundabout-1_1_T-1', 'ZAM_Merge-1_1_T-1'])
 def test_table_to_scenario_and_back(source: str, tmp_path: Path) -> None:
@@ -115,6 +116,7 @@ def test_table_to_scenario_and_back(source: str, tmp_path: Path) -> None:
     assert len(exported.pieces) == len(roads.lane_ids) + 2 * (source == 'town')
 
 
+@pytest.mark.matrix('ZAM_DenseMerge-1_1_T-1')
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['ZAM_Intersection-1_1_T-1', 'ZAM_DenseMerge-1_1_T-1'])
 def test_scenario_to_table_and_back(name: str, tmp_path: Path) -> None:

@@ -164,6 +164,7 @@ def test_nearest_lane_against_every_lane() -> None:
         assert (found.s[row], found.d[row]) == pytest.approx((s[0], d[0]), abs=1e-6)
 
 
+@pytest.mark.clock
 def test_finding_the_lane_costs_the_logarithm_of_their_number() -> None:
     """Of 1,000 lanes instead of 10, the nearest is found in less than five times the time."""
     taken = []

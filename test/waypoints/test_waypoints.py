@@ -154,8 +154,7 @@ def assert_nearest(lane: WaypointLane, points: Array) -> None:
     assert np.abs(found.d[inside]) == pytest.approx(distance[inside], abs=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('directory', [scenarios_directory(), SHARED], ids=['own', 'published'])
 def test_projection_against_dense_search_on_maps(directory: Path) -> None:
     """On every lane of every map, for points up to 20 m beside its way-points."""

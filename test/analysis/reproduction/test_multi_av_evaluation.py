@@ -37,8 +37,7 @@ def _unmet(run: MultiAvRun) -> list[str]:
     return [each.name for each in judge_multi_av([('', run)]) if not each.is_met]
 
 
-@pytest.mark.slow
-@pytest.mark.matrix
+@pytest.mark.exhaustive
 def test_each_reacts(idm: MultiAvRun) -> None:
     """Both are elsewhere than in the game without the human."""
     assert _unmet(idm) == []
