@@ -15,6 +15,8 @@ from crgame_ros.study.names import ColumnName
 
 _SEE = 'see docs/studies.md for the keys'
 MOST_CHARACTERS = 20_000
+# A limit that is not set is that far away.
+_UNLIMITED = 1e9
 Answer = float | str | list[str] | None
 
 
@@ -130,8 +132,8 @@ class NumberQuestion:
 
     FORM: ClassVar[Form] = Form(_SEE)
 
-    low: float = -1e9
-    high: float = 1e9
+    low: float = -_UNLIMITED
+    high: float = _UNLIMITED
     whole: bool = False
     unit: Annotated[str, Wording(r'[\s\S]{0,20}', 'give 20 characters at most')] = ''
 
@@ -140,7 +142,11 @@ class NumberQuestion:
         fits = _finite(answer) and self.low <= answer <= self.high \
             and (not self.whole or answer == int(answer))
         kind = 'a whole number' if self.whole else 'a number'
-        return '' if fits else f'give {kind} from {self.low:g} to {self.high:g}'
+        limits = {(True, True): f' from {self.low:g} to {self.high:g}',
+                  (True, False): f' of at least {self.low:g}',
+                  (False, True): f' of at most {self.high:g}', (False, False): ''}
+        return '' if fits else f'give {kind}' + limits[self.low > -_UNLIMITED,
+                                                       self.high < _UNLIMITED]
 
 
 @dataclass(frozen=True)

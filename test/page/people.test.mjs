@@ -77,8 +77,8 @@ test('each person has a role, a seat and delays, and this page is marked', () =>
   show([{ ...ADA, round_trip_ms: 12.6 },
     { ...BOB, round_trip_ms: 80, input_delay_ms: 119.5 }, { ...BOB, client: 'c3', name: 'Cleo',
       role: 'spectator', seat: null }]);
-  assert.deepEqual(rows(), ['Ada (you) director 13 ms there and back',
-    'Bob driver in hv1 80 ms there and back, 120 ms from hand to answer', 'Cleo spectator']);
+  assert.deepEqual(rows(), ['Ada (you) director round trip 13 ms',
+    'Bob driver in hv1 round trip 80 ms, input latency 120 ms', 'Cleo spectator']);
   show([ADA]);
   assert.deepEqual(rows(), ['Ada (you) director']);
 });

@@ -14,6 +14,7 @@ const TABLE = { next: 'Next', missing: 'Please answer', missing_one: 'One is mis
   missing_some: '{count} are missing', optional: 'may be left out',
   several: 'Several are possible', slider_unset: 'not marked yet',
   number_wrong: 'From {low} to {high}', number_whole: 'Whole, from {low} to {high}',
+  number_low: 'At least {low}', number_whole_high: 'Whole, at most {high}',
   number_any: 'A number', number_any_whole: 'A whole number',
   text_long: '{longest} at most; these are {count}' };
 const asked = (kind, more) => ({ name: kind, kind, ask: `What of ${kind}?`, required: true,
@@ -160,6 +161,14 @@ test('a number without limits is refused without telling of limits', async () =>
     [12000.5, 'A number']);
   ask({ ...NUMBER, low: -1e12, high: 1e12 });
   assert.equal(await given('number', '1.5'), 'A whole number');
+});
+
+test('a number with one limit is refused with that limit', async () => {
+  ask({ ...NUMBER, low: 0, high: 1e9, whole: false });
+  assert.deepEqual([await given('number', '1e6'), await given('number', '-0.5')],
+    [1e6, 'At least 0']);
+  ask({ ...NUMBER, low: -1e9, high: 10 });
+  assert.equal(await given('number', '11'), 'Whole, at most 10');
 });
 
 test('a text is counted as the server does, and sent unchanged', async () => {

@@ -7,7 +7,7 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.schema.reading import read
 from crgame_ros.study.local_text import LocalText
-from crgame_ros.study.question import check_answers, Question
+from crgame_ros.study.question import check_answers, NumberQuestion, Question
 import pytest
 
 QUESTIONS = tuple(read(Question, values, 'file') for values in (
@@ -38,6 +38,13 @@ def test_answers_stay_as_they_were() -> None:
 def test_what_is_no_answer_is_told(name: str, answer: Any) -> None:
     with pytest.raises(InputError, match=name):
         check_answers(QUESTIONS, GOOD | {name: answer}, 'answers')
+
+
+@pytest.mark.parametrize(('limits', 'told'), [
+    ({'low': 0.0}, 'give a number of at least 0'),
+    ({'high': 9.0, 'whole': True}, 'give a whole number of at most 9'), ({}, 'give a number')])
+def test_only_limits_that_are_set_are_told(limits: dict[str, Any], told: str) -> None:
+    assert NumberQuestion(**limits).refusal('x') == told
 
 
 def test_texts_are_given_in_the_language_that_there_is() -> None:

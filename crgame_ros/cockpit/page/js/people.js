@@ -88,8 +88,8 @@ class People {
   #row({ client, name, role, seat, round_trip_ms, input_delay_ms }) {
     const me = client === this.#store.me.id ? ' (you)' : '';
     const delays = [
-      round_trip_ms === null ? '' : `${round_trip_ms.toFixed(0)} ms there and back`,
-      input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms from hand to answer`,
+      round_trip_ms === null ? '' : `round trip ${round_trip_ms.toFixed(0)} ms`,
+      input_delay_ms === null ? '' : `input latency ${input_delay_ms.toFixed(0)} ms`,
     ].filter(Boolean).join(', ');
     return element('li', { 'data-client': client },
       element('strong', { text: `${oneLine(name)}${me}` }),

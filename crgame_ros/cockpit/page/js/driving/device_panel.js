@@ -22,7 +22,7 @@ export class DevicePanel {
     this.node = element('section', { class: 'drive-section', 'aria-labelledby': 'devices-title' },
       element('h2', { id: 'devices-title', text: 'Input devices' }), this.#list,
       element('p', { class: 'drive-note', text: 'A gamepad or wheel appears here after you press '
-        + 'one of its buttons. It drives once you move it; the keys go before it while held.' }));
+        + 'one of its buttons. It drives once you move it; keys take precedence while held.' }));
     this.list();
   }
 

@@ -146,9 +146,9 @@ class ExperimenterPage {
   #showPage({ page }) {
     const node = part(document.body, 'page');
     const delay = page.round_trip_ms === undefined ? ''
-      : `, ${Math.round(page.round_trip_ms)} ms there and back`;
+      : `, round trip ${Math.round(page.round_trip_ms)} ms`;
     const drive = page.drive_delay_ms === undefined ? ''
-      : `, ${Math.round(page.drive_delay_ms)} ms from hand to answer`;
+      : `, input latency ${Math.round(page.drive_delay_ms)} ms`;
     const more = page.open > 1 ? `, ${page.open} tabs` : '';
     setText(node, page.connected ? `Participant's page: connected${delay}${drive}${more}`
       : "Participant's page: not connected");

@@ -204,7 +204,12 @@ function number({ low, high, whole, unit }, words, id, changed) {
   const input = element('input', { id, type: 'text', inputmode: whole && low >= 0 ? 'numeric'
     : 'decimal', autocomplete: 'off', class: 'number', on: { input: changed } });
   const given = () => input.value.trim().replace(',', '.');
-  const bounded = low > -1e9 && high < 1e9;
+  // A limit that is not set is that far away.
+  const [hasLow, hasHigh] = [low > -1e9, high < 1e9];
+  const kind = whole ? 'number_whole' : 'number';
+  const wrong = hasLow && hasHigh ? (whole ? 'number_whole' : 'number_wrong')
+    : hasLow ? `${kind}_low` : hasHigh ? `${kind}_high`
+      : whole ? 'number_any_whole' : 'number_any';
   return {
     node: element('div', { class: 'number-row' }, input,
       unit ? element('span', { class: 'unit', text: unit }) : null),
@@ -220,9 +225,7 @@ function number({ low, high, whole, unit }, words, id, changed) {
       const value = Number(given());
       const fits = isNumber(given()) && value >= low && value <= high
         && (!whole || Number.isInteger(value));
-      const key = bounded ? whole ? 'number_whole' : 'number_wrong'
-        : whole ? 'number_any_whole' : 'number_any';
-      return fits ? '' : words.of(key, { low, high });
+      return fits ? '' : words.of(wrong, { low, high });
     },
   };
 }
