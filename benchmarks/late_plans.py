@@ -6,23 +6,43 @@ Check that an AV's motion is one motion, however late its planner answers.
 
     python benchmarks/late_plans.py
     python benchmarks/late_plans.py scenarios/cut_in.yaml --planner idm --latencies 0 20 40
+    python benchmarks/late_plans.py FOLDER/*.xml --time-steps 0.04 0.2
 
-Each game runs offline. Of its AVs the table gives the largest difference between the speed and
-the displacement, over a simulation step and over a scenario step, the largest step to the side,
-the refused and the realigned plans, and the transitions that the drivability checker refuses.
+Each game runs offline, also with scenarios of other time steps. In a CommonRoad scenario with a
+planning problem, an AV drives among reactive traffic. Of the AVs the table gives the largest
+difference between the speed and the displacement, over a simulation step and over a scenario
+step, the largest step to the side, the refused and the realigned plans, and the transitions that
+the drivability checker refuses.
 """
 
 import argparse
 from pathlib import Path
-
-import crgame_ros
-from crgame_ros.vehicle.state import StateColumn
-import numpy as np
-from numpy.typing import NDArray
+import sys
+import tempfile
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
+
+from commonroad.common.file_reader import CommonRoadFileReader  # noqa: E402, I100
+from commonroad.common.file_writer import (  # noqa: E402
+    CommonRoadFileWriter,
+    OverwriteExistingFile,
+)
+from commonroad.common.util import Interval  # noqa: E402
+from commonroad.prediction.prediction import TrajectoryPrediction  # noqa: E402
+from commonroad.scenario.obstacle import DynamicObstacle  # noqa: E402
+from commonroad.scenario.state import CustomState, InitialState  # noqa: E402
+from commonroad.scenario.trajectory import Trajectory  # noqa: E402
+import crgame_ros  # noqa: E402
+from crgame_ros.errors import CrgameError  # noqa: E402
+from crgame_ros.vehicle.state import StateColumn  # noqa: E402
+import numpy as np  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
+from placed_runs import DIGITS, PLAYED  # noqa: E402
+import yaml  # noqa: E402
+
 LATENCIES = (0, 1, 5, 10, 12, 20, 40, 70, 100)
-HEAD = f'{"game":20} {"late":>4} {"av":5} {"dv step":>8} {"dv tick":>8} {"aside":>8} ' \
+HEAD = f'{"game":20} {"dt":>5} {"late":>4} {"av":5} {"dv step":>8} {"dv tick":>8} {"aside":>8} ' \
     f'{"refused":>7} {"realigned":>9} {"infeasible":>10}'
 
 
@@ -42,13 +62,79 @@ def disagreement(states: NDArray[np.float64], dt_s: float) -> tuple[float, float
             float(np.abs(aside).max()))
 
 
+def resample(obstacle: DynamicObstacle, ratio: float) -> None:
+    """
+    Give an obstacle states at other time steps, interpolated between its own.
+
+    :param ratio: new time steps in an old one
+    """
+    if not isinstance(obstacle.prediction, TrajectoryPrediction):
+        return
+    states = [obstacle.initial_state, *obstacle.prediction.trajectory.state_list]
+    known = np.array([state.time_step for state in states]) * ratio
+    steps = np.arange(np.ceil(known[0]), np.floor(known[-1]) + 1.0)
+    x, y, yaw, speed = (np.interp(steps, known, values) for values in (
+        [state.position[0] for state in states], [state.position[1] for state in states],
+        np.unwrap([state.orientation for state in states]),
+        [state.velocity for state in states]))
+    first, *later = [{
+        'time_step': int(step), 'position': np.array((x[i], y[i])),
+        'orientation': (yaw[i] + np.pi) % (2.0 * np.pi) - np.pi, 'velocity': speed[i]}
+        for i, step in enumerate(steps)]
+    obstacle.initial_state = InitialState(**first)
+    obstacle.prediction = TrajectoryPrediction(Trajectory(later[0]['time_step'], [
+        CustomState(**values) for values in later]), obstacle.obstacle_shape)
+
+
+def game_at(path: Path, time_step_s: float | None, folder: Path) -> Path:
+    """
+    Return a game whose scenario has another time step.
+
+    :param path: of a game, or of a CommonRoad scenario, which is then `PLAYED`.
+    :param time_step_s: None for that of the scenario.
+    :param folder: where it is written.
+    """
+    values = {**PLAYED, 'scenario': str(path)} if path.suffix == '.xml' \
+        else yaml.safe_load(path.read_text())
+    source = path.parent / values['scenario']
+    values['scenario'] = str(source)
+    if time_step_s is not None:
+        scenario, problems = CommonRoadFileReader(str(source)).open()
+        ratio = scenario.dt / time_step_s
+        for obstacle in scenario.dynamic_obstacles:
+            resample(obstacle, ratio)
+        for light in scenario.lanelet_network.traffic_lights:
+            cycle = light.traffic_light_cycle
+            for element in cycle.cycle_elements if cycle else ():
+                element.duration = max(1, round(element.duration * ratio))
+        for problem in problems.planning_problem_dict.values():
+            problem.initial_state.time_step = round(problem.initial_state.time_step * ratio)
+            for state in problem.goal.state_list:
+                state.time_step = Interval(round(state.time_step.start * ratio),
+                                           round(state.time_step.end * ratio))
+        scenario.dt = time_step_s
+        values['scenario'] = str(folder / f'{source.stem}_{time_step_s}.xml')
+        CommonRoadFileWriter(scenario, problems, decimal_precision=DIGITS).write_to_file(
+            values['scenario'], OverwriteExistingFile.ALWAYS)
+    for human in values['humans']:
+        kind, _, name = str(human.get('driver', '')).partition(':')
+        if (path.parent / name).is_file() and name:
+            human['driver'] = f'{kind}:{path.parent / name}'
+    written = folder / f'{path.stem}.yaml'
+    written.write_text(yaml.safe_dump(values))
+    return written
+
+
 def main() -> None:
-    """Print one line for each game, latency [steps] and AV."""
+    """Print one line for each game, time step, latency [steps] and AV."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('games', nargs='*', type=Path, help='game files; all of scenarios/')
+    parser.add_argument('games', nargs='*', type=Path,
+                        help='games or scenarios; all games of scenarios/')
     parser.add_argument('--planner', help="of all AVs, instead of the game's")
     parser.add_argument('--latencies', nargs='+', type=int, default=LATENCIES, metavar='STEPS')
+    parser.add_argument('--time-steps', nargs='+', type=float, default=(None,), metavar='SECONDS',
+                        help='of the scenario, instead of its own')
     parser.add_argument('--duration', type=float, default=10.0, help='of each run [s]')
     parser.add_argument('--feasibility', action='store_true',
                         help='with the drivability checker, which takes seconds for each run')
@@ -56,22 +142,35 @@ def main() -> None:
     print(HEAD)
     games = given.games or sorted(path for path in (ROOT / 'scenarios').glob('*.yaml')
                                   if path.name.count('.') == 1)
-    for game in games:
-        for latency in given.latencies:
-            run = crgame_ros.run(game, planner=given.planner, latency_steps=latency,
-                                 duration_s=given.duration)
-            setup = run.result.setup
-            scores = run.scores() if given.feasibility else {}
-            for av in setup.avs:
-                states = run.result.states_of(av.id)
-                every = setup.scheduler.steps_per_tick
-                step, aside = disagreement(states, setup.scheduler.dt_s)
-                tick, _ = disagreement(states[::every], setup.scheduler.time_step_s)
-                counters = run.result.planners[av.id].counters
-                score = scores[av.id].commonroad if scores else None
-                infeasible = score.feasibility.infeasible if score else '-'
-                print(f'{game.stem:20} {latency:4} {av.id:5} {step:8.3f} {tick:8.3f} {aside:8.3f} '
-                      f'{counters.refused:7} {counters.realigned:9} {infeasible:>10}', flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for path in games:
+            for time_step_s in given.time_steps:
+                game = game_at(path.resolve(), time_step_s, Path(folder))
+                for latency in given.latencies:
+                    try:
+                        measure(game, latency, given)
+                    except CrgameError as error:
+                        print(f'{game.stem}: {error}', flush=True)
+                        break
+
+
+def measure(game: Path, latency: int, given: argparse.Namespace) -> None:
+    """Print the lines of a run."""
+    run = crgame_ros.run(game, planner=given.planner, latency_steps=latency,
+                         duration_s=given.duration)
+    setup = run.result.setup
+    scores = run.scores() if given.feasibility else {}
+    for av in setup.avs:
+        states = run.result.states_of(av.id)
+        every = setup.scheduler.steps_per_tick
+        step, aside = disagreement(states, setup.scheduler.dt_s)
+        tick, _ = disagreement(states[::every], setup.scheduler.time_step_s)
+        counters = run.result.planners[av.id].counters
+        score = scores[av.id].commonroad if scores else None
+        infeasible = score.feasibility.infeasible if score else '-'
+        print(f'{game.stem:20} {setup.scheduler.time_step_s:5} {latency:4} {av.id:5} {step:8.3f} '
+              f'{tick:8.3f} {aside:8.3f} {counters.refused:7} {counters.realigned:9} '
+              f'{infeasible:>10}', flush=True)
 
 
 if __name__ == '__main__':
