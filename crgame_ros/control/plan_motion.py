@@ -37,8 +37,9 @@ class PlanMotion:
     The motion between planned states.
 
     Positions are cubic in time, by heading and speed at both ends, and do not turn back between
-    two states; speeds are those of this motion. Headings are linear in the way covered, by the
-    shortest turn, and the other columns in time.
+    two states; speeds are those of this motion. A vehicle that comes to rest within the step, or
+    drives off within it, brakes or accelerates constantly and rests for the remaining time.
+    Headings are linear in the way covered, by the shortest turn, and the other columns in time.
 
     :param states: (S, 8) planned states, columns as in `StateColumn`, S >= 1
     :param time_step_s: Delta t_c [s]
@@ -52,9 +53,17 @@ class PlanMotion:
         speeds, yaws = states[:, StateColumn.SPEED], states[:, StateColumn.YAW]
         velocities = (speeds * time_step_s)[:, None] * np.column_stack(
             (np.cos(yaws), np.sin(yaws)))
+        lengths = np.hypot(steps[:, 0], steps[:, 1])
         # Beyond three times the step, a cubic would turn back.
-        most = 3.0 * np.hypot(steps[:, 0], steps[:, 1])
+        most = 3.0 * lengths
         ways = np.maximum(np.abs(speeds) * time_step_s, 1e-12)
+        # The share of a step in which the vehicle moves: at the start of it, or at the end if
+        # negative; 0 if it moves all the time.
+        resting = np.abs(speeds) <= PLANNED_REST
+        share = 2.0 * lengths / (ways[:-1] + ways[1:])
+        rests = (resting[:-1] != resting[1:]) & (share < 1.0) & (lengths**2 > RESTING)
+        self._moving = np.where(rests, np.where(resting[1:], share, -share), 0.0)
+        self._moving_shares: list[float] = self._moving.tolist()
         self._starts = velocities[:-1] * np.minimum(1.0, most / ways[:-1])[:, None]
         self._ends = velocities[1:] * np.minimum(1.0, most / ways[1:])[:, None]
         self._tangents: list[list[float]] = np.column_stack((self._starts, self._ends)).tolist()
@@ -70,6 +79,16 @@ class PlanMotion:
             return VehicleState(*first)
         second = self._rows[index + 1]
         mixed = [a + share * (b - a) for a, b in zip(first, second, strict=True)]
+        moving = self._moving_shares[index]
+        if moving:
+            covered, faster = _with_rest(share, moving)
+            for column in (StateColumn.X, StateColumn.Y):
+                mixed[column] = first[column] + covered * (second[column] - first[column])
+            mixed[StateColumn.YAW] = interpolate_angle(
+                first[StateColumn.YAW], second[StateColumn.YAW], covered)
+            mixed[StateColumn.SPEED] = faster * (
+                first if moving > 0.0 else second)[StateColumn.SPEED]
+            return VehicleState(*mixed)
         start_x, start_y, end_x, end_y = self._tangents[index]
         mixed[0], along_x = _cubic(share, first[0], second[0], start_x, end_x)
         mixed[1], along_y = _cubic(share, first[1], second[1], start_y, end_y)
@@ -110,7 +129,27 @@ class PlanMotion:
             speeds = (along[:, 0] * np.cos(yaws) + along[:, 1] * np.sin(yaws)) / self.time_step_s
             sampled[:, StateColumn.SPEED] = np.where(
                 share[:, 0] == 0.0, first[:, StateColumn.SPEED], speeds)
+            for row in np.flatnonzero((self._moving[index] != 0.0) & (share[:, 0] > 0.0)):
+                # The yaw stays continuous.
+                yaw = sampled[row, StateColumn.YAW]
+                sampled[row] = self.at(int(index[row]), float(share[row, 0]))
+                sampled[row, StateColumn.YAW] = yaw + wrap_pi(
+                    sampled[row, StateColumn.YAW] - yaw)
         return np.asarray(sampled)
+
+
+def _with_rest(share: float, moving: float) -> tuple[float, float]:
+    """
+    Return the way covered and the speed, as shares, of a step with rest after or before motion.
+
+    :param share: of the step's time
+    :param moving: share in which the vehicle moves; negative if it rests first
+    """
+    if moving > 0.0:
+        left = max(0.0, 1.0 - share / moving)
+        return 1.0 - left * left, left
+    gone = max(0.0, 1.0 - (1.0 - share) / -moving)
+    return gone * gone, gone
 
 
 def _cubic(share: Any, first: Any, second: Any, start: Any, end: Any) -> Any:
