@@ -24,10 +24,6 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 from commonroad.common.file_reader import CommonRoadFileReader  # noqa: E402, I100
-from commonroad.common.file_writer import (  # noqa: E402
-    CommonRoadFileWriter,
-    OverwriteExistingFile,
-)
 from commonroad.common.util import Interval  # noqa: E402
 from commonroad.prediction.prediction import TrajectoryPrediction  # noqa: E402
 from commonroad.scenario.obstacle import DynamicObstacle  # noqa: E402
@@ -35,11 +31,13 @@ from commonroad.scenario.state import CustomState, InitialState  # noqa: E402
 from commonroad.scenario.trajectory import Trajectory  # noqa: E402
 import crgame_ros  # noqa: E402
 from crgame_ros.errors import CrgameError  # noqa: E402
+from crgame_ros.game.file import parse_game  # noqa: E402
+from crgame_ros.game.game import Game  # noqa: E402
+from crgame_ros.geometry.angles import wrap_pi_array  # noqa: E402
 from crgame_ros.vehicle.state import StateColumn  # noqa: E402
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
-from placed_runs import DIGITS, PLAYED  # noqa: E402
-import yaml  # noqa: E402
+from placed_runs import played_values, write_exactly  # noqa: E402
 
 LATENCIES = (0, 1, 5, 10, 12, 20, 40, 70, 100)
 HEAD = f'{"game":20} {"dt":>5} {"late":>4} {"av":5} {"dv step":>8} {"dv tick":>8} {"aside":>8} ' \
@@ -77,28 +75,27 @@ def resample(obstacle: DynamicObstacle, ratio: float) -> None:
         [state.position[0] for state in states], [state.position[1] for state in states],
         np.unwrap([state.orientation for state in states]),
         [state.velocity for state in states]))
+    yaw = wrap_pi_array(yaw)
     first, *later = [{
         'time_step': int(step), 'position': np.array((x[i], y[i])),
-        'orientation': (yaw[i] + np.pi) % (2.0 * np.pi) - np.pi, 'velocity': speed[i]}
+        'orientation': yaw[i], 'velocity': speed[i]}
         for i, step in enumerate(steps)]
     obstacle.initial_state = InitialState(**first)
     obstacle.prediction = TrajectoryPrediction(Trajectory(later[0]['time_step'], [
         CustomState(**values) for values in later]), obstacle.obstacle_shape)
 
 
-def game_at(path: Path, time_step_s: float | None, folder: Path) -> Path:
+def game_at(path: Path, time_step_s: float | None, folder: Path) -> Game:
     """
     Return a game whose scenario has another time step.
 
-    :param path: of a game, or of a CommonRoad scenario, which is then `PLAYED`.
+    :param path: of a game, or of a CommonRoad scenario, as in `played_values`.
     :param time_step_s: None for that of the scenario.
-    :param folder: where it is written.
+    :param folder: where the scenario is written.
     """
-    values = {**PLAYED, 'scenario': str(path)} if path.suffix == '.xml' \
-        else yaml.safe_load(path.read_text())
-    source = path.parent / values['scenario']
-    values['scenario'] = str(source)
+    values = played_values(path)
     if time_step_s is not None:
+        source = path.parent / values['scenario']
         scenario, problems = CommonRoadFileReader(str(source)).open()
         ratio = scenario.dt / time_step_s
         for obstacle in scenario.dynamic_obstacles:
@@ -113,16 +110,9 @@ def game_at(path: Path, time_step_s: float | None, folder: Path) -> Path:
                 state.time_step = Interval(round(state.time_step.start * ratio),
                                            round(state.time_step.end * ratio))
         scenario.dt = time_step_s
-        values['scenario'] = str(folder / f'{source.stem}_{time_step_s}.xml')
-        CommonRoadFileWriter(scenario, problems, decimal_precision=DIGITS).write_to_file(
-            values['scenario'], OverwriteExistingFile.ALWAYS)
-    for human in values['humans']:
-        kind, _, name = str(human.get('driver', '')).partition(':')
-        if (path.parent / name).is_file() and name:
-            human['driver'] = f'{kind}:{path.parent / name}'
-    written = folder / f'{path.stem}.yaml'
-    written.write_text(yaml.safe_dump(values))
-    return written
+        values['scenario'] = write_exactly(
+            scenario, problems, folder / f'{source.stem}_{time_step_s}.xml')
+    return parse_game(values, str(path), path.parent)
 
 
 def main() -> None:
@@ -145,16 +135,15 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for path in games:
             for time_step_s in given.time_steps:
-                game = game_at(path.resolve(), time_step_s, Path(folder))
-                for latency in given.latencies:
-                    try:
-                        measure(game, latency, given)
-                    except CrgameError as error:
-                        print(f'{game.stem}: {error}', flush=True)
-                        break
+                try:
+                    game = game_at(path, time_step_s, Path(folder))
+                    for latency in given.latencies:
+                        measure(path.stem, game, latency, given)
+                except CrgameError as error:
+                    print(f'{path.stem}: {error}', flush=True)
 
 
-def measure(game: Path, latency: int, given: argparse.Namespace) -> None:
+def measure(name: str, game: Game, latency: int, given: argparse.Namespace) -> None:
     """Print the lines of a run."""
     run = crgame_ros.run(game, planner=given.planner, latency_steps=latency,
                          duration_s=given.duration)
@@ -168,7 +157,7 @@ def measure(game: Path, latency: int, given: argparse.Namespace) -> None:
         counters = run.result.planners[av.id].counters
         score = scores[av.id].commonroad if scores else None
         infeasible = score.feasibility.infeasible if score else '-'
-        print(f'{game.stem:20} {setup.scheduler.time_step_s:5} {latency:4} {av.id:5} {step:8.3f} '
+        print(f'{name:20} {setup.scheduler.time_step_s:5} {latency:4} {av.id:5} {step:8.3f} '
               f'{tick:8.3f} {aside:8.3f} {counters.refused:7} {counters.realigned:9} '
               f'{infeasible:>10}', flush=True)
 

@@ -8,6 +8,8 @@ from typing import Any
 
 from commonroad.common.file_reader import CommonRoadFileReader
 from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
+from commonroad.planning.planning_problem import PlanningProblemSet
+from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.file import parse_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
@@ -22,6 +24,19 @@ DIGITS = 14
 # A scenario without a game: one AV, and agents that take the place of its recorded vehicles.
 PLAYED = {'humans': [], 'avs': [{'id': 'av0', 'planner': 'idm'}], 'seed': 1,
           'traffic': {'recorded': 'reactive', 'agents': 10}}
+
+
+def played_values(path: Path) -> dict[str, Any]:
+    """Return the values of a game's file, or of `PLAYED` in a CommonRoad scenario."""
+    return {**PLAYED, 'scenario': path.name} if path.suffix == '.xml' \
+        else dict(yaml.safe_load(path.read_text()))
+
+
+def write_exactly(scenario: Scenario, problems: PlanningProblemSet, path: Path) -> str:
+    """Write a scenario with all digits of its coordinates; return the path as text."""
+    CommonRoadFileWriter(scenario, problems, decimal_precision=DIGITS).write_to_file(
+        str(path), OverwriteExistingFile.ALWAYS)
+    return str(path)
 
 
 def placed(values: Any, angle: float, offset: tuple[float, float]) -> Any:
@@ -55,18 +70,16 @@ def run_placed(path: Path, folder: Path, angle: float, offset: tuple[float, floa
 
     :param path: of a game, or of a CommonRoad scenario, which is then `PLAYED`.
     """
-    played = {**PLAYED, 'scenario': path.name} if path.suffix == '.xml' \
-        else yaml.safe_load(path.read_text())
+    played = played_values(path)
     game = parse_game(played, str(path), path.parent)
     scenario, problems = CommonRoadFileReader(str(game.scenario)).open()
     for each in (scenario, problems):
         each.translate_rotate(np.zeros(2), angle)
         each.translate_rotate(np.array(offset), 0.0)
-    name = folder / f'{path.stem}_{round(math.degrees(angle))}_{round(offset[0])}.xml'
-    CommonRoadFileWriter(scenario, problems, decimal_precision=DIGITS).write_to_file(
-        str(name), OverwriteExistingFile.ALWAYS)
     values = placed(played, angle, offset)
-    values['scenario'] = str(name)
+    values['scenario'] = write_exactly(
+        scenario, problems,
+        folder / f'{path.stem}_{round(math.degrees(angle))}_{round(offset[0])}.xml')
     return run_offline(build_setup(parse_game(values, str(path), path.parent)),
                        duration_s=duration_s)
 

@@ -54,18 +54,21 @@ class PlanMotion:
         velocities = (speeds * time_step_s)[:, None] * np.column_stack(
             (np.cos(yaws), np.sin(yaws)))
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        # Beyond three times the step, a cubic would turn back.
-        most = 3.0 * lengths
         ways = np.maximum(np.abs(speeds) * time_step_s, 1e-12)
-        # The share of a step in which the vehicle moves: at the start of it, or at the end if
-        # negative; 0 if it moves all the time.
+        # When a vehicle moves in a step that begins or ends at rest, as shares of its time: with
+        # the mean of both speeds it covers the way in less than the step.
         resting = np.abs(speeds) <= PLANNED_REST
-        share = 2.0 * lengths / (ways[:-1] + ways[1:])
-        rests = (resting[:-1] != resting[1:]) & (share < 1.0) & (lengths**2 > RESTING)
-        self._moving = np.where(rests, np.where(resting[1:], share, -share), 0.0)
-        self._moving_shares: list[float] = self._moving.tolist()
-        self._starts = velocities[:-1] * np.minimum(1.0, most / ways[:-1])[:, None]
-        self._ends = velocities[1:] * np.minimum(1.0, most / ways[1:])[:, None]
+        needed = 2.0 * lengths / (ways[:-1] + ways[1:])
+        rests = (resting[:-1] != resting[1:]) & (needed < 1.0) & (lengths**2 > RESTING)
+        self._spans = np.where(rests, needed, 1.0)
+        self._begins = np.where(resting[:-1], 1.0 - self._spans, 0.0)
+        self._motions: list[list[float]] = np.column_stack((self._begins, self._spans)).tolist()
+        # Beyond three times the step, a cubic would turn back.
+        most, spans = 3.0 * lengths, self._spans[:, None]
+        self._starts = spans * velocities[:-1] * np.minimum(
+            1.0, most / (self._spans * ways[:-1]))[:, None]
+        self._ends = spans * velocities[1:] * np.minimum(
+            1.0, most / (self._spans * ways[1:]))[:, None]
         self._tangents: list[list[float]] = np.column_stack((self._starts, self._ends)).tolist()
 
     def __len__(self) -> int:
@@ -79,19 +82,11 @@ class PlanMotion:
             return VehicleState(*first)
         second = self._rows[index + 1]
         mixed = [a + share * (b - a) for a, b in zip(first, second, strict=True)]
-        moving = self._moving_shares[index]
-        if moving:
-            covered, faster = _with_rest(share, moving)
-            for column in (StateColumn.X, StateColumn.Y):
-                mixed[column] = first[column] + covered * (second[column] - first[column])
-            mixed[StateColumn.YAW] = interpolate_angle(
-                first[StateColumn.YAW], second[StateColumn.YAW], covered)
-            mixed[StateColumn.SPEED] = faster * (
-                first if moving > 0.0 else second)[StateColumn.SPEED]
-            return VehicleState(*mixed)
+        begin, span = self._motions[index]
+        moving = min(max((share - begin) / span, 0.0), 1.0)
         start_x, start_y, end_x, end_y = self._tangents[index]
-        mixed[0], along_x = _cubic(share, first[0], second[0], start_x, end_x)
-        mixed[1], along_y = _cubic(share, first[1], second[1], start_y, end_y)
+        mixed[0], along_x = _cubic(moving, first[0], second[0], start_x, end_x)
+        mixed[1], along_y = _cubic(moving, first[1], second[1], start_y, end_y)
         step_x, step_y = second[0] - first[0], second[1] - first[1]
         square = step_x * step_x + step_y * step_y
         covered = share if square < RESTING else (
@@ -99,7 +94,7 @@ class PlanMotion:
         yaw = interpolate_angle(first[StateColumn.YAW], second[StateColumn.YAW], covered)
         mixed[StateColumn.YAW] = yaw
         mixed[StateColumn.SPEED] = (
-            along_x * math.cos(yaw) + along_y * math.sin(yaw)) / self.time_step_s
+            along_x * math.cos(yaw) + along_y * math.sin(yaw)) / (span * self.time_step_s)
         return VehicleState(*mixed)
 
     def sample(self, at: Array) -> Array:
@@ -116,7 +111,9 @@ class PlanMotion:
         first, second = states[index], states[np.minimum(index + 1, len(states) - 1)]
         sampled = first + share * (second - first)
         if len(states) > 1:
-            sampled[:, :2], along = _cubic(share, first[:, :2], second[:, :2],
+            spans = self._spans[index]
+            moving = np.clip((share[:, 0] - self._begins[index]) / spans, 0.0, 1.0)[:, None]
+            sampled[:, :2], along = _cubic(moving, first[:, :2], second[:, :2],
                                            self._starts[index], self._ends[index])
             steps = second[:, :2] - first[:, :2]
             squares = np.einsum('ij,ij->i', steps, steps)
@@ -126,30 +123,11 @@ class PlanMotion:
             yaws = first[:, StateColumn.YAW] + covered * (
                 second[:, StateColumn.YAW] - first[:, StateColumn.YAW])
             sampled[:, StateColumn.YAW] = yaws
-            speeds = (along[:, 0] * np.cos(yaws) + along[:, 1] * np.sin(yaws)) / self.time_step_s
+            speeds = (along[:, 0] * np.cos(yaws) + along[:, 1] * np.sin(yaws)) / (
+                spans * self.time_step_s)
             sampled[:, StateColumn.SPEED] = np.where(
                 share[:, 0] == 0.0, first[:, StateColumn.SPEED], speeds)
-            for row in np.flatnonzero((self._moving[index] != 0.0) & (share[:, 0] > 0.0)):
-                # The yaw stays continuous.
-                yaw = sampled[row, StateColumn.YAW]
-                sampled[row] = self.at(int(index[row]), float(share[row, 0]))
-                sampled[row, StateColumn.YAW] = yaw + wrap_pi(
-                    sampled[row, StateColumn.YAW] - yaw)
         return np.asarray(sampled)
-
-
-def _with_rest(share: float, moving: float) -> tuple[float, float]:
-    """
-    Return the way covered and the speed, as shares, of a step with rest after or before motion.
-
-    :param share: of the step's time
-    :param moving: share in which the vehicle moves; negative if it rests first
-    """
-    if moving > 0.0:
-        left = max(0.0, 1.0 - share / moving)
-        return 1.0 - left * left, left
-    gone = max(0.0, 1.0 - (1.0 - share) / -moving)
-    return gone * gone, gone
 
 
 def _cubic(share: Any, first: Any, second: Any, start: Any, end: Any) -> Any:

@@ -193,23 +193,35 @@ function option(type, name, value, label, changed) {
 }
 
 /**
+ * Return the key of the words that refuse a number: they name the limits that are set.
+ *
+ * @param {NumberQuestion} question
+ */
+function refusalKey({ low, high, whole }) {
+  // A limit that is not set is that far away.
+  const [hasLow, hasHigh] = [low > -1e9, high < 1e9];
+  if (hasLow && hasHigh) {
+    return whole ? 'number_whole' : 'number_wrong';
+  }
+  if (!hasLow && !hasHigh) {
+    return whole ? 'number_any_whole' : 'number_any';
+  }
+  return `number${whole ? '_whole' : ''}${hasLow ? '_low' : '_high'}`;
+}
+
+/**
  * @param {NumberQuestion} question
  * @param {Words} words
  * @param {string} id
  * @param {() => void} changed
  * @returns {Controls}
  */
-function number({ low, high, whole, unit }, words, id, changed) {
+function number(question, words, id, changed) {
+  const { low, high, whole, unit } = question;
   // A text field, so that non-numbers are reported and the mouse wheel does not change the value.
   const input = element('input', { id, type: 'text', inputmode: whole && low >= 0 ? 'numeric'
     : 'decimal', autocomplete: 'off', class: 'number', on: { input: changed } });
   const given = () => input.value.trim().replace(',', '.');
-  // A limit that is not set is that far away.
-  const [hasLow, hasHigh] = [low > -1e9, high < 1e9];
-  const kind = whole ? 'number_whole' : 'number';
-  const wrong = hasLow && hasHigh ? (whole ? 'number_whole' : 'number_wrong')
-    : hasLow ? `${kind}_low` : hasHigh ? `${kind}_high`
-      : whole ? 'number_any_whole' : 'number_any';
   return {
     node: element('div', { class: 'number-row' }, input,
       unit ? element('span', { class: 'unit', text: unit }) : null),
@@ -225,7 +237,7 @@ function number({ low, high, whole, unit }, words, id, changed) {
       const value = Number(given());
       const fits = isNumber(given()) && value >= low && value <= high
         && (!whole || Number.isInteger(value));
-      return fits ? '' : words.of(wrong, { low, high });
+      return fits ? '' : words.of(refusalKey(question), { low, high });
     },
   };
 }
