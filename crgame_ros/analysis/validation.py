@@ -18,7 +18,13 @@ from crgame_ros.recording.exceptions import RunTooShortError
 from crgame_ros.recording.info import describe
 from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.reader import BagReader
-from crgame_ros.recording.run_folder import bags_of, recording_in, run_folders
+from crgame_ros.recording.run_folder import (
+    bags_of,
+    PARTICIPANTS,
+    recording_in,
+    run_folders,
+    STUDY_FILE,
+)
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.recording.timing_report import REPORT_KEYS
 from crgame_ros.scenario import guard
@@ -30,7 +36,6 @@ from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.late_steps import LATE_KEYS
 from crgame_ros.yaml_text import read_text, read_yaml
 
-STUDY_FILE = Path('study', 'study.yaml')
 _FILES, _WORDS = 'files', re.compile(r'words\..*\.yaml')
 # A journal has a line for each entry, and answers can be long [bytes].
 _LONGEST_JOURNAL = 200_000_000
@@ -52,7 +57,7 @@ def _parts(path: Path) -> Iterator[Path]:
     yield from sorted(file for file in study.rglob('*.yaml') if not _WORDS.fullmatch(file.name)
                       and study / _FILES not in file.parents)
     yield from sorted((study / _FILES).rglob('*.xml'))
-    for person in sorted((path / 'participants').glob('*/')):
+    for person in sorted((path / PARTICIPANTS).glob('*/')):
         yield from sorted(person.glob('*.jsonl'))
         yield from sorted((person / 'games').glob('*.yaml'))
         for session in sorted((person / 'runs').glob('*/')):

@@ -10,10 +10,9 @@ import json
 from typing import Any, NamedTuple
 
 from crgame_ros.evaluation.content import digests_in
+from crgame_ros.evaluation.results.cell_rows import FACTORS
 
 KEY_DIGITS = 32
-# Columns that identify cells, in every table.
-FACTORS = ('scenario', 'game', 'human', 'planner', 'perception', 'traffic', 'seed')
 
 
 @dataclass(frozen=True)
@@ -37,6 +36,7 @@ class Condition:
     :param latency_steps: simulation steps between a request and its plan.
     :param commonroad_scores: whether CommonRoad's tools score it, too.
     :param code: digests of the engine's and the planners' code.
+    :param participant: label of the study's participant who drove the recorded run, or empty.
     """
 
     scenario: str
@@ -54,6 +54,7 @@ class Condition:
     latency_steps: int
     commonroad_scores: bool
     code: tuple[str, ...]
+    participant: str = ''
 
     @cached_property
     def text(self) -> str:
@@ -63,8 +64,10 @@ class Condition:
     @cached_property
     def around_seed(self) -> tuple[str, str]:
         """Return what comes before and after the seed in a cell's JSON, with sorted keys."""
-        names = [sorted(item.name for item in fields(self) if (item.name > 'seed') is after)
-                 for after in (False, True)]
+        # Without a participant the keys are those of evaluations that did not know participants.
+        known = sorted(item.name for item in fields(self)
+                       if self.participant or item.name != 'participant')
+        names = [[name for name in known if (name > 'seed') is after] for after in (False, True)]
         before, after = (json.dumps({name: getattr(self, name) for name in part}, sort_keys=True,
                                     separators=(',', ':'), allow_nan=True) for part in names)
         return before[:-1], after[1:]

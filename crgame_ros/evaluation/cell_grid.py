@@ -14,6 +14,7 @@ from crgame_ros.evaluation.cell_scene import (
     CellScene,
     files_of,
     GAME_SUFFIXES,
+    participant_labels,
     runs_of,
     SCENARIO_SUFFIXES,
     scene_of_game,
@@ -82,9 +83,10 @@ class CellGrid:
                     for traffic, flow in self.traffic.items():
                         condition = Condition(
                             scene.scenario, scene.game, scene.human, planner.label, perception,
-                            traffic, scene.values, scene.inputs, planner.choice, seen, flow,
-                            self.duration_s, self.latency_steps, self.commonroad_scores,
-                            (self.engine, *self._code(scene, planner)))
+                            traffic, scene.values, scene.inputs,
+                            planner.choice, seen, flow, self.duration_s, self.latency_steps,
+                            self.commonroad_scores, (self.engine, *self._code(scene, planner)),
+                            scene.participant)
                         yield from (Cell(condition, seed) for seed in self.seeds)
 
     def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
@@ -132,6 +134,8 @@ def make_grid(plan: EvaluationPlan, store: ContentStore,
         scenes.append(scene)
         progress((number + 1) / len(places))
     paths = [path for _, path in places]
+    scenes = [replace(scene, participant=label) if scene.human else scene
+              for scene, label in zip(scenes, participant_labels(paths), strict=True)]
     return CellGrid(_unique_names(scenes, paths), planners, perception, traffic,
                     plan.seed_numbers(), plan.duration, plan.latency, plan.commonroad_scores,
                     engine_digest())

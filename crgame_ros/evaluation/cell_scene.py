@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene of a cell: a game with all files that it names, ready for transfer to workers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import io
+import os
 from pathlib import Path
 import re
 from typing import Any
@@ -20,7 +21,7 @@ from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_recorded_game
 from crgame_ros.recording.recorded_inputs import with_recorded_events
 from crgame_ros.recording.run_cycles import replay_inputs
-from crgame_ros.recording.run_folder import folder_name, recording_in
+from crgame_ros.recording.run_folder import folder_name, participant_folder, recording_in
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.writing import write
@@ -44,6 +45,7 @@ class CellScene:
     :param scenario: benchmark id, with the file's name where two files have that id.
     :param game: name of the game's file; empty where there is none.
     :param human: name of the recorded run whose humans drive; empty where there is none.
+    :param participant: label of the study's participant who drove it; empty outside a study.
     :param values: values of the game, as in its file; files are references to contents.
     :param inputs: digest of the recorded humans' inputs; empty without recorded humans.
     :param digests: digests of the code of its AVs' planners.
@@ -55,6 +57,7 @@ class CellScene:
     values: dict[str, Any]
     inputs: str
     digests: tuple[str, ...]
+    participant: str = ''
 
     @property
     def label(self) -> str:
@@ -111,6 +114,20 @@ def scene_of_run(path: Path, store: ContentStore) -> CellScene:
     digest = store.put(Content(INPUTS, {INPUTS: stream.getvalue()}))
     return _scene(replace(game, humans=humans, duration=min(game.duration, duration_s)),
                   recorded.loaded, store, human=folder_name(path), inputs=digest)
+
+
+def participant_labels(runs: Sequence[Path]) -> list[str]:
+    """
+    Return labels of the participants who drove recorded runs, unique among all studies.
+
+    :param runs: recorded runs; those of no study get an empty label.
+    """
+    folders = [participant_folder(run) for run in runs]
+    studies = [folder.parents[1] for folder in folders if folder is not None]
+    common = Path(os.path.commonpath(studies)) if studies else Path()
+    return ['' if folder is None else
+            (folder.parents[1].relative_to(common) / folder.name).as_posix()
+            for folder in folders]
 
 
 def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name: str = '',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Names and finds the folders of the runs of a session."""
+"""Names and finds the folders of the runs of a session, and of a study's participants."""
 
 from pathlib import Path
 import re
@@ -12,6 +12,8 @@ FINISHED_MARK = '.finished'
 # Suffix of the folder of a restarted recorder.
 _PART = re.compile(r'_part([1-9][0-9]*)$')
 _LATER = re.compile(r'run_([1-9][0-9]*)')
+# In the folder of a study: its file, and the folder with those of its participants.
+STUDY_FILE, PARTICIPANTS = Path('study', 'study.yaml'), 'participants'
 
 
 def run_folder(session: Path, epoch: int) -> Path:
@@ -28,6 +30,12 @@ def run_folders(session: Path) -> list[Path]:
     later = [(int(found[1]), path) for path in session.iterdir()
              if (found := _LATER.fullmatch(path.name)) and path.is_dir()]
     return [session, *(path for _, path in sorted(later))]
+
+
+def participant_folder(run: Path) -> Path | None:
+    """Return the folder of the study's participant who drove a run; None outside a study."""
+    return next((folder for folder in run.resolve().parents if folder.parent.name == PARTICIPANTS
+                 and (folder.parents[1] / STUDY_FILE).is_file()), None)
 
 
 def recording_in(path: Path) -> Path:

@@ -13,6 +13,7 @@ from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell_scene import values_of_game
 from crgame_ros.evaluation.content import ContentStore, digests_in
+from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
 from crgame_ros.study.file import Page, Questions, StudyFile
 from crgame_ros.study.pages import steps_of
 from crgame_ros.study.session_journal import read_journal
@@ -104,14 +105,14 @@ class StudyFolder:
     @property
     def participants(self) -> list[str]:
         """Return the participants who have begun, in the order of their places."""
-        folder = self.root / 'participants'
+        folder = self.root / PARTICIPANTS
         found = [(places[0], path.name) for path in (folder.iterdir() if folder.is_dir() else ())
                  if (places := _places(path))]
         return [name for _, name in sorted(found)]
 
     def participant(self, name: str) -> Path:
         """Return the folder of a participant, which may not exist yet."""
-        return self.root / 'participants' / name
+        return self.root / PARTICIPANTS / name
 
     def place_of(self, name: str) -> int:
         """Return a participant's place among all: the stored one, or the next free one."""
@@ -130,8 +131,8 @@ class StudyFolder:
         :param pictures: of its pages, relative to its folder.
         :raises InputError: if one has changed since, or cannot be written.
         """
-        folder = self.root / 'study'
-        files = {'study.yaml': file,
+        folder = (self.root / STUDY_FILE).parent
+        files = {STUDY_FILE.name: file,
                  **{name: study.base / name for name in (*_beside(study), *pictures)}}
         try:
             for name, path in files.items():

@@ -10,6 +10,7 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.cell import cell_of, KEY_DIGITS
 from crgame_ros.evaluation.cell_grid import CellGrid, make_grid
+from crgame_ros.evaluation.cell_scene import participant_labels
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.plan import load_plan, parse_plan
 from crgame_ros.paths import scenarios_directory
@@ -159,3 +160,17 @@ def test_the_plan_of_the_documents_can_be_read(tmp_path: Path) -> None:
     assert [choice.name for choice in plan.planners] == ['idm', 'cautious', 'my_planner.py:Mine']
     assert plan.seed_numbers() == (0, 1, 2, 3, 4) and set(plan.perceptions()) == {
         'own', 'short-sighted'}
+
+
+def test_participants_are_those_of_studies(tmp_path: Path) -> None:
+    """Two studies may each have a P1; a run outside a study has no participant."""
+    runs = [tmp_path / study / 'participants' / person / 'runs' / 'session' / run
+            for study, person, run in (('night', 'P1', '.'), ('night', 'P1', 'run_2'),
+                                       ('night', 'P2', '.'), ('day', 'P1', 'bag'))]
+    for study in ('night', 'day'):
+        (tmp_path / study / 'study').mkdir(parents=True)
+        (tmp_path / study / 'study' / 'study.yaml').touch()
+    other = tmp_path / 'others' / 'participants' / 'P1' / 'runs' / 'session'
+    assert participant_labels([*runs, other]) == ['night/P1', 'night/P1', 'night/P2', 'day/P1', '']
+    assert participant_labels(runs[1:3]) == ['P1', 'P2']
+    assert participant_labels([other]) == ['']

@@ -16,6 +16,7 @@ import time
 from crgame_ros import __version__
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.cli import main
+from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.recording.run_folder import FINISHED_MARK
 from crgame_ros.recording.run_trajectories import read_trajectories
 from crgame_ros.study.data.bids_folder import escaped
@@ -350,7 +351,13 @@ def test_people_drive_again_as_they_did(copied: Path) -> None:
             assert row[f'recorded_{name}'] == mine[name][0]
             assert row[f'rerun_{name}'] == pytest.approx(mine[name][0], rel=1e-9)
     assert found.filter(role='autonomous')['rerun_distance_m'].n_unique() > 1
-    assert main(['validate', str(copied / 'data' / 'rerun' / 'comparison')]) == 0
+    rerun = copied / 'data' / 'rerun'
+    assert main(['validate', str(rerun / 'comparison')]) == 0
+    cells = polars.read_parquet(rerun / 'cells' / '*.parquet')
+    assert cells.group_by('participant').len().sort('participant').rows() == [
+        ('P01', 2), ('P03', 2)]
+    # Of one scenario, it is the participants that vary by chance.
+    assert [group.clustered for group in summarise(rerun).groups] == ['participants']
 
 
 def test_no_study_is_said_in_one_line(tmp_path: Path,

@@ -27,10 +27,15 @@ _FACTORS = (
     Column('game', TEXT, '', "name of the game's file", empty='it is a scenario without a game'),
     Column('human', TEXT, '', 'name of the recorded run whose humans drive',
            empty='no recorded human drives'),
+    Column('participant', TEXT, '', "the study's participant who drove that run",
+           empty='the run is not of a study'),
     Column('planner', TEXT, '', 'label of the planner or driver of the AVs'),
     Column('perception', TEXT, '', 'label of how AVs perceive'),
     Column('traffic', TEXT, '', 'label of the traffic'),
     Column('seed', INTEGER, '1', 'of everything random'))
+# Names of the columns that identify cells; cells that share all but the planner are a pair.
+FACTORS = tuple(column.name for column in _FACTORS)
+TEXT_FACTORS = tuple(column.name for column in _FACTORS if column.type is TEXT)
 FAILED = 'the cell failed'
 CELLS = TableDeclaration('cells', 'a cell', ('cell',), (
     _KEY, *_FACTORS,

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from functools import reduce
 import hashlib
 
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, FACTORS, TEXT_FACTORS
+from crgame_ros.evaluation.results.cell_rows import FACTORS, TEXT_FACTORS
+from crgame_ros.evaluation.summary.cluster_means import CellClusters, IntArray
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 import numpy as np
 from numpy.typing import NDArray
 import pyarrow as pa
@@ -62,8 +64,6 @@ def mixed(found: NDArray[np.uint64], more: NDArray[np.uint64]) -> NDArray[np.uin
         return np.asarray(value ^ (value >> np.uint64(31)))
 
 
-IntArray = NDArray[np.int64]
-
 BLOCK_CELLS = 65_536
 # Greatest length of the reason of a cell's failure [characters].
 _LONGEST_REASON = 200
@@ -80,7 +80,7 @@ class CellBlock:
 
     :param number: number of the block.
     :param keys: keys of the cells.
-    :param labels: (N, 6) numbers of their labels, in the order of `TEXT_FACTORS`.
+    :param labels: (N, 7) numbers of their labels, in the order of `TEXT_FACTORS`.
     :param seeds: (N)
     :param pairs: (N) digests, equal for cells that share all factors but the planner.
     :param status: `ok`, or the kind of failure.
@@ -126,12 +126,14 @@ class CellBlocks:
         """Return the planners' labels in alphabetical order."""
         return [text for text in self.labels['planner'].texts if text]
 
-    def scenarios(self, block: CellBlock) -> IntArray:
-        """Return the number of each cell's scenario (N), or that of its game without one."""
-        scenarios, games = (block.labels[:, TEXT_FACTORS.index(name)].astype(np.int64)
-                            for name in ('scenario', 'game'))
+    def clusters(self, block: CellBlock) -> CellClusters:
+        """Return what its cells have in common; a cell without a scenario has that of its game."""
+        scenarios, games, participants = (
+            block.labels[:, TEXT_FACTORS.index(name)].astype(np.int64)
+            for name in ('scenario', 'game', 'participant'))
         # The empty label has number 0. Games get negative numbers, apart from those of scenarios.
-        return np.where(scenarios == 0, -1 - games, scenarios)
+        return CellClusters(np.where(scenarios == 0, -1 - games, scenarios), participants,
+                            block.runs)
 
     def factors(self, block: CellBlock, row: int) -> tuple[str, ...]:
         """Return the labels and the seed of a cell, in the order of `FACTORS`."""

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from crgame_ros.evaluation.results.cell_rows import TEXT_FACTORS
 from crgame_ros.evaluation.summary.cell_block import (
     CellBlock,
     CellBlocks,
@@ -13,8 +14,8 @@ from crgame_ros.evaluation.summary.cell_block import (
     IntArray,
     mixed,
 )
-from crgame_ros.evaluation.summary.cluster_means import CountedCells
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
+from crgame_ros.evaluation.summary.cluster_means import CellClusters, CountedCells
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.summary import FailureReason
 import numpy as np
 from numpy.typing import NDArray
@@ -55,9 +56,10 @@ class PairedCells:
         """
         return np.asarray(values[self.rows] - values[self.baseline])
 
-    def runs(self, runs: NDArray[np.uint64]) -> NDArray[np.uint64]:
-        """Return the digest of each pair of runs, from those of all cells of the block (N)."""
-        return mixed(runs[self.rows], runs[self.baseline])
+    def clusters(self, clusters: CellClusters) -> CellClusters:
+        """Return those of the pairs, from those of all cells of the block (N)."""
+        return clusters.of(self.rows)._replace(
+            runs=mixed(clusters.runs[self.rows], clusters.runs[self.baseline]))
 
 
 def paired_cells(block: CellBlock, baseline: int) -> PairedCells:
@@ -186,20 +188,20 @@ def tally_cells(blocks: CellBlocks, by: Sequence[str], baseline: str) -> CellTal
     found = CellTally(CellGroups(blocks, by), baseline,
                       planners.index(baseline) if baseline else -1)
     for block in blocks:
-        groups, scenarios = found.groups.numbers(block), blocks.scenarios(block)
-        _count(found.cells, groups, scenarios, block.runs)
+        groups, clusters = found.groups.numbers(block), blocks.clusters(block)
+        _count(found.cells, groups, clusters)
         found.failed.update(groups[~block.ok].tolist())
         found.failures.add(block, groups)
         if baseline:
-            _count_pairs(found, block, groups, scenarios)
+            _count_pairs(found, block, groups, clusters)
     return found
 
 
 def _count_pairs(found: CellTally, block: CellBlock, groups: IntArray,
-                 scenarios: IntArray) -> None:
+                 clusters: CellClusters) -> None:
     pairs = paired_cells(block, found.baseline_number)
     own_groups = groups[pairs.rows]
-    _count(found.pairs, own_groups, scenarios[pairs.rows], pairs.runs(block.runs))
+    _count(found.pairs, own_groups, pairs.clusters(clusters))
     found.unpaired.update(groups[pairs.unpaired].tolist())
     for group in np.unique(own_groups).tolist():
         own = own_groups == group
@@ -208,8 +210,6 @@ def _count_pairs(found: CellTally, block: CellBlock, groups: IntArray,
             strict=True))
 
 
-def _count(counted: dict[int, CountedCells], groups: IntArray, scenarios: IntArray,
-           runs: NDArray[np.uint64]) -> None:
+def _count(counted: dict[int, CountedCells], groups: IntArray, clusters: CellClusters) -> None:
     for group in np.unique(groups).tolist():
-        own = groups == group
-        counted.setdefault(group, CountedCells()).add(scenarios[own], runs[own])
+        counted.setdefault(group, CountedCells()).add(clusters.of(groups == group))

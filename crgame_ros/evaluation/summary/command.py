@@ -97,8 +97,8 @@ def add_summary_arguments(parser: 'argparse.ArgumentParser | argparse._ArgumentG
     parser.add_argument('--measure', action='append', metavar='NAME', help='measure to summarise; '
                         'may be given several times (default: all that docs/evaluation.md names)')
     parser.add_argument('--by', action='append', metavar='FACTOR', help='factor that defines '
-                        'the groups: planner, scenario, game, human, perception or traffic; may '
-                        'be given several times (default: planner)')
+                        'the groups: planner, scenario, game, human, participant, perception or '
+                        'traffic; may be given several times (default: planner)')
     parser.add_argument('--baseline', metavar='PLANNER', help='planner with which the others '
                         'are compared (default: idm, or the first planner)')
     parser.add_argument('--worst', action='append', metavar='NAME', help='measure by which the '

@@ -11,9 +11,6 @@ from crgame_ros.evaluation.results.parts import newest_parts, part_paths
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-# The text factors of a cell; cells that share all factors but the planner are a pair.
-TEXT_FACTORS = ('scenario', 'game', 'planner', 'human', 'perception', 'traffic')
-FACTORS = (*TEXT_FACTORS, 'seed')
 _REQUIRED = {'cells': ('cell', 'status'), 'vehicles': ('cell', 'vehicle', 'role')}
 
 

@@ -13,17 +13,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError, short
+from crgame_ros.evaluation.results.cell_rows import TEXT_FACTORS
 from crgame_ros.evaluation.summary.cell_block import BLOCK_CELLS, CellBlock, CellBlocks
 from crgame_ros.evaluation.summary.cell_tally import CellTally, paired_cells, tally_cells
 from crgame_ros.evaluation.summary.cluster_means import (
+    CellClusters,
     ClusterMeans,
     CountedCells,
     FloatArray,
     holm,
     IntArray,
-    run_clusters,
 )
-from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts, TEXT_FACTORS
+from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.measures import (
     chosen_measures,
     MEASURES,
@@ -237,28 +238,27 @@ def _sum_up(parts: EvaluatedParts, blocks: CellBlocks, tally: CellTally,
         vehicles = measured_vehicles(parts, block, columns)
         found.add(blocks, block, vehicles)
         values = vehicles.means(block, columns)[:, :len(chosen)]
-        groups, scenarios = tally.groups.numbers(block), blocks.scenarios(block)
-        _add(means, tally.cells, groups, values, scenarios, block.runs)
+        groups, clusters = tally.groups.numbers(block), blocks.clusters(block)
+        _add(means, tally.cells, groups, values, clusters)
         if tally.pairs:
             pairs = paired_cells(block, tally.baseline_number)
             _add(differences, tally.pairs, groups[pairs.rows], pairs.differences(values),
-                 scenarios[pairs.rows], pairs.runs(block.runs))
+                 pairs.clusters(clusters))
     return means, differences, found
 
 
 def _add(means: _Means, counted: Mapping[int, CountedCells], groups: IntArray,
-         values: FloatArray, scenarios: IntArray, runs: NDArray[np.uint64]) -> None:
+         values: FloatArray, clusters: CellClusters) -> None:
     for group in np.unique(groups).tolist():
         own = groups == group
-        means[group].add(values[own], scenarios[own] if counted[group].clustered == 'scenarios'
-                         else run_clusters(runs[own]))
+        means[group].add(values[own], *clusters.of(own).crossed(counted[group].clustered))
 
 
 def _groups(tally: CellTally, means: _Means,
             chosen: Sequence[SummaryMeasure]) -> tuple[GroupMeans, ...]:
     return tuple(GroupMeans(
         tally.groups.labels[group], counted.cells, tally.failed[group], len(counted.scenarios),
-        counted.different_runs, counted.clustered, tuple(
+        len(counted.participants), counted.different_runs, counted.clustered, tuple(
             _within(each, 0.0, measure)
             for each, measure in zip(means[group].estimates(), chosen, strict=True)))
         for group, counted in tally.in_order(tally.cells))
@@ -285,6 +285,7 @@ def _differences(tally: CellTally, differences: _Means,
         found.append(PairedDifferences(
             tally.groups.labels[group], outcomes[True, True], outcomes[False, True],
             outcomes[True, False], outcomes[False, False], tally.unpaired[group],
-            len(counted.scenarios), counted.different_runs, counted.clustered,
+            len(counted.scenarios), len(counted.participants), counted.different_runs,
+            counted.clustered,
             tuple(_within(next(judged), -1.0, measure) for measure in chosen)))
     return tuple(found)

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
 
 _KEY = re.compile('[0-9a-f]{32}')
+Clustered = Literal['scenarios', 'scenarios and participants', 'participants', 'runs']
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class Estimate:
     :param low: lower bound of the interval; NaN where there is none.
     :param high: upper bound.
     :param n: number of cells, or pairs of cells, with a value.
-    :param clusters: number of scenarios, or different runs of one scenario, with such values.
+    :param clusters: number of scenarios with such values; of one scenario, that of participants
+        or different runs.
     :param p: probability of a value at least as far from 0 if the true one is 0; NaN without an
         interval.
     :param beyond_chance: of a difference, whether it is told from 0 among all of them.
@@ -53,8 +55,10 @@ class GroupMeans:
     :param cells: number of finished cells, failed ones included.
     :param failed: number of failed cells.
     :param scenarios: number of different scenarios.
+    :param participants: number of different participants who drove recorded runs.
     :param runs: number of different runs: cells whose states are equal are one run.
-    :param clustered: what varies by chance: scenarios, or runs of one scenario.
+    :param clustered: what varies by chance: scenarios and those who drove in them, or runs of one
+        scenario.
     :param estimates: in the order of `Summary.measures`.
     """
 
@@ -62,8 +66,9 @@ class GroupMeans:
     cells: int
     failed: int
     scenarios: int
+    participants: int
     runs: int
-    clustered: Literal['scenarios', 'runs']
+    clustered: Clustered
     estimates: tuple[Estimate, ...]
 
 
@@ -79,8 +84,9 @@ class PairedDifferences:
     :param both_failed: number of pairs in which both failed.
     :param unpaired: number of the group's cells without a counterpart of the baseline so far.
     :param scenarios: number of different scenarios of the pairs.
+    :param participants: number of their different participants.
     :param runs: number of different pairs of runs.
-    :param clustered: what varies by chance: scenarios, or pairs of runs of one scenario.
+    :param clustered: likewise.
     :param estimates: group minus baseline, in the order of `Summary.measures`.
     """
 
@@ -91,8 +97,9 @@ class PairedDifferences:
     both_failed: int
     unpaired: int
     scenarios: int
+    participants: int
     runs: int
-    clustered: Literal['scenarios', 'runs']
+    clustered: Clustered
     estimates: tuple[Estimate, ...]
 
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from crgame_ros.evaluation.summary.evaluated_parts import FACTORS
+from crgame_ros.evaluation.results.cell_rows import FACTORS
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
 from crgame_ros.evaluation.summary.summary import (
+    Clustered,
     Estimate,
     GroupMeans,
     PairedDifferences,
@@ -22,6 +23,16 @@ _SHARE_OF_NONE = ('an interval from 0 to 0 says that no cell has the event: afte
                   'without it, its rate may still be 3/n')
 _BY_CHANCE = ('better and worse: a difference that is not negligible and, among all of this table '
               'together, beyond chance at 5 % (Holm); each interval is of its own measure alone')
+
+
+_CLUSTERS: dict[Clustered, str] = {
+    'scenarios': "are Student's, of the scenarios' means: they apply to similar scenarios",
+    'scenarios and participants': 'allow for what scenarios and participants do to their runs: '
+                                  'they apply to similar scenarios and people',
+    'participants': "are Student's, of the participants' means: they apply to this scenario, with "
+                    'similar people',
+    'runs': "are Student's, of different runs: they apply to this scenario alone; equal runs "
+            'count as one'}
 
 
 class SummaryCell(NamedTuple):
@@ -118,8 +129,10 @@ def quantity(value: float, measure: SummaryMeasure, signed: bool = False) -> str
 
 def _means(summary: Summary) -> SummaryTable:
     counts = SummaryCell('cells finished'), *(SummaryCell(
-        str(group.cells), _scenarios(group.scenarios) + (
-            '' if group.runs >= group.cells else f', {group.runs} different runs'))
+        str(group.cells), ', '.join((
+            _number(group.scenarios, 'scenario'),
+            *((_number(group.participants, 'participant'),) if group.participants else ()),
+            *((f'{group.runs} different runs',) if group.runs < group.cells else ()))))
         for group in summary.groups)
     rows = [counts]
     for place, measure in known_measures(summary):
@@ -150,23 +163,18 @@ def _group(group: GroupMeans | PairedDifferences) -> str:
     return group_name(group.labels)
 
 
-def _scenarios(count: int) -> str:
-    return f'{count} scenario{"" if count == 1 else "s"}'
+def _number(count: int, thing: str) -> str:
+    return f'{count} {thing}{"" if count == 1 else "s"}'
 
 
 def _clusters(groups: Sequence[GroupMeans] | Sequence[PairedDifferences]) -> Iterator[str]:
     """Yield notes on what varies by chance in the intervals, and what they apply to."""
-    kinds: dict[str, list[str]] = {}
+    kinds: dict[Clustered, list[str]] = {}
     for group in groups:
         kinds.setdefault(group.clustered, []).append(_group(group))
     for kind, names in sorted(kinds.items()):
         whose = '' if len(kinds) == 1 else f'of {", ".join(names)}: '
-        if kind == 'scenarios':
-            yield (f"{whose}95 % intervals are Student's, of the scenarios' means: they apply to "
-                   'similar scenarios')
-        else:
-            yield (f"{whose}95 % intervals are Student's, of different runs: they apply to this "
-                   'scenario alone; equal runs count as one')
+        yield f'{whose}95 % intervals {_CLUSTERS[kind]}'
 
 
 def _estimate(found: Estimate, measure: SummaryMeasure, signed: bool = False) -> SummaryCell:

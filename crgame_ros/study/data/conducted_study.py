@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from crgame_ros.errors import InputError
+from crgame_ros.recording.run_folder import PARTICIPANTS, STUDY_FILE
 from crgame_ros.study.data.participant_record import ParticipantRecord, read_participant
 from crgame_ros.study.file import load_study, StudyFile
 
-STUDY, PARTICIPANTS, DATA = 'study', 'participants', 'data'
+DATA = 'data'
 
 
 class ConductedStudy:
@@ -23,7 +24,7 @@ class ConductedStudy:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.study_path = path / STUDY / 'study.yaml'
+        self.study_path = path / STUDY_FILE
         if not self.study_path.is_file():
             raise InputError('holds no study' if path.exists() else 'there is no such folder',
                              str(path), 'name the folder that `crgame study run` has made')

@@ -11,7 +11,6 @@ from typing import Any
 from crgame_ros.analysis.report.text import free, note, number, plain, table
 from crgame_ros.schema.writing import write
 from crgame_ros.software import software_with_commit
-from crgame_ros.study.data.conducted_study import STUDY
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.timing_quality import BOUNDS
 from crgame_ros.study.data.trials_table import measure_columns
@@ -28,7 +27,7 @@ def provenance_of(data: StudyData) -> dict[str, Any]:
     :raises InputError: if a file of the study cannot be read.
     """
     study, folder = data.folder.study, data.folder
-    files = sorted(path for path in (folder.path / STUDY).rglob('*') if path.is_file())
+    files = sorted(path for path in folder.study_path.parent.rglob('*') if path.is_file())
     return {
         'study': study.name, 'title': study.title.in_language(study.language),
         'file': folder.relative(folder.study_path), 'seed': study.seed,

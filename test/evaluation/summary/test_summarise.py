@@ -7,11 +7,13 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
+from crgame_ros.evaluation.results.cell_rows import FACTORS
 from crgame_ros.evaluation.summary.cell_block import CellBlocks
 from crgame_ros.evaluation.summary.evaluated_parts import EvaluatedParts
 from crgame_ros.evaluation.summary.measures import MEASURES
 from crgame_ros.evaluation.summary.summarise import summarise
 from crgame_ros.evaluation.summary.summary import Estimate, Summary
+from crgame_ros.evaluation.summary.tables import summary_tables
 from evaluation_rows import Evaluation, many
 import numpy as np
 import pyarrow as pa
@@ -99,7 +101,8 @@ def test_only_cells_that_are_alike_are_pairs(tmp_path: Path) -> None:
 
 
 def test_the_worst_cells_come_contacts_first(two: Summary) -> None:
-    assert [(cell.values, cell.factors[2], cell.vehicle) for cell in two.worst[:3]] == [
+    planner = FACTORS.index('planner')
+    assert [(cell.values, cell.factors[planner], cell.vehicle) for cell in two.worst[:3]] == [
         ((1.0, 1.5), 'mine', 'av0'), ((1.0, 5.0), 'mine', 'av0'), ((0.0, 2.0), 'idm', 'av0')]
     assert len(two.worst) == 10 and len({cell.key for cell in two.worst}) == 10
     # A failed cell is not among them.
@@ -130,6 +133,25 @@ def test_scenarios_vary_by_chance_or_the_runs_of_a_single_one(tmp_path: Path,
     assert (one.clusters, several.clusters) == (1, 2) and math.isnan(one.low)
     assert found.differences[0].runs == 2
     assert _of(found, 'distance', 'mine', difference=True).clusters == 2
+
+
+@pytest.mark.parametrize('scenarios, clustered', [
+    (1, 'participants'), (4, 'scenarios and participants')])
+def test_participants_vary_by_chance_too(tmp_path: Path, scenarios: int, clustered: str) -> None:
+    """Three participants with six runs each: their means differ more than the runs of each."""
+    rows = Evaluation()
+    for run in range(18):
+        rows.add(scenario=f'ZAM_S-{run % scenarios}_1_T-1', human=f'run {run}',
+                 participant=f'P{run % 3}', avs=[{'distance': 10.0 * (run % 3) + 0.1 * run}])
+    found = summarise(rows.write(tmp_path / 'rows'))
+    group, = found.groups
+    assert (group.clustered, group.participants, group.scenarios, group.runs) == (
+        clustered, 3, scenarios, 18)
+    distance = _of(found, 'distance', 'idm')
+    # Of the participants' means, 0.75, 10.85 and 20.95, it would be 25 m to each side.
+    assert distance.high - distance.low > 40.0
+    assert distance.clusters == (3 if scenarios == 1 else scenarios)
+    assert 'participants' in next(summary_tables(found)).notes[1]
 
 
 def test_a_difference_of_means_is_the_mean_of_differences(tmp_path: Path) -> None:
