@@ -2,19 +2,19 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Check that a run does not depend on where its map lies: turned, and moved to UTM coordinates.
+Check that a run does not depend on where its map lies: turned, in UTM coordinates, mirrored.
 
     python benchmarks/invariance.py
     python benchmarks/invariance.py scenarios/merge.yaml --angles 45 --duration 20
     python benchmarks/invariance.py FOLDER/*.xml
 
 In a CommonRoad scenario with a planning problem, an AV drives among reactive traffic. Each game
-runs offline as it is and placed anew, with its planners, perception and traffic. The table gives
-the largest difference of positions, yaws and speeds, after the placement is undone.
+runs offline as it is and placed anew, with its planners, perception and traffic. In a mirrored map
+vehicles keep to the other side of the road; noise is not mirrored. The table gives the largest
+difference of positions, yaws and speeds, after the placement is undone.
 """
 
 import argparse
-import math
 from pathlib import Path
 import sys
 import tempfile
@@ -22,7 +22,7 @@ import tempfile
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
-from placed_runs import difference, run_placed, UTM  # noqa: E402, I100
+from placed_runs import difference, Placement, run_placed, UTM  # noqa: E402, I100
 
 
 def main() -> None:
@@ -37,17 +37,16 @@ def main() -> None:
     given = parser.parse_args()
     games = given.games or sorted(path for path in (ROOT / 'scenarios').glob('*.yaml')
                                   if path.name.count('.') == 1)
-    places = [*((math.radians(angle), (0.0, 0.0)) for angle in given.angles), (0.0, UTM)]
+    places = [*map(Placement, given.angles), Placement(offset=UTM), Placement(mirrored=True)]
     print(f'{"game":20} {"placed":>8} {"position":>10} {"yaw":>10} {"speed":>10}')
     with tempfile.TemporaryDirectory() as folder:
         for game in games:
-            first = run_placed(game, Path(folder), 0.0, (0.0, 0.0), given.duration)
-            for angle, offset in places:
-                found = difference(first, run_placed(game, Path(folder), angle, offset,
-                                                     given.duration), angle, offset)
-                name = 'UTM' if any(offset) else f'{math.degrees(angle):g}°'
-                print(f'{game.stem:20} {name:>8}', *(f'{each:10.1e}' for each in found),
-                      flush=True)
+            first, *others = (
+                run_placed(game, Path(folder, place.name), place, given.duration)
+                for place in (Placement(), *places))
+            for place, other in zip(places, others, strict=True):
+                print(f'{game.stem:20} {place.name:>8}',
+                      *(f'{each:10.1e}' for each in difference(first, other, place)), flush=True)
 
 
 if __name__ == '__main__':
