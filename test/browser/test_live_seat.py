@@ -101,10 +101,10 @@ def test_the_delay_of_a_device_at_the_machine_is_shown(page: LivePage, graph: Gr
         publisher.publish(Joy(axes=[0.0, 0.0, 0.2 + 0.1 * (next(numbers) % 2), 0.0, 0.0, 1.0],
                               buttons=[0] * 11))
         graph.peer.listen_for(0.04)
-        return 'to the state that obeys' in page.text('li[data-device="hv1"]')
+        return 'input latency' in page.text('li[data-device="hv1"]')
     graph.peer.wait_until(shown, 'the delay of the device', PATIENCE_S)
     text = page.text('li[data-device="hv1"]')
-    assert text.startswith('generic_gamepad') and 'ms to the command' in text
+    assert text.startswith('generic_gamepad') and 'command latency' in text
 
 
 def test_once_more_needs_no_second_start(page: LivePage) -> None:

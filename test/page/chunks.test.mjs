@@ -241,7 +241,7 @@ test('after a jump the plots get the status of the last two minutes, then the pr
   () => {
     const planners = [...Array(300).keys()].map((second) => [second, {}]);
     const { told, shown } = documentsOf({ planners });
-    shown.tellPast(now(200));
+    shown.replayStatus(now(200));
     const times = told.map(({ t }) => t);
     // After 80 s and before 200 s, one a second, and now.
     assert.deepEqual([times[0], times.at(-2), times.at(-1), times.length], [81, 199, 200, 120]);

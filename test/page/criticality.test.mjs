@@ -17,7 +17,7 @@ const frame = (n, ...rows) => frameOf(KIND.CRITICALITY, 0, n, n / 10, n / 100, r
   ...rows.flat());
 const logOf = (keeps_s, ...frames) => {
   const log = new CriticalityLog(keeps_s);
-  frames.forEach((each) => log.take(decodeFrame(each)));
+  frames.forEach((each) => log.add(decodeFrame(each)));
   return log;
 };
 
@@ -54,7 +54,7 @@ test('the worst past value is the smallest, for decelerations the greatest', () 
 test('a repeated step replaces all values from it on, and old values are dropped', () => {
   const log = logOf(0.15, ...[10, 20, 30, 20].map((n) => frame(n, row(0, { ttc: n }))));
   close(log.past(0, 'ttc').values, [20]);
-  log.take(decodeFrame(frame(30, row(0, { ttc: 7 }))));
+  log.add(decodeFrame(frame(30, row(0, { ttc: 7 }))));
   close(log.past(0, 'ttc').values, [20, 7]);
 });
 

@@ -26,7 +26,7 @@ function rest(t, left_s, text = '') {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   const pictures = new Pictures();
   const words = new Words();
-  words.take({ next: 'Next', break: 'Break', break_left: 'Not before {time}',
+  words.load({ next: 'Next', break: 'Break', break_left: 'Not before {time}',
     break_over: 'Go on whenever you are ready.' });
   const done = [];
   const node = breakView({ text, left_s }, words, () => done.push(1));

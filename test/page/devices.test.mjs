@@ -236,11 +236,11 @@ test('a refused request to be put back is reported once', (t) => {
   /** @param {object[]} before @param {object[]} after events at the request, and later */
   const ask = (before, after) => {
     store.fired = before;
-    notice.take('hv0', true);
-    notice.take('hv0', true);
+    notice.update('hv0', true);
+    notice.update('hv0', true);
     store.fired = after;
     t.mock.timers.tick(2000);
-    notice.take('hv0', false);
+    notice.update('hv0', false);
     return told.splice(0).length;
   };
   assert.equal(ask([], []), 0);

@@ -88,7 +88,7 @@ test('a device at the machine of the game is listed after the people, with its d
     input_delay_ms: 20.4 }, { seat: 'hv0', device: 'wheel', command_ms: null,
     input_delay_ms: null }]);
   assert.deepEqual(rows(), ['Ada (you) director', 'generic_gamepad drives hv1 at the machine of '
-    + 'the game 1.3 ms to the command, 20 ms to the state that obeys',
+    + 'the game command latency 1.3 ms, input latency 20 ms',
   'wheel drives hv0 at the machine of the game']);
 });
 

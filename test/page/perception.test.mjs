@@ -62,7 +62,7 @@ const seen = (t, ...columns) => (
 test('the planner\'s request is valid for a second', () => {
   const perceived = new Perceived();
   assert.equal(perceived.seenBy(1, 0), null);
-  perceived.take(seen(10, 0, 2));
+  perceived.add(seen(10, 0, 2));
   close(perceived.seenBy(1, 10.99), [0, 2]);
   assert.equal(perceived.seenBy(1, 11.01), null);
   assert.equal(perceived.seenBy(0, 10), null);
@@ -76,14 +76,14 @@ const estimate = (n, more) => ({ kind: KIND.ESTIMATE, index: 1, n, t: n / 100, x
 
 test('an estimate is extrapolated along its motion', () => {
   const perceived = new Perceived();
-  perceived.take(estimate(100, { x: 5, yaw: Math.PI / 2, speed: 10, xx: 0.5 }));
+  perceived.add(estimate(100, { x: 5, yaw: Math.PI / 2, speed: 10, xx: 0.5 }));
   const { n, x, y, yaw, xx } = perceived.estimateOf(1, 1.2);
   close([n, x, y, yaw, xx], [100, 5, 2, Math.PI / 2, 0.5]);
 });
 
 test('in a bend it is extrapolated along the circle up to the third order', () => {
   const perceived = new Perceived();
-  perceived.take(estimate(100, { speed: 10, yaw_rate: 0.5 }));
+  perceived.add(estimate(100, { speed: 10, yaw_rate: 0.5 }));
   const { x, y, yaw } = perceived.estimateOf(1, 1.1);
   // Radius 20 m, 0.05 rad of it.
   close([x, y], [20 * Math.sin(0.05), 20 * (1 - Math.cos(0.05))], 1.1e-4);
@@ -92,7 +92,7 @@ test('in a bend it is extrapolated along the circle up to the third order', () =
 
 test('the estimate of the shown time counts, and none that is too old', () => {
   const perceived = new Perceived();
-  [100, 110, 120].forEach((n) => perceived.take(estimate(n, { x: n })));
+  [100, 110, 120].forEach((n) => perceived.add(estimate(n, { x: n })));
   assert.deepEqual([1.05, 1.1, 1.15, 1.2, 1.69].map((t) => perceived.estimateOf(1, t).n),
     [100, 110, 110, 120, 120]);
   assert.equal(perceived.estimateOf(1, 1.71), null);
@@ -101,13 +101,13 @@ test('the estimate of the shown time counts, and none that is too old', () => {
 
 test('an estimate beyond half a turn comes out within it', () => {
   const perceived = new Perceived();
-  perceived.take(estimate(100, { yaw: 3, yaw_rate: 2 }));
+  perceived.add(estimate(100, { yaw: 3, yaw_rate: 2 }));
   close(perceived.estimateOf(1, 1.2).yaw, 3.4 - 2 * Math.PI);
 });
 
 test('scans: the newest of each sensor, for two periods and 0.3 s', () => {
   const perceived = new Perceived();
-  const scan = (sensor, t, index = 1) => perceived.take(
+  const scan = (sensor, t, index = 1) => perceived.add(
     { kind: KIND.SCAN, index, sensor, t, period_s: 0.1 });
   scan(0, 1.0);
   scan(0, 1.1);
@@ -122,8 +122,8 @@ test('scans: the newest of each sensor, for two periods and 0.3 s', () => {
 test('a reset clears the perception and keeps the map', () => {
   const perceived = new Perceived();
   const map = { kind: KIND.OCCUPANCY, rows: 1 };
-  perceived.take(map);
-  perceived.take(seen(0));
+  perceived.add(map);
+  perceived.add(seen(0));
   perceived.clear();
   assert.equal(perceived.seenBy(1, 0), null);
   assert.equal(perceived.occupancy, map);

@@ -33,7 +33,7 @@ beforeEach(() => {
   root = openPage();
   expose('sessionStorage', 'HTMLTextAreaElement');
   words = new Words();
-  words.take(TABLE);
+  words.load(TABLE);
   [now_s, told] = [1000, []];
 });
 

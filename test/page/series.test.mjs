@@ -70,10 +70,10 @@ const status = (t, latency_ms, lag) => ({
 test('figures are kept for a limited time, and replaced if a replay goes back', () => {
   const log = new HealthLog(10);
   for (const t of [0, 1, 2, 11, 12]) {
-    log.take(status(t, 10 * t, t));
+    log.add(status(t, 10 * t, t));
   }
   assert.deepEqual(log.t, [2, 11, 12]);
-  log.take(status(11, 5, 6));
+  log.add(status(11, 5, 6));
   assert.deepEqual([log.t, log.column('lag'), log.latency('av0')], [[2, 11], [2, 6], [20, 5]]);
   assert.ok(log.latency('av9').every(Number.isNaN));
   log.clear();
@@ -82,9 +82,9 @@ test('figures are kept for a limited time, and replaced if a replay goes back', 
 
 test('a status without time, timing or planners gives no figures', () => {
   const log = new HealthLog(10);
-  log.take({ t: null });
+  log.add({ t: null });
   assert.deepEqual(log.t, []);
-  log.take({ t: 1, timing: null });
+  log.add({ t: 1, timing: null });
   assert.ok(Number.isNaN(log.column('step_error')[0]));
 });
 
@@ -118,7 +118,7 @@ test('pedals are two lines a vehicle, in per cent; the value is that of the show
 
 test('latency has lines of AVs only, drift those of the run', () => {
   const health = new HealthLog(100);
-  health.take(status(1, 42, 7));
+  health.add(status(1, 42, 7));
   const data = { vehicles: [vehicle('hv0', 'human', {}), vehicle('av0', 'autonomous', {})],
     health, runColor: 'grey' };
   const latency = traces(quantity('latency'), data, VIEW);

@@ -164,7 +164,7 @@ test('events of the game hide plans and show them again', () => {
   const hide = { name: 'a', kind: 'plan_display', av: 'av0', show: false };
   const events = [hide, { ...hide, name: 'b', show: true }, { name: 'c', kind: 'release' }];
   const after = (...names) => {
-    plans.takeEvents({ events }, names.map((name) => ({ name })));
+    plans.applyEvents({ events }, names.map((name) => ({ name })));
     return [plans.shows('av0'), plans.shows('av1')];
   };
   assert.deepEqual([after(), after('a'), after('a', 'c'), after('a', 'b'), after('b', 'a')],

@@ -36,16 +36,16 @@ test('the light is on for its time; an answer is accepted for longer', () => {
   const prompt = drawn(new RunningTime());
   assert.deepEqual([10_029, 10_030, 11_029, 11_030].map((at) => prompt.lit(at)),
     [true, true, true, false]);
-  assert.deepEqual([10_029, 10_030, 12_530, 12_531].map((at) => prompt.takes(at)),
+  assert.deepEqual([10_029, 10_030, 12_530, 12_531].map((at) => prompt.accepts(at)),
     [false, true, true, false]);
   prompt.answered = true;
-  assert.equal(prompt.lit(10_100) || prompt.takes(10_100), false);
+  assert.equal(prompt.lit(10_100) || prompt.accepts(10_100), false);
 });
 
 test('no answer is accepted before the light is drawn', () => {
   const prompt = new Prompt({ task: 'light', seat: 'hv0', number: 1, n: 300, seen: false }, LIGHT,
     new RunningTime(), 10_000, NaN);
-  assert.equal(prompt.takes(10_500) || prompt.lit(10_500), false);
+  assert.equal(prompt.accepts(10_500) || prompt.lit(10_500), false);
 });
 
 test('pauses count neither for the light nor for the response', () => {

@@ -8,14 +8,14 @@ import { test } from 'node:test';
 import { close, recordPaths } from './support.mjs';
 
 recordPaths();
-const { lookOf, TYRE } = await import(
+const { vehicleLook, TYRE } = await import(
   '../../crgame_ros/cockpit/page/js/world/vehicle_shape.js');
 
 const rectangle = (length, width) => ({ kind: 'rectangle', length, width, vertices: [] });
 const parts = (look) => ['glass', 'roof', 'lamps', 'brakes'].filter((name) => look[name]);
 
 test('a car has its length and width, but for the bow of its bumper', () => {
-  const { body, extent, radius } = lookOf('car', rectangle(4.5, 1.8), true);
+  const { body, extent, radius } = vehicleLook('car', rectangle(4.5, 1.8), true);
   const [xmin, ymin, xmax, ymax] = body.box;
   close([xmin, ymin, ymax], [-2.25, -0.9, 0.9]);
   // The control point of the bow is one per cent of half its width before it.
@@ -26,20 +26,20 @@ test('a car has its length and width, but for the bow of its bumper', () => {
 
 for (const [type, length, width] of [['truck', 12, 2.5], ['bus', 18, 2.5]]) {
   test(`a ${type} has its length and width`, () => {
-    const look = lookOf(type, rectangle(length, width), true);
+    const look = vehicleLook(type, rectangle(length, width), true);
     close(look.body.box, [-length / 2, -width / 2, length / 2, width / 2]);
     assert.deepEqual(parts(look), ['glass', 'lamps', 'brakes']);
   });
 }
 
 test('only a truck has a gap between cab and load', () => {
-  const glass = (type) => lookOf(type, rectangle(12, 2.5), true).glass.pieces.length;
+  const glass = (type) => vehicleLook(type, rectangle(12, 2.5), true).glass.pieces.length;
   assert.deepEqual([glass('truck'), glass('bus')], [2, 1]);
 });
 
 test('lamps are at the front and brake lights at the back, within the outline', () => {
   for (const type of ['car', 'truck']) {
-    const { lamps, brakes } = lookOf(type, rectangle(5, 2), true);
+    const { lamps, brakes } = vehicleLook(type, rectangle(5, 2), true);
     assert.ok(lamps.box[0] > 0 && lamps.box[2] <= 2.5, `${lamps.box}`);
     assert.ok(brakes.box[2] < 0 && brakes.box[0] >= -2.5, `${brakes.box}`);
     for (const { box } of [lamps, brakes]) {
@@ -50,26 +50,26 @@ test('lamps are at the front and brake lights at the back, within the outline', 
 });
 
 test('a windscreen is in the front half, so that the heading is visible', () => {
-  const { glass, roof } = lookOf('car', rectangle(4.5, 1.8), true);
+  const { glass, roof } = vehicleLook('car', rectangle(4.5, 1.8), true);
   assert.ok(glass.box[2] > roof.box[2], 'before the roof');
 });
 
 test('a shape unlike a car is a block with a nose, or without one if static', () => {
-  assert.deepEqual(parts(lookOf('car', rectangle(12, 1.8), true)), ['glass']);
-  assert.deepEqual(parts(lookOf('unknown', rectangle(4, 4), false)), []);
-  assert.deepEqual(parts(lookOf('car', rectangle(4.5, 1.8), false)), []);
-  assert.equal(parts(lookOf('parkedVehicle', rectangle(4.5, 1.8), false)).length, 4);
+  assert.deepEqual(parts(vehicleLook('car', rectangle(12, 1.8), true)), ['glass']);
+  assert.deepEqual(parts(vehicleLook('unknown', rectangle(4, 4), false)), []);
+  assert.deepEqual(parts(vehicleLook('car', rectangle(4.5, 1.8), false)), []);
+  assert.equal(parts(vehicleLook('parkedVehicle', rectangle(4.5, 1.8), false)).length, 4);
 });
 
 test('a nose points ahead, within the block and in its front third', () => {
-  const [tip, ...base] = lookOf('car', rectangle(12, 1.8), true).glass.pieces[0];
+  const [tip, ...base] = vehicleLook('car', rectangle(12, 1.8), true).glass.pieces[0];
   assert.ok(base.every(([x]) => x < tip[0]));
   close(tip[1], 0);
   assert.ok([tip, ...base].every(([x, y]) => x > 2 && x <= 6 && Math.abs(y) <= 0.9));
 });
 
 test('glass and roof lie within the outline of a car', () => {
-  const { body, glass, roof } = lookOf('car', rectangle(4.5, 1.8), true);
+  const { body, glass, roof } = vehicleLook('car', rectangle(4.5, 1.8), true);
   for (const { box } of [glass, roof]) {
     assert.ok(box[0] > body.box[0] && box[2] < body.box[2], `${box}`);
     assert.ok(box[1] > body.box[1] && box[3] < body.box[3], `${box}`);
@@ -78,16 +78,16 @@ test('glass and roof lie within the outline of a car', () => {
 });
 
 test('a circle and a polygon keep their shape', () => {
-  const { body } = lookOf('pillar', { kind: 'circle', length: 3, width: 3, vertices: [] }, false);
+  const { body } = vehicleLook('pillar', { kind: 'circle', length: 3, width: 3, vertices: [] }, false);
   assert.deepEqual(body.arcs, [{ x: 0, y: 0, rx: 1.5, ry: 1.5 }]);
   const triangle = { kind: 'polygon', length: 2, width: 1, vertices: [-1, 0, 1, 0.5, 1, -0.5] };
-  const block = lookOf('building', triangle, false).body;
+  const block = vehicleLook('building', triangle, false).body;
   assert.deepEqual(block.pieces, [[[-1, 0], [1, 0.5], [1, -0.5]]]);
   assert.equal(block.closed, 1);
 });
 
 test('a pedestrian is an ellipse of its size, and a nose that points ahead', () => {
-  const { body } = lookOf('pedestrian', rectangle(0.4, 0.6), true);
+  const { body } = vehicleLook('pedestrian', rectangle(0.4, 0.6), true);
   const [base, tip, other] = body.pieces.at(-1);
   close([base[0] - other[0], base[1] + other[1], tip[1]], [0, 0, 0]);
   assert.ok(tip[0] > base[0] && Math.abs(base[1]) < 0.3);
@@ -96,7 +96,7 @@ test('a pedestrian is an ellipse of its size, and a nose that points ahead', () 
 });
 
 test('a bicycle has its length, and its handlebar its width', () => {
-  const { body } = lookOf('bicycle', rectangle(1.8, 0.7), true);
+  const { body } = vehicleLook('bicycle', rectangle(1.8, 0.7), true);
   const [xmin, ymin, xmax, ymax] = body.box;
   close([xmin, ymin, xmax, ymax], [-0.9, -0.35, 0.9, 0.35]);
 });

@@ -170,12 +170,12 @@ test('the quality control finds a pixel ratio within the time for a picture', ()
     const quality = new Quality(true, 1);
     const cost = () => 2 + factor * quality.ratio ** 2;
     for (let now_ms = 0; now_ms < 60000; now_ms += 500) {
-      quality.take(cost(), now_ms);
+      quality.adjust(cost(), now_ms);
     }
     assert.ok(cost() <= 16 || quality.ratio <= 0.25, `${factor}: ${quality.ratio}`);
     const settled = quality.ratio;
     for (let now_ms = 60000; now_ms < 90000; now_ms += 500) {
-      quality.take(cost(), now_ms);
+      quality.adjust(cost(), now_ms);
     }
     assert.equal(quality.ratio, settled);
     quality.sharp = true;
@@ -194,7 +194,7 @@ test('detail is dropped when pictures take too long, and returns when they do no
     let now_ms = 0;
     const settle = (cost_ms) => {
       for (let i = 0; i < 400; i += 1) {
-        quality.take(cost_ms, now_ms);
+        quality.adjust(cost_ms, now_ms);
         now_ms += 500;
       }
     };
@@ -218,7 +218,7 @@ test('a quality that took too long is retried ever more rarely', () => {
   const tries = [];
   for (let now_ms = 0; now_ms < 600_000; now_ms += 500) {
     const before = quality.ratio;
-    quality.take(cost(), now_ms);
+    quality.adjust(cost(), now_ms);
     if (quality.ratio > before) {
       tries.push(now_ms);
     }
@@ -231,11 +231,11 @@ test('a quality that took too long is retried ever more rarely', () => {
 
 test('slow software pictures come less often, but at least 20 times a second', () => {
   const quality = new Quality(true, 1);
-  quality.take(5, 0);
+  quality.adjust(5, 0);
   assert.equal(quality.period_ms, 33);
-  quality.take(12, 100);
+  quality.adjust(12, 100);
   assert.equal(quality.period_ms, 40);
-  quality.take(500, 200);
+  quality.adjust(500, 200);
   assert.equal(quality.period_ms, 50);
 });
 

@@ -62,7 +62,7 @@ export class CriticalityLog {
    *
    * @param {CriticalityFrame} frame
    */
-  take(frame) {
+  add(frame) {
     while ((this.#frames.at(-1)?.n ?? -1) >= frame.n) {
       this.#frames.pop();
     }

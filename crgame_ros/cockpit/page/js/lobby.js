@@ -16,7 +16,7 @@ class Lobby {
   #list = element('ul', { class: 'lobby-seats' });
   #note = element('p', { class: 'drive-note', role: 'status' });
   #ready = element('button', { type: 'button', class: 'drive-button primary wide',
-    on: { click: () => this.#sayReady() } });
+    on: { click: () => this.#toggleReady() } });
   #all = element('button', { type: 'button', class: 'drive-button', text: 'Start for all',
     title: 'Begin as soon as everybody has the hands on the controls',
     on: { click: () => this.#request({ type: 'control', action: 'start', all: true }) } });
@@ -93,7 +93,7 @@ class Lobby {
       element('span', { class: 'lobby-state', text: state }));
   }
 
-  #sayReady() {
+  #toggleReady() {
     const seat = this.#mine;
     if (seat !== undefined) {
       this.#ready.blur();

@@ -101,7 +101,7 @@ class People {
     // A select that keeps the focus would take the driving keys.
     this.#role.blur();
     sessionStorage.setItem(ROLE, this.#role.value);
-    this.#take(this.#role.value);
+    this.#requestRole(this.#role.value);
   }
 
   /** Restore the chosen role: a new connection begins with all granted rights. */
@@ -110,12 +110,12 @@ class People {
       ?? new URLSearchParams(window.location.search).get('role');
     if (this.#store.me.id !== '' && this.#store.mode === 'live' && role !== this.#refused
         && ROLES.some(([known]) => known === role)) {
-      this.#take(/** @type {string} */ (role));
+      this.#requestRole(/** @type {string} */ (role));
     }
   }
 
   /** @param {string} role */
-  async #take(role) {
+  async #requestRole(role) {
     const { ok, text } = await this.#connection.request({ type: 'role', role });
     if (!ok) {
       this.#refused = role;
@@ -147,8 +147,8 @@ class People {
 /** @param {DeviceDelay} delay */
 function deviceRow({ seat, device, command_ms, input_delay_ms }) {
   const delays = [
-    command_ms === null ? '' : `${command_ms.toFixed(1)} ms to the command`,
-    input_delay_ms === null ? '' : `${input_delay_ms.toFixed(0)} ms to the state that obeys`,
+    command_ms === null ? '' : `command latency ${command_ms.toFixed(1)} ms`,
+    input_delay_ms === null ? '' : `input latency ${input_delay_ms.toFixed(0)} ms`,
   ].filter(Boolean).join(', ');
   return element('li', { 'data-device': seat }, element('strong', { text: oneLine(device) }),
     element('span', { text: `drives ${seat} at the machine of the game` }),

@@ -48,7 +48,7 @@ export class Perceived {
    *
    * @param {PerceptionFrame} frame decoded frame
    */
-  take(frame) {
+  add(frame) {
     switch (frame.kind) {
       case KIND.SEEN: this.#seen.set(frame.index, frame); break;
       case KIND.SCAN: this.#scans.set(`${frame.index}:${frame.sensor}`, frame); break;

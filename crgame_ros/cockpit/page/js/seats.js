@@ -90,7 +90,7 @@ class Seats {
       this.#rebuild(rows, none);
     }
     if (!this.#stale) {
-      this.#tell(seats);
+      this.#announce(seats);
       this.#before = seats;
     }
   }
@@ -267,7 +267,7 @@ class Seats {
    *
    * @param {Record<string, Seat>} seats
    */
-  #tell(seats) {
+  #announce(seats) {
     const { me } = this.#store;
     for (const [id, seat] of Object.entries(seats)) {
       const before = this.#before[id];

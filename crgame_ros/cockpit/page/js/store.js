@@ -206,7 +206,7 @@ export class Store {
     this.#fresh &&= frame.kind !== KIND.STATE;
     this.#shownFor_ms = NaN;
     switch (frame.kind) {
-      case KIND.STATE: this.#takeState(frame, now_ms); break;
+      case KIND.STATE: this.#receiveState(frame, now_ms); break;
       case KIND.OBJECTS: this.steps.push(frame); this.#emit('objects', frame); break;
       case KIND.PLAN: this.plans.set(frame.index, frame); this.#emit('plan', frame); break;
       case KIND.PREDICTION:
@@ -214,11 +214,11 @@ export class Store {
         this.#emit('prediction', frame);
         break;
       case KIND.CRITICALITY:
-        this.criticality.take(frame);
+        this.criticality.add(frame);
         this.#emit('criticality', frame);
         break;
       default:
-        this.perceived.take(frame);
+        this.perceived.add(frame);
         this.#emit('perception', frame);
     }
   }
@@ -335,7 +335,7 @@ export class Store {
    * @param {StateFrame} frame
    * @param {number} now_ms
    */
-  #takeState(frame, now_ms) {
+  #receiveState(frame, now_ms) {
     if ((this.samples.newest?.vehicles.length ?? frame.vehicles.length)
         !== frame.vehicles.length) {
       this.samples.clear();

@@ -6,9 +6,9 @@
 /** @import { ViewMessage } from './messages.js' */
 /** @import { Store } from './store.js' */
 
-const LOOK_EVERY_MS = 100;
+const CHECK_EVERY_MS = 100;
 // The picture rate is reported once a second [ms].
-const TELL_EVERY_MS = 1000;
+const SEND_EVERY_MS = 1000;
 const DEGREES = 180 / Math.PI;
 
 /** A periodic report of the view; in `window.crgame.viewReport`. */
@@ -16,8 +16,8 @@ class ViewReport {
   #connection;
   #store;
   #stage;
-  #told = '';
-  #told_ms = -Infinity;
+  #sent = '';
+  #sent_ms = -Infinity;
   #pictures = 0;
 
   /**
@@ -30,25 +30,25 @@ class ViewReport {
     this.#store = store;
     this.#connection = connection;
     store.on('hello', () => {
-      this.#told = '';
+      this.#sent = '';
     });
-    setInterval(() => this.#look(), LOOK_EVERY_MS);
+    setInterval(() => this.#report(), CHECK_EVERY_MS);
   }
 
-  #look() {
+  #report() {
     const now_ms = performance.now();
-    const since_ms = now_ms - this.#told_ms;
+    const since_ms = now_ms - this.#sent_ms;
     const text = JSON.stringify(this.#choice);
     if (this.#store.mode !== 'live' || window.crgame.ready !== true
-        || (text === this.#told && since_ms < TELL_EVERY_MS)) {
+        || (text === this.#sent && since_ms < SEND_EVERY_MS)) {
       return;
     }
     const pictures = this.#count;
     // The picture rate of a view that was just opened is not known yet.
-    const rate_hz = text === this.#told ? 1000 * (pictures - this.#pictures) / since_ms : null;
+    const rate_hz = text === this.#sent ? 1000 * (pictures - this.#pictures) / since_ms : null;
     if (this.#connection.send({ ...this.#choice, ratio: this.#ratio, rate_hz })) {
-      this.#told = text;
-      this.#told_ms = now_ms;
+      this.#sent = text;
+      this.#sent_ms = now_ms;
       this.#pictures = pictures;
     }
   }

@@ -34,7 +34,7 @@ export class Driving {
   #unplugged = false;
   // Text of the instruments while there is no connection.
   #lost = '';
-  #toldDevice = '';
+  #sentDevice = '';
   #putBackNotice;
 
   /**
@@ -53,7 +53,7 @@ export class Driving {
     });
     this.#sender = new InputSender(connection, () => {
       const { hands } = this;
-      this.#putBackNotice.take(this.seat, 'put_back' in hands && hands.put_back === 1);
+      this.#putBackNotice.update(this.seat, 'put_back' in hands && hands.put_back === 1);
       return hands;
     });
     this.gamepads = new Gamepads({
@@ -62,7 +62,7 @@ export class Driving {
       unplugged: () => this.#unplug(),
       listed: () => {
         this.#devicePanel?.list();
-        this.#tellDevice();
+        this.#sendDevice();
       },
     });
     this.calibration = new CalibrationDialog(
@@ -70,10 +70,10 @@ export class Driving {
     this.#devicePanel = new DevicePanel(this.gamepads, (index) => this.calibration.open(index));
     this.hud = new Hud(part(root, 'hud'), store, () => this.#subject(),
       this.keyboard);
-    store.on('seats', () => this.#takeSeat());
-    store.on('hello', () => this.#tellDevice(true));
+    store.on('seats', () => this.#updateSeat());
+    store.on('hello', () => this.#sendDevice(true));
     store.on('connection', (connected) => this.#connectionChanged(connected));
-    this.#takeSeat();
+    this.#updateSeat();
   }
 
   /** @returns {string|null} the seat that this page drives */
@@ -127,7 +127,7 @@ export class Driving {
     const { seat } = this;
     this.#leaveSeat();
     const reply = await this.#connection.request({ type: 'release', seat: seat ?? '' });
-    this.#takeSeat();
+    this.#updateSeat();
     return reply;
   }
 
@@ -144,9 +144,9 @@ export class Driving {
   }
 
   /** @param {boolean} [anew] send it even if the server has it already */
-  #tellDevice(anew = false) {
-    if (anew || this.device !== this.#toldDevice) {
-      this.#toldDevice = this.device;
+  #sendDevice(anew = false) {
+    if (anew || this.device !== this.#sentDevice) {
+      this.#sentDevice = this.device;
       this.#connection.send({ type: 'device', device: this.device });
     }
   }
@@ -164,7 +164,7 @@ export class Driving {
     }
   }
 
-  #takeSeat() {
+  #updateSeat() {
     const { seats, me } = this.#store;
     const mine = Object.keys(seats).filter((id) => seats[id].holder === me.id && me.id !== '');
     if (this.#store.mode !== 'live' || !this.#store.connected || mine.length === 0) {

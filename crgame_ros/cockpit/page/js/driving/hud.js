@@ -70,9 +70,9 @@ export class Hud {
     this.#parts = buildParts(keyboard);
     root.replaceChildren(this.#parts.banner, this.#parts.board);
     root.classList.add('hud');
-    store.on('scene', (scene) => this.#takeScene(scene));
-    store.on('events', ({ fired }) => this.#limits.takeEvents(fired));
-    this.#takeScene(store.scene);
+    store.on('scene', (scene) => this.#setScene(scene));
+    store.on('events', ({ fired }) => this.#limits.applyEvents(fired));
+    this.#setScene(store.scene);
     /** @param {number} now_ms */
     const frame = (now_ms) => {
       this.#draw(now_ms);
@@ -82,9 +82,9 @@ export class Hud {
   }
 
   /** @param {Scene|null} scene */
-  #takeScene(scene) {
+  #setScene(scene) {
     this.#limits = new SpeedLimits(scene);
-    this.#limits.takeEvents(this.#store.fired);
+    this.#limits.applyEvents(this.#store.fired);
     this.#vehicleId = null;
   }
 

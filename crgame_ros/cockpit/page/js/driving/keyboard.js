@@ -86,7 +86,7 @@ export class Keyboard {
    */
   press(code) {
     if (this.#enabled()) {
-      this.#take(code, performance.now());
+      this.#press(code, performance.now());
     }
   }
 
@@ -131,14 +131,14 @@ export class Keyboard {
     if (event.repeat) {
       return;
     }
-    this.#take(event.code, event.timeStamp);
+    this.#press(event.code, event.timeStamp);
   }
 
   /**
    * @param {string} code
    * @param {number} now_ms
    */
-  #take(code, now_ms) {
+  #press(code, now_ms) {
     if (ACTIONS[code] === 'reverse') {
       this.#reverseSince_ms = now_ms;
     } else if (!this.#held.has(code)) {

@@ -42,7 +42,7 @@ export class Keycaps {
         + 'comma and period indicators, J hazard lights, G horn, Backspace back on the lane '
         + 'after a contact' },
     ...this.#caps.values());
-    this.#takeLayout();
+    this.#readLayout();
   }
 
   /**
@@ -68,7 +68,7 @@ export class Keycaps {
   }
 
   /** Write the labels of the user's keyboard layout, if the browser knows it. */
-  async #takeLayout() {
+  async #readLayout() {
     const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => undefined);
     for (const [code, text, , , sign] of CAPS) {
       const key = layout?.get(code)?.toUpperCase() ?? text;

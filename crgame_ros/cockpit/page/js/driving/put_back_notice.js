@@ -28,17 +28,17 @@ export class PutBackNotice {
    * @param {string|null} seat
    * @param {boolean} asked whether the driver requests to be put back
    */
-  take(seat, asked) {
+  update(seat, asked) {
     const begins = asked && !this.#asked;
     this.#asked = asked;
     if (begins && seat !== null && standsAtContact(this.#store.fired, seat)) {
       clearTimeout(this.#timer);
-      this.#timer = setTimeout(() => this.#look(seat), IN_VAIN_MS);
+      this.#timer = setTimeout(() => this.#warn(seat), IN_VAIN_MS);
     }
   }
 
   /** @param {string} seat */
-  #look(seat) {
+  #warn(seat) {
     const { fired, status } = this.#store;
     if (status?.run === 'running' && standsAtContact(fired, seat)) {
       this.#store.receive({ type: 'notice', level: 'warn', text: IN_VAIN });

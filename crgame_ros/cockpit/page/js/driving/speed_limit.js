@@ -34,7 +34,7 @@ export class SpeedLimits {
    *
    * @param {FiredEvent[]} fired
    */
-  takeEvents(fired) {
+  applyEvents(fired) {
     for (const lane of this.#lanes) {
       lane.limit = lane.usual;
     }

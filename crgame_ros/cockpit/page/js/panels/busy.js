@@ -24,7 +24,7 @@ export class Busy {
    *
    * @param {string} words what is being done
    */
-  say(words) {
+  describe(words) {
     this.#words = words;
     if (this.#timer === 0) {
       this.#since = performance.now();

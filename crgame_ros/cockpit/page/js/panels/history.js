@@ -94,7 +94,7 @@ export class HistoryPanel {
     store.on('scene', () => this.#newScene());
     store.on('seats', () => this.#selectOwn());
     store.on('epoch', () => this.#health.clear());
-    store.on('status', (status) => this.#health.take(status));
+    store.on('status', (status) => this.#health.add(status));
     onThemeChange(() => this.#readTheme());
     this.#readTheme();
     if (store.scene !== null) {

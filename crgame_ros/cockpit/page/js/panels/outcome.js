@@ -198,7 +198,7 @@ class Outcome {
       this.#button('hold', 'How it went', () => this.#hold(),
         'Pause the run and show the result so far', 'drive-button', refused),
       this.#button('look', run === 'running' ? 'Pause and look again' : 'Look again',
-        () => this.#lookAgain(), 'The last 10 s once more', 'drive-button', refused),
+        () => this.#openLastSeconds(), 'The last 10 s once more', 'drive-button', refused),
       this.#button('again', 'Begin anew', () => this.#order('reset'),
         'The same game from its first step (hold R)', 'drive-button', against.reset),
       this.#button('close', '', () => this.#dismiss(), 'Close this and drive on', 'icon-button')];
@@ -211,7 +211,7 @@ class Outcome {
     this.#show();
   }
 
-  async #lookAgain() {
+  async #openLastSeconds() {
     if (await this.#still()) {
       window.crgame.lastSeconds?.open();
     }
@@ -274,7 +274,7 @@ class Outcome {
           'The next one of the list', 'drive-button', against.choose),
         this.#button('another', 'Another game', () => this.#another(),
           'Choose a game or a scenario', 'drive-button', against.choose),
-        this.#button('look', 'Last 10 s', () => this.#lookAgain(),
+        this.#button('look', 'Last 10 s', () => this.#openLastSeconds(),
           'Replay the last 10 s, in slow motion if you like', 'drive-button')),
     ].filter((item) => item !== null);
   }

@@ -10,7 +10,7 @@ import { clockTime, NONE, oneLine, plural } from './format.js';
 /** @import { Contact, Files, Recording, Status } from '../messages.js' */
 
 // Further entries of a kind are only counted.
-const MOST_TOLD = 5;
+const MOST_LISTED = 5;
 const REPORT = 'report.html';
 
 /**
@@ -58,9 +58,9 @@ export function why({ reason, t, contacts = [] }) {
 /** @param {Result} facts */
 export function table(facts) {
   const rows = facts.driven ? [
-    ['Contacts', told(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
+    ['Contacts', listed(facts.contacts, (item) => `${item.vehicle} with ${item.with}`,
       (item) => item.part)],
-    ['Off the road', told(facts.departures, (item) => item.vehicle)],
+    ['Off the road', listed(facts.departures, (item) => item.vehicle)],
   ] : [['Driven', 'no vehicle: traffic was alone']];
   for (const { id, name, accepted, refused, fallbacks } of facts.planners) {
     rows.push([`${id}${name ? ` · ${oneLine(name)}` : ''}`, [
@@ -92,11 +92,11 @@ export function part(contact, files) {
  * @param {(item: Item) => string} name
  * @param {(item: Item) => string} remark = () => ''
  */
-function told(items, name, remark = () => '') {
+function listed(items, name, remark = () => '') {
   if (items.length === 0) {
     return 'none';
   }
-  const texts = items.slice(0, MOST_TOLD).map(
+  const texts = items.slice(0, MOST_LISTED).map(
     (item) => `${name(item)} at ${clockTime(item.t)}${remark(item)}`);
   const more = items.length - texts.length;
   return [...texts, ...(more > 0 ? [`${more} more`] : [])].join('; ');

@@ -68,7 +68,7 @@ class ScenarioPanel {
       type: 'file', accept: '.xml,text/xml,application/xml', class: 'unseen', tabindex: '-1',
       'aria-label': 'CommonRoad file', on: {
         change: () => {
-          this.take([...file.files ?? []]);
+          this.upload([...file.files ?? []]);
           file.value = '';
         },
       },
@@ -92,7 +92,7 @@ class ScenarioPanel {
       /** @type {HTMLElement|null} */
       const tab = document.querySelector('#tab-scenario');
       tab?.click();
-      this.take(files);
+      this.upload(files);
     });
   }
 
@@ -120,7 +120,7 @@ class ScenarioPanel {
     this.#clearErrors();
     this.#list.mark(id);
     this.#start.disabled = true;
-    this.#busy.say('Reading the scenario …');
+    this.#busy.describe('Reading the scenario …');
     try {
       const preview = await fetchPreview(id, abort.signal);
       this.#show(preview);
@@ -139,7 +139,7 @@ class ScenarioPanel {
    *
    * @param {File[]} files
    */
-  async take(files) {
+  async upload(files) {
     this.#clearErrors();
     const [file] = files;
     const wrong = wrongFiles(files);
@@ -147,7 +147,7 @@ class ScenarioPanel {
       setText(this.#errors.upload, wrong);
       return;
     }
-    this.#busy.say(`Sending ${file.name} …`);
+    this.#busy.describe(`Sending ${file.name} …`);
     try {
       const id = await upload(file);
       await this.refresh();
@@ -162,11 +162,11 @@ class ScenarioPanel {
   async start() {
     this.#clearErrors();
     this.#start.disabled = true;
-    this.#busy.say('Loading …');
+    this.#busy.describe('Loading …');
     const begun = this.#nextRun();
     try {
       const text = await load({ id: this.#chosen, ...this.#form.choices });
-      this.#busy.say(text ? `${text.replace(/[.…\s]+$/, '')} …` : 'Loading …');
+      this.#busy.describe(text ? `${text.replace(/[.…\s]+$/, '')} …` : 'Loading …');
       this.#begun = this.#chosen;
       await begun.promise;
       if (this.#store.status?.run === 'paused' && !waitsForSeveral(this.#store)) {
@@ -248,7 +248,7 @@ class ScenarioPanel {
         const run = this.#store.status?.run;
         if (epoch > before && this.#store.status?.epoch === epoch) {
           if (run === 'waiting') {
-            this.#busy.say('Waiting for the planners …');
+            this.#busy.describe('Waiting for the planners …');
           } else {
             cancel();
             resolve();

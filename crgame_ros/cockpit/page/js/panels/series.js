@@ -110,7 +110,7 @@ export class HealthLog {
   }
 
   /** @param {Status} status as the server sends it */
-  take(status) {
+  add(status) {
     const { t } = status;
     if (!Number.isFinite(t)) {
       return;

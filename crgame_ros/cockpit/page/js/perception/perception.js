@@ -55,7 +55,7 @@ class Perception {
   #estimate = new EstimateLayer();
   #occupancy = new OccupancyLayer();
   #legend;
-  #told = '';
+  #sentLayers = '';
   #legended = '';
 
   /**
@@ -75,8 +75,8 @@ class Perception {
     this.#addButtons();
     store.on('scene', () => this.#load());
     store.on('hello', () => {
-      this.#told = '';
-      this.#tell();
+      this.#sentLayers = '';
+      this.#sendLayers();
     });
     setInterval(() => this.#showCount(stage), COUNT_EVERY_MS);
     this.#load();
@@ -139,7 +139,7 @@ class Perception {
     if (button !== undefined) {
       press(button, on);
     }
-    this.#tell();
+    this.#sendLayers();
     this.#world.redraw();
   }
 
@@ -187,7 +187,7 @@ class Perception {
       button.hidden = LAYERS[name][3] ? !perceiving : !scene?.occupancy;
     }
     this.#group.hidden = !perceiving && !scene?.occupancy;
-    this.#tell();
+    this.#sendLayers();
   }
 
   /** Return the index of the followed AV if its perception may be shown, else -1. */
@@ -197,13 +197,13 @@ class Perception {
   }
 
   /** Send the wanted layers to the server, if they have changed. */
-  #tell() {
+  #sendLayers() {
     const perception = this.#av() < 0 ? '' : this.#world.followed ?? '';
     const scans = Boolean(this.#on.rays);
     const told = `${perception} ${scans}`;
-    if (told !== this.#told
+    if (told !== this.#sentLayers
         && this.#connection?.send({ type: 'layers', perception, scans })) {
-      this.#told = told;
+      this.#sentLayers = told;
     }
   }
 
@@ -226,7 +226,7 @@ class Perception {
    * @param {LiveView} view
    */
   #choose({ store, shown }) {
-    this.#tell();
+    this.#sendLayers();
     const av = this.#shows('unseen') ? this.#av() : -1;
     const columns = av < 0 ? null : store.perceived.seenBy(av, shown.t);
     this.#flags = columns === null ? null : this.#unseen?.flags(av, columns) ?? null;

@@ -79,7 +79,7 @@ export class ReplayDocuments {
    *
    * @param {Now} now
    */
-  tellPast(now) {
+  replayStatus(now) {
     const { planners, timing } = this.#info.documents;
     /** @type {number[]} */
     const times = [];

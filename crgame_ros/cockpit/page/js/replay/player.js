@@ -205,7 +205,7 @@ export class Player {
       : events.findLast(({ t }) => t < this.#t - TINY_S);
     if (found !== undefined) {
       this.seek(found.t);
-      this.#timeline.tell(found);
+      this.#timeline.showEvent(found);
     }
     return found ?? null;
   }
@@ -255,7 +255,7 @@ export class Player {
     }
     if (now_ms - this.#jumped_ms > SETTLED_MS) {
       this.#jumped_ms = NaN;
-      this.#documents?.tellPast(this.#now());
+      this.#documents?.replayStatus(this.#now());
     }
   }
 

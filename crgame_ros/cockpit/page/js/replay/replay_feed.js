@@ -72,7 +72,7 @@ export class ReplayFeed {
       const answer = await ask('criticality', { epoch: this.info.epoch });
       for (const frame of unpack(await answer.arrayBuffer()).map(decodeFrame)) {
         if (frame?.kind === KIND.CRITICALITY) {
-          log.take(frame);
+          log.add(frame);
         }
       }
     } catch (error) {

@@ -84,7 +84,7 @@ export class Timeline {
     this.#marks.replaceChildren(...info.events.map((event) => mark(
       event, (event.t - info.start_s) / length_s, () => {
         this.#player.seek(event.t);
-        this.tell(event);
+        this.showEvent(event);
       })));
     this.#epochs.replaceChildren(...info.epochs.map((epoch, i) => element('option',
       { value: epoch, text: `${i + 1} of ${info.epochs.length}` })));
@@ -119,7 +119,7 @@ export class Timeline {
    *
    * @param {ReplayMark} event of the run's info
    */
-  tell(event) {
+  showEvent(event) {
     setText(this.#told, eventText(event));
   }
 

@@ -45,13 +45,13 @@ export class Sound {
   #listener = new Listener();
   /** @type {Kerbs|null} */
   #kerbs = null;
-  #speaker = new Speaker(() => this.#tell());
+  #speaker = new Speaker(() => this.#sendSettings());
   #motors = new Rumble();
   #control;
   #next_ms = -Infinity;
   #subject = '';
   #t = NaN;
-  #told = '';
+  #sentSettings = '';
   // Whether the key M turns it on and off.
   #keys = true;
 
@@ -66,29 +66,29 @@ export class Sound {
     this.#control = createSoundControl(root, this);
     window.addEventListener('pointerdown', () => this.begin(), true);
     window.addEventListener('keydown', (event) => this.#key(event), true);
-    document.addEventListener('visibilitychange', () => this.#look(performance.now()));
+    document.addEventListener('visibilitychange', () => this.#update(performance.now()));
     store.on('scene', () => {
       this.#kerbs = null;
-      this.#tell();
+      this.#sendSettings();
     });
     store.on('epoch', () => {
       this.#subject = '';
       this.#listener.reset();
     });
     store.on('hello', () => {
-      this.#told = '';
-      this.#tell();
+      this.#sentSettings = '';
+      this.#sendSettings();
     });
     /** @param {number} now_ms */
     const frame = (now_ms) => {
       requestAnimationFrame(frame);
       if (now_ms >= this.#next_ms) {
         this.#next_ms = now_ms + EVERY_MS;
-        this.#look(now_ms);
+        this.#update(now_ms);
       }
     };
     requestAnimationFrame(frame);
-    this.#tell();
+    this.#sendSettings();
   }
 
   /** Return whether the game lets pages sound and gamepads rumble. */
@@ -113,8 +113,8 @@ export class Sound {
     if (this.wanted && this.allowed) {
       this.#speaker.begin();
     }
-    this.#look(performance.now());
-    this.#tell();
+    this.#update(performance.now());
+    this.#sendSettings();
   }
 
   /** Start if it is switched on: in a gesture, or if the browser allows it without. */
@@ -132,7 +132,7 @@ export class Sound {
   want(on) {
     this.wanted = on;
     this.#keys = false;
-    this.#tell();
+    this.#sendSettings();
   }
 
   /**
@@ -142,7 +142,7 @@ export class Sound {
   set(amount, share) {
     this[amount] = Math.min(Math.max(share, 0), 1);
     remember(amount, String(this[amount]));
-    this.#tell();
+    this.#sendSettings();
   }
 
   /** @param {KeyboardEvent} event */
@@ -162,7 +162,7 @@ export class Sound {
    *
    * @param {number} now_ms
    */
-  #look(now_ms) {
+  #update(now_ms) {
     if (!this.on && this.#pads().some(({ buttons }) => buttons.some(({ pressed }) => pressed))) {
       // Browsers treat a gamepad's button as a gesture, without an event.
       this.begin();
@@ -260,12 +260,12 @@ export class Sound {
   }
 
   /** Show the settings, and send them to the server, which records them. */
-  #tell() {
+  #sendSettings() {
     this.#control.show();
     const told = { on: Number(this.on), volume: this.volume, rumble: this.rumble };
     const text = JSON.stringify(told);
-    if (text !== this.#told && this.#connection.send({ type: 'sound', ...told })) {
-      this.#told = text;
+    if (text !== this.#sentSettings && this.#connection.send({ type: 'sound', ...told })) {
+      this.#sentSettings = text;
     }
   }
 }

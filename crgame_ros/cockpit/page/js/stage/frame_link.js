@@ -29,7 +29,7 @@ export class FrameLink {
    *
    * @param {StageState} state
    */
-  tell(state) {
+  send(state) {
     const { framedBy } = this.#store;
     const text = JSON.stringify(state);
     if (window.parent !== window && framedBy !== '' && text !== this.#told) {

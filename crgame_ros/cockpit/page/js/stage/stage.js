@@ -57,12 +57,12 @@ export class Stage {
     store.on('hello', () => {
       // Another server may assign the same id, and does not know the role.
       this.#role = '';
-      this.#takeRole();
+      this.#claimRole();
     });
-    store.on('seats', () => this.#look());
-    store.on('connection', () => this.#look());
-    this.#takeRole();
-    setInterval(() => this.#look(), EVERY_MS);
+    store.on('seats', () => this.#update());
+    store.on('connection', () => this.#update());
+    this.#claimRole();
+    setInterval(() => this.#update(), EVERY_MS);
   }
 
   /** Apply the address, once all parts are loaded. */
@@ -82,7 +82,7 @@ export class Stage {
         this.#missing3d = !await view3d.show(true);
       }
     }
-    this.#look();
+    this.#update();
   }
 
   #writeLabels() {
@@ -95,12 +95,12 @@ export class Stage {
   }
 
   /** Take the role of a driver, so that the server refuses all other rights. */
-  #takeRole() {
+  #claimRole() {
     const { me, mode } = this.#store;
     if (me.id !== '' && mode === 'live' && this.#role !== me.id) {
       this.#role = me.id;
       this.#claimed_ms = -Infinity;
-      this.#connection.request({ type: 'role', role: 'drive' }).then(() => this.#look());
+      this.#connection.request({ type: 'role', role: 'drive' }).then(() => this.#update());
     }
   }
 
@@ -115,12 +115,12 @@ export class Stage {
     if (order.kind === 'ready') {
       window.crgame.sound?.begin();
       this.#ready = { wanted: order.ready, epoch: this.#store.epoch, sent: false };
-      this.#look();
+      this.#update();
     }
   }
 
   /** Take the seat while it is free, show any trouble, and report to the framing page. */
-  #look() {
+  #update() {
     const seat = this.#store.seats[this.address.seat];
     this.#leave();
     if (this.#rides && window.crgame.world.followed !== this.address.seat) {
@@ -131,7 +131,7 @@ export class Stage {
         && performance.now() - this.#claimed_ms > CLAIM_EVERY_MS) {
       this.#claim();
     }
-    this.#sayReady();
+    this.#reportReady();
     const trouble = this.#trouble();
     const text = trouble === null ? '' : this.#words[trouble];
     setText(this.#line, text);
@@ -139,7 +139,7 @@ export class Stage {
     const state = this.#state(trouble);
     document.documentElement.dataset.stage = state.view;
     document.documentElement.toggleAttribute('data-missing3d', state.missing3d);
-    this.#link.tell(state);
+    this.#link.send(state);
   }
 
   /**
@@ -170,7 +170,7 @@ export class Stage {
   }
 
   /** Report ready; each run needs a new report. */
-  async #sayReady() {
+  async #reportReady() {
     const ready = this.#ready;
     const { epoch, seats } = this.#store;
     if (ready.epoch !== epoch || ready.sent || !this.#seated

@@ -61,7 +61,7 @@ export class Prompt {
    * @param {number} now_ms
    * @returns {boolean} whether it accepts an answer
    */
-  takes(now_ms) {
+  accepts(now_ms) {
     const since_ms = this.since(now_ms);
     return !this.answered && since_ms >= 0 && since_ms <= 1000 * (this.task.latest_s ?? 0);
   }

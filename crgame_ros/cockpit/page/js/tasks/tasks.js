@@ -28,7 +28,7 @@ export class Tasks {
    */
   #prompts = new Map();
   #words = wordsIn('en');
-  #looking = false;
+  #frameRequested = false;
 
   /**
    * @param {HTMLElement} stage
@@ -50,7 +50,7 @@ export class Tasks {
     store.on('connection', () => this.#update());
     store.on('status', () => {
       this.#running.note(this.#runs, performance.now());
-      this.#look();
+      this.#requestFrame();
     });
     this.#begin();
   }
@@ -141,7 +141,7 @@ export class Tasks {
       }
     }
     this.#showWhatLasts(mine);
-    this.#look();
+    this.#requestFrame();
   }
 
   /**
@@ -166,7 +166,7 @@ export class Tasks {
     }).then(({ drawn_ms, picture_ms }) => {
       prompt.draw(drawn_ms);
       prompt.picture_ms = picture_ms;
-      this.#tell(prompt, 'shown', prompt.times());
+      this.#send(prompt, 'shown', prompt.times());
     });
     if (!light && !open.seen && this.#store.scene?.sound !== 'none') {
       this.#tone.play(window.crgame.sound?.volume ?? 1);
@@ -184,9 +184,9 @@ export class Tasks {
   }
 
   /** Update in every frame while there are prompts. */
-  #look() {
-    if (!this.#looking) {
-      this.#looking = true;
+  #requestFrame() {
+    if (!this.#frameRequested) {
+      this.#frameRequested = true;
       requestAnimationFrame(() => this.#frame());
     }
     if (this.#wanted) {
@@ -195,10 +195,10 @@ export class Tasks {
   }
 
   #frame() {
-    this.#looking = false;
+    this.#frameRequested = false;
     this.#draw();
     if (this.#prompts.size > 0 && this.#runs) {
-      this.#look();
+      this.#requestFrame();
     }
   }
 
@@ -230,12 +230,12 @@ export class Tasks {
     }
     const detecting = this.#detecting;
     const prompt = this.prompts.find((each) => each.task.kind === 'detection_response'
-      && each.takes(at_ms));
+      && each.accepts(at_ms));
     if (prompt !== undefined) {
       const times = prompt.times(at_ms);
       prompt.answered = true;
-      this.#tell(prompt, 'answer', times);
-      this.#look();
+      this.#send(prompt, 'answer', times);
+      this.#requestFrame();
     } else if (detecting !== undefined) {
       this.#connection.send({ type: 'task', seat: detecting.seat, task: detecting.name, number: 0,
         what: 'answer' });
@@ -254,7 +254,7 @@ export class Tasks {
    * @param {'shown'|'answer'} what
    * @param {PageTimes} times
    */
-  #tell({ open }, what, times) {
+  #send({ open }, what, times) {
     const known = Object.fromEntries(Object.entries(times)
       .filter(([, value]) => Number.isFinite(value))
       .map(([name, value]) => [name, Math.round(1000 * value) / 1000]));

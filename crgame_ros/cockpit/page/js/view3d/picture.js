@@ -277,7 +277,7 @@ export class Picture {
       frame_ms: performance.now() - begin_ms });
     if (measures) {
       this.stats.cost_ms = this.#cost.end();
-      if (this.#quality.take(this.stats.cost_ms, now_ms)) {
+      if (this.#quality.adjust(this.stats.cost_ms, now_ms)) {
         this.#choose();
         this.resize(this.#size.width, this.#size.height);
       }

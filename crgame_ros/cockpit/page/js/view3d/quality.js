@@ -108,7 +108,7 @@ export class Quality {
    * @param {number} now_ms
    * @returns {boolean} whether ratio or detail have changed
    */
-  take(cost_ms, now_ms) {
+  adjust(cost_ms, now_ms) {
     this.#cost_ms = cost_ms;
     if (this.sharp || now_ms - this.#changed_ms < EVERY_MS) {
       return false;

@@ -62,7 +62,7 @@ export class SeatClock {
    * @param {number} t simulation time that is shown [s]
    * @param {string|null} vehicle
    */
-  tell(now_ms, t, vehicle) {
+  send(now_ms, t, vehicle) {
     if (this.#follows) {
       return;
     }

@@ -73,7 +73,7 @@ export class Traffic {
     this.#scaling = new three.Vector3();
     this.#parts = new FittedParts(three, group);
     this.#headlights = new Headlights(three, group);
-    store.on('objects', (step) => this.#brakeLights.takeStep(step));
+    store.on('objects', (step) => this.#brakeLights.update(step));
   }
 
   /**

@@ -138,7 +138,7 @@ export class View3d {
   async snapshot() {
     const now_ms = performance.now();
     const shown = this.#on ? this.#store.displayed(now_ms) : null;
-    if (shown === null || !this.picture?.draw(shown, now_ms, this.#looks(this.vehicle))) {
+    if (shown === null || !this.picture?.draw(shown, now_ms, this.#view(this.vehicle))) {
       return null;
     }
     return new Promise((resolve) => { this.#canvas.toBlob(resolve); });
@@ -169,7 +169,7 @@ export class View3d {
     try {
       three = await import('./three.js');
     } catch {
-      this.#say(MISSING);
+      this.#notify(MISSING);
       return false;
     }
     try {
@@ -177,13 +177,13 @@ export class View3d {
       this.picture ??= new module.Picture(three, this.#canvas, this.#store);
       return true;
     } catch (error) {
-      this.#say(`The 3D view cannot be drawn: ${error instanceof Error ? error.message : error}`);
+      this.#notify(`The 3D view cannot be drawn: ${error instanceof Error ? error.message : error}`);
       return false;
     }
   }
 
   /** @param {string} text */
-  #say(text) {
+  #notify(text) {
     this.#store.receive({ type: 'notice', level: 'warn', text });
   }
 
@@ -223,7 +223,7 @@ export class View3d {
       return;
     }
     this.#frame = requestAnimationFrame((next_ms) => this.#animate(next_ms));
-    this.#tellLoss(this.picture);
+    this.#notifyLoss(this.picture);
     this.#clock.follow(now_ms);
     const shown = this.#store.displayed(now_ms);
     const early = now_ms - this.#drawn_ms < this.picture.period_ms - EARLY_MS;
@@ -232,9 +232,9 @@ export class View3d {
       return;
     }
     const { vehicle } = this;
-    this.#clock.tell(now_ms, shown.t, vehicle);
+    this.#clock.send(now_ms, shown.t, vehicle);
     this.picture.sharp = this.settings.switches.sharp;
-    if (this.picture.draw(shown, now_ms, this.#looks(vehicle))) {
+    if (this.picture.draw(shown, now_ms, this.#view(vehicle))) {
       this.#due = shown.t === this.#shown_t ? this.#due - 1 : PICTURES_AFTER_CHANGE;
       this.#shown_t = shown.t;
       this.#drawn_ms = now_ms;
@@ -248,7 +248,7 @@ export class View3d {
    * @param {string|null} vehicle
    * @returns {Looks}
    */
-  #looks(vehicle) {
+  #view(vehicle) {
     const { clientWidth: width, clientHeight: height } = this.#stage;
     const { seat, fieldOfView_deg, switches } = this.settings;
     const across = acrossAngle(this.window?.fieldOfView_deg ? null : seat,
@@ -261,11 +261,11 @@ export class View3d {
   }
 
   /** @param {Picture} picture */
-  #tellLoss(picture) {
+  #notifyLoss(picture) {
     if (picture.lost !== this.#wasLost) {
       this.#wasLost = picture.lost;
       if (picture.lost) {
-        this.#say(LOST);
+        this.#notify(LOST);
       } else {
         this.redraw();
       }

@@ -28,7 +28,7 @@ export class BrakeLights {
    *
    * @param {Pick<ObjectsFrame, 'k'|'t'|'objects'>} step as received by the store
    */
-  takeStep(step) {
+  update(step) {
     const last = this.#lastStep;
     this.#lastStep = step;
     if (last === null || step.k <= last.k || last.objects.length !== step.objects.length) {

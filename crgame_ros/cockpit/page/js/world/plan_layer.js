@@ -31,7 +31,7 @@ export class PlanLayer {
    * @param {Scene|null} scene with the definitions of the events
    * @param {FiredEvent[]} fired in order
    */
-  takeEvents(scene, fired) {
+  applyEvents(scene, fired) {
     this.#hidden.clear();
     for (const { name } of fired) {
       const event = scene?.events.find((entry) => entry.name === name);

@@ -6,7 +6,7 @@ import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
 import { shining } from '../lights.js';
 import { BrakeLights } from './brake_lights.js';
 import { drawOutline } from './hollow.js';
-import { lookOf, TYRE } from './vehicle_shape.js';
+import { vehicleLook, TYRE } from './vehicle_shape.js';
 
 /** @import { Pose, Scene, SceneObject, SceneVehicle } from '../messages.js' */
 /** @import { Shown } from '../store.js' */
@@ -49,11 +49,11 @@ export class VehicleLayer {
   /** @param {Scene} scene the scene document */
   load(scene) {
     this.vehicles = scene.vehicles.map((vehicle) => ({
-      ...vehicle, look: lookOf('car', vehicle.shape, true),
+      ...vehicle, look: vehicleLook('car', vehicle.shape, true),
       color: vehicle.role === 'human' ? 'human' : 'av',
     }));
     this.objects = scene.objects.map((object) => ({
-      ...object, look: lookOf(object.type, object.shape, object.role !== 'static'),
+      ...object, look: vehicleLook(object.type, object.shape, object.role !== 'static'),
       color: colorOf(object),
     }));
     this.brakeLights.load(this.objects.length);

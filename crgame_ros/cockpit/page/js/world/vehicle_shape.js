@@ -30,7 +30,7 @@ const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknow
  * @param {boolean} moves whether it has a front
  * @returns {Look} paths around the shape's centre
  */
-export function lookOf(type, shape, moves) {
+export function vehicleLook(type, shape, moves) {
   const { kind, length, width } = shape;
   const rest = {
     extent: Math.max(length, width), radius: 0.5 * Math.hypot(length, width),

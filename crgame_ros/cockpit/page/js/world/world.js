@@ -259,9 +259,9 @@ export class World {
     }
     this.#ends.push(
       store.on('scene', (scene) => this.#load(scene)),
-      store.on('objects', (step) => this.#painter.vehicles.brakeLights.takeStep(step)),
+      store.on('objects', (step) => this.#painter.vehicles.brakeLights.update(step)),
       store.on('hello', () => this.#sendLayers()),
-      store.on('events', () => this.#painter.plans.takeEvents(store.scene, store.fired)),
+      store.on('events', () => this.#painter.plans.applyEvents(store.scene, store.fired)),
       ...REDRAWN_ON.map((name) => store.on(name, () => this.redraw())));
   }
 
@@ -298,7 +298,7 @@ export class World {
   #load(scene) {
     this.#painter.load(scene);
     this.#view.scene = scene;
-    this.#painter.plans.takeEvents(scene, this.#store.fired);
+    this.#painter.plans.applyEvents(scene, this.#store.fired);
     this.#navigation.load(scene, this.#follow);
   }
 

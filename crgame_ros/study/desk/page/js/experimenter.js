@@ -74,7 +74,7 @@ class ExperimenterPage {
     this.#lastId += 1;
     const sent = this.#connection.send({ ...message, id: this.#lastId });
     if (!sent) {
-      this.#say('There is no connection.', true);
+      this.#showAnswer('There is no connection.', true);
     }
     return sent;
   }
@@ -83,7 +83,7 @@ class ExperimenterPage {
    * @param {string} text
    * @param {boolean} bad
    */
-  #say(text, bad) {
+  #showAnswer(text, bad) {
     setText(this.#answer, text);
     setAttribute(this.#answer, 'data-bad', bad);
   }
@@ -91,7 +91,7 @@ class ExperimenterPage {
   /** @param {any} message */
   #receive(message) {
     if (message.type === 'reply') {
-      this.#say(message.ok ? 'Kept.' : message.text, !message.ok);
+      this.#showAnswer(message.ok ? 'Kept.' : message.text, !message.ok);
     } else if (message.type === 'desk') {
       this.#show(message);
     }

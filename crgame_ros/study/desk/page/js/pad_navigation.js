@@ -45,7 +45,7 @@ export class PadNavigation {
         const order = (pad.mapping === 'standard' ? STANDARD : WHEEL)[i];
         // The press that made the pad appear does not count as an order.
         if (pressed && before && !before[i] && order) {
-          this.#take(order);
+          this.#apply(order);
         }
       });
     }
@@ -56,7 +56,7 @@ export class PadNavigation {
   }
 
   /** @param {PadOrder} order */
-  #take(order) {
+  #apply(order) {
     const root = this.#drive.hidden ? this.#sheet : this.#drive;
     if (document.querySelector('dialog[open]')
         || root.querySelector('.device-check:not([data-complete])')) {

@@ -59,7 +59,7 @@ class ParticipantPage {
   #receive(message) {
     switch (message.type) {
       case 'words':
-        this.#words.take(message.words);
+        this.#words.load(message.words);
         // Redraw the present content in the new words.
         if (this.#shown !== null) {
           this.#show(this.#shown, true);

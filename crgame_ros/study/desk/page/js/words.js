@@ -10,7 +10,7 @@ export class Words {
   #table = {};
 
   /** @param {WordTable} table */
-  take(table) {
+  load(table) {
     this.#table = table;
   }
 

@@ -107,7 +107,7 @@ class Taken {
    * @param {number} radius at most half a cell [m]
    * @returns {boolean} whether it was free
    */
-  take(x, y, radius) {
+  claim(x, y, radius) {
     for (let column = -1; column <= 1; column += 1) {
       for (let row = -1; row <= 1; row += 1) {
         const cell = this.#cells.get(
@@ -239,7 +239,7 @@ export function stationsOf(lanelets) {
 function placeRow(row, edge, spacing, beside, index, taken) {
   for (const s of edge.multiples(spacing)) {
     const { x, y, yaw } = beyond(edge.at(s), beside);
-    if (index.isClear(x, y, 0.8 * beside) && taken.take(x, y, 1.5)) {
+    if (index.isClear(x, y, 0.8 * beside) && taken.claim(x, y, 1.5)) {
       row.push({ x, y, yaw, size: [1, 1, 1], shade: 0 });
     }
   }
@@ -266,7 +266,7 @@ function placeTrees({ trees, firs }, edge, kind, index, points, taken, random) {
     const front = beyond(pose, -0.5);
     if (index.isClear(pose.x, pose.y, width / 2 + 0.3)
         && (!isFir || points.areBefore(front.x, front.y, front.yaw))
-        && taken.take(pose.x, pose.y, 0.35 * width)) {
+        && taken.claim(pose.x, pose.y, 0.35 * width)) {
       (isFir ? firs : trees).push({ ...pose, shade, size: [width, width, 6 + 5 * large] });
     }
   }
@@ -289,7 +289,7 @@ function placeHouses(houses, edge, index, points, taken, random) {
     const radius = Math.hypot(length, width) / 2;
     // In a bend, its corners may be nearer to the road than the middle of its front.
     if (index.isClear(pose.x, pose.y, radius - 1) && points.areBefore(front.x, front.y, front.yaw)
-        && taken.take(pose.x, pose.y, radius)) {
+        && taken.claim(pose.x, pose.y, radius)) {
       houses.push({ ...pose, shade, size: [length, width, height] });
     }
   }
@@ -318,7 +318,7 @@ function placeAround({ trees, firs }, [xmin, ymin, xmax, ymax], taken, random) {
       const y = middle_y + out * Math.sin(toward) + 46 * (dy - 0.5);
       const width = 3.5 + 4 * large;
       if ((Math.abs(x - middle_x) > half_x + width || Math.abs(y - middle_y) > half_y + width)
-          && taken.take(x, y, 0.35 * width)) {
+          && taken.claim(x, y, 0.35 * width)) {
         (type < 0.5 ? firs : trees).push({ x, y, yaw: 6 * shade, shade,
           size: [width, width, 7 + 6 * large] });
       }
