@@ -69,7 +69,7 @@ def at_end(request: RunRequest) -> str:
     return STAY if request.duration_s is None else STAY_IF_CHOSEN
 
 
-def participant_specs(who: Participants, roster: Path) -> list[NodeSpec]:
+def participant_specs(participants: Participants, roster: Path) -> list[NodeSpec]:
     """
     Return the nodes that a game's vehicles, perception, traffic and map need.
 
@@ -79,17 +79,17 @@ def participant_specs(who: Participants, roster: Path) -> list[NodeSpec]:
     specs = [
         *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av, **code},
                    nice=COMPANION_NICE, restart=True)
-          for av, planner in who.avs.items() if planner != EXTERNAL),
+          for av, planner in participants.avs.items() if planner != EXTERNAL),
         *(NodeSpec('driver_node', f'driver_node_{human}', {'vehicle': human, **code},
                    restart=True)
-          for human, driver in who.humans.items()
+          for human, driver in participants.humans.items()
           if driver != COCKPIT and not is_replay(driver)),
         *(NodeSpec('perception_node', f'perception_node_{av}', {'vehicle': av, **code},
-                   nice=COMPANION_NICE, restart=True) for av in who.perceiving)]
-    if who.traffic:
+                   nice=COMPANION_NICE, restart=True) for av in participants.perceiving)]
+    if participants.traffic:
         specs.append(NodeSpec('traffic_node', 'traffic_node', code, nice=COMPANION_NICE,
                               restart=True))
-    if who.occupancy:
+    if participants.occupancy:
         specs.append(NodeSpec('map_node', 'map_node', nice=COMPANION_NICE, restart=True))
     return specs
 

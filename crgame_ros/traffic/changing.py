@@ -405,10 +405,10 @@ class LaneChanges:
                 continue
             row, room = row[fits], room[fits]
             first = int(room.argmin())
-            who = int(slots[row[first]])
+            stopping = int(slots[row[first]])
             # By braking a little harder than needed it remains the agent that stops.
-            braking = LETTING_IN * agents.speed[who]**2 / (2.0 * room[first])
-            yielding[who] = min(yielding[who], -braking)
+            braking = LETTING_IN * agents.speed[stopping]**2 / (2.0 * room[first])
+            yielding[stopping] = min(yielding[stopping], -braking)
 
 
 @compiled

@@ -190,7 +190,7 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     if hold <= 0.0 or not (agents.sees[slot] if agents.late[slot] else easy):
         return False
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
-        if meeting.who[n] < 0 and meeting.step[n] <= passage.granted[i] and _yields(
+        if meeting.other[n] < 0 and meeting.step[n] <= passage.granted[i] and _yields(
                 ticks, k, agents, passage, meeting, at, i, n):
             return True
     return False
@@ -216,8 +216,8 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
         if meeting.step[n] > passage.granted[i] and (
                 _yields(ticks, k, agents, passage, meeting, at, i, n)
                 or (easily and _has_mercy(ticks, k, agents, meeting, at, i, n))):
-            who = meeting.who[n]
-            agents.blocker[slot] = at.slots[who] if who >= 0 else who
+            other = meeting.other[n]
+            agents.blocker[slot] = at.slots[other] if other >= 0 else other
             return False
     return True
 
@@ -226,10 +226,10 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
     """Return whether an agent lets another go first that has waited very long."""
-    who = meeting.who[n]
-    if who < 0 or meeting.apart[n] or agents.insists_until[at.slots[i]] > k:
+    other = meeting.other[n]
+    if other < 0 or meeting.apart[n] or agents.insists_until[at.slots[i]] > k:
         return False
-    waits = agents.waits[at.slots[who]]
+    waits = agents.waits[at.slots[other]]
     return bool(waits > ticks[3] and waits > agents.waits[at.slots[i]])
 
 
@@ -239,19 +239,19 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
     """Return whether an agent lets the other of a meeting go first."""
     if meeting.apart[n]:
         return False
-    slot, who = at.slots[i], meeting.who[n]
+    slot, other = at.slots[i], meeting.other[n]
     if meeting.inside[n]:
         return True
-    if who < 0:
+    if other < 0:
         return bool(meeting.committed[n] or meeting.priority[n] < 0)
-    them = at.slots[who]
+    them = at.slots[other]
     if agents.insists_until[slot] > k and agents.speed[them] < 1.0:
         return False
-    if is_let_in(agents, them, passage, who, meeting.theirs[n]):
+    if is_let_in(agents, them, passage, other, meeting.theirs[n]):
         return True
     waits, theirs = agents.waits[slot], agents.waits[them]
     # Of two standing agents the one that has stood longer goes first.
-    longer = waits > theirs or (waits == theirs and i < who)
+    longer = waits > theirs or (waits == theirs and i < other)
     patient = meeting.priority[n] > -2 and waits > ticks[0] and theirs > 0 and longer
     patient |= meeting.courteous[n] and waits > (ticks[1] if meeting.joins[n] else ticks[3])
     return bool(meeting.priority[n] < 0 and not patient)
@@ -264,22 +264,22 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
     slot = at.slots[i]
     result = math.inf
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
-        who = meeting.who[n]
+        other = meeting.other[n]
         if meeting.apart[n] or meeting.into[n] >= result or (
                 meeting.step[n] > passage.granted[i]):
             continue
         # An agent that cannot stop before the conflict any more drives on.
         if agents.speed[slot]**2 > 8.0 * max(meeting.into[n], 0.1):
             continue
-        if who < 0:
+        if other < 0:
             stops = meeting.inside[n] or meeting.committed[n]
         else:
             stops = meeting.inside[n] or (
-                is_let_in(agents, at.slots[who], passage, who, meeting.theirs[n])
+                is_let_in(agents, at.slots[other], passage, other, meeting.theirs[n])
                 and _is_senior(k, agents, passage, meeting, at, i, n))
         if stops:
             result = meeting.into[n]
-            agents.blocker[slot] = at.slots[who] if who >= 0 else who
+            agents.blocker[slot] = at.slots[other] if other >= 0 else other
     return result
 
 
@@ -287,10 +287,10 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
 def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
     """Return whether the other of a meeting goes before an agent, both having been let in."""
-    who = meeting.who[n]
-    slot, them = at.slots[i], at.slots[who]
+    other = meeting.other[n]
+    slot, them = at.slots[i], at.slots[other]
     grant = _admission_tick(agents, slot, passage, i, meeting.step[n])
-    theirs = _admission_tick(agents, them, passage, who, meeting.theirs[n])
+    theirs = _admission_tick(agents, them, passage, other, meeting.theirs[n])
     # An agent whose leader is this one lets it go.
     if agents.leader[them] == slot:
         return False

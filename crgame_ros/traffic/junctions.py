@@ -30,7 +30,7 @@ class Arrivals(NamedTuple):
     The arrivals of vehicles at conflicts (R rows), in the order of the conflicts.
 
     :param begin: (C + 1) rows at which those of each conflict begin.
-    :param who: (R) row of the agent, or -1 - n for the n-th of the others.
+    :param owner: (R) row of the agent, or -1 - n for the n-th of the others.
     :param conflict: (R) row of `Conflicts`.
     :param into: (R) distance of its front from the conflict [m], negative inside.
     :param out: (R) distance of its rear from the conflict's end [m]
@@ -40,7 +40,7 @@ class Arrivals(NamedTuple):
     """
 
     begin: IntArray
-    who: IntArray
+    owner: IntArray
     conflict: IntArray
     into: FloatArray
     out: FloatArray
@@ -191,9 +191,9 @@ def _empty(conflicts: int, room: int) -> Arrivals:
 
 
 @compiled
-def _note(found: Arrivals, n: int, who: int, conflict: int, into: float, out: float,
+def _note(found: Arrivals, n: int, owner: int, conflict: int, into: float, out: float,
           speed: float, width: float, step: int) -> None:
-    found.who[n], found.conflict[n], found.step[n] = who, conflict, step
+    found.owner[n], found.conflict[n], found.step[n] = owner, conflict, step
     found.into[n], found.out[n], found.speed[n], found.width[n] = into, out, speed, width
 
 
@@ -215,7 +215,7 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
                          conflicts.first[current] + conflicts.rows[current]):
             out = offset + size + conflicts.end[1, row]
             if out > 0.0:
-                if used == len(found.who):
+                if used == len(found.owner):
                     found = _grown(found)
                 _note(found, used, entries.owner[n], row, offset + conflicts.start[1, row], out,
                       speed, width, 0)
@@ -231,9 +231,9 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
 
 @compiled
 def _grown(found: Arrivals) -> Arrivals:
-    more = _empty(0, 2 * len(found.who))
-    for n in range(len(found.who)):
-        _note(more, n, found.who[n], found.conflict[n], found.into[n], found.out[n],
+    more = _empty(0, 2 * len(found.owner))
+    for n in range(len(found.owner)):
+        _note(more, n, found.owner[n], found.conflict[n], found.into[n], found.out[n],
               found.speed[n], found.width[n], found.step[n])
     return more
 
@@ -249,7 +249,7 @@ def _by_conflict(found: Arrivals, used: int, conflicts: int) -> Arrivals:
     fill = result.begin.copy()
     for n in range(used):
         row = found.conflict[n]
-        _note(result, fill[row], found.who[n], row, found.into[n], found.out[n], found.speed[n],
+        _note(result, fill[row], found.owner[n], row, found.into[n], found.out[n], found.speed[n],
               found.width[n], found.step[n])
         fill[row] += 1
     return result

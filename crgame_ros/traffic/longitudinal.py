@@ -232,10 +232,10 @@ class Longitudinal:
         result = np.asarray(self._followers.for_agents(slots).acceleration(
             speed, desired, free, speed), dtype=float)
         if len(pairs.agent):
-            who, entry = pairs.agent, pairs.entry
-            wanted = self._followers.for_agents(slots[who]).acceleration(
-                speed[who], desired[who], pairs.gap, entries.speed[entry],
-                agents.relief[slots[who]],
+            row, entry = pairs.agent, pairs.entry
+            wanted = self._followers.for_agents(slots[row]).acceleration(
+                speed[row], desired[row], pairs.gap, entries.speed[entry],
+                agents.relief[slots[row]],
                 # A vehicle that changes lanes may brake for a leader in the lane that it leaves:
                 # its acceleration says nothing about the new lane.
                 np.where(entries.claims[entry], 0.0, entries.acceleration[entry]))

@@ -82,7 +82,7 @@ class Meetings(NamedTuple):
     Pairs (M) of an agent and another that comes to the same conflict, in the order of agents.
 
     :param begin: (A + 1) rows of each agent.
-    :param who: (M) row of the other agent, or -1 - n for the n-th of the others.
+    :param other: (M) row of the other agent, or -1 - n for the n-th of the others.
     :param step: (M) of the agent's way.
     :param theirs: (M) step of the other's way.
     :param into: (M) distance of the agent's front from the conflict [m]
@@ -95,7 +95,7 @@ class Meetings(NamedTuple):
     """
 
     begin: IntArray
-    who: IntArray
+    other: IntArray
     step: IntArray
     theirs: IntArray
     into: FloatArray
@@ -132,19 +132,19 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     or arrivals.into[mine] <= 0.0:
                 continue
             conflict = arrivals.conflict[mine]
-            other = conflicts.other[conflict]
-            for theirs in range(arrivals.begin[other], arrivals.begin[other + 1]):
-                who = arrivals.who[theirs]
-                if who == i or not touch(conflicts, conflict, agents.width[slot],
+            counterpart = conflicts.other[conflict]
+            for theirs in range(arrivals.begin[counterpart], arrivals.begin[counterpart + 1]):
+                owner = arrivals.owner[theirs]
+                if owner == i or not touch(conflicts, conflict, agents.width[slot],
                                          arrivals.width[theirs]):
                     continue
-                if who >= 0 and stays[who] and arrivals.into[theirs] > 0.0 \
-                        and not is_let_in(agents, at.slots[who], passage, who,
+                if owner >= 0 and stays[owner] and arrivals.into[theirs] > 0.0 \
+                        and not is_let_in(agents, at.slots[owner], passage, owner,
                                           arrivals.step[theirs]) \
-                        and not (conflicts.merges[conflict] and (next_in[who] or (
-                            first[who] and conflicts.priority[conflict] < -1))):
+                        and not (conflicts.merges[conflict] and (next_in[owner] or (
+                            first[owner] and conflicts.priority[conflict] < -1))):
                     continue
-                if used == len(found.who):
+                if used == len(found.other):
                     found = _grown(found)
                 _compare(conflicts, rules, arrivals, mine, theirs, at.desired, found, used)
                 used += 1
@@ -167,16 +167,16 @@ class _Rows(NamedTuple):
 def _rows_of(arrivals: Arrivals, count: int) -> _Rows:
     """List the rows of arrivals by agent."""
     begin = np.zeros(count + 1, np.int64)
-    for who in arrivals.who:
-        if who >= 0:
-            begin[who + 1] += 1
+    for owner in arrivals.owner:
+        if owner >= 0:
+            begin[owner + 1] += 1
     for i in range(count):
         begin[i + 1] += begin[i]
     fill, row = begin.copy(), np.empty(begin[count], np.int64)
-    for n, who in enumerate(arrivals.who):
-        if who >= 0:
-            row[fill[who]] = n
-            fill[who] += 1
+    for n, owner in enumerate(arrivals.owner):
+        if owner >= 0:
+            row[fill[owner]] = n
+            fill[owner] += 1
     return _Rows(begin, row)
 
 
@@ -191,9 +191,9 @@ def _empty(agents: int, room: int) -> Meetings:
 
 @compiled
 def _grown(found: Meetings) -> Meetings:
-    more, size = _empty(len(found.begin) - 1, 2 * len(found.who)), len(found.who)
+    more, size = _empty(len(found.begin) - 1, 2 * len(found.other)), len(found.other)
     more.begin[:] = found.begin
-    more.who[:size], more.into[:size] = found.who, found.into
+    more.other[:size], more.into[:size] = found.other, found.into
     more.step[:size], more.theirs[:size] = found.step, found.theirs
     more.priority[:size], more.apart[:size] = found.priority, found.apart
     more.inside[:size], more.committed[:size] = found.inside, found.committed
@@ -205,23 +205,23 @@ def _grown(found: Meetings) -> Meetings:
 def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
              theirs: int, desired: FloatArray, found: Meetings, n: int) -> None:
     """Write the meeting of two arrivals into row n."""
-    who, conflict = arrivals.who[theirs], arrivals.conflict[mine]
+    owner, conflict = arrivals.owner[theirs], arrivals.conflict[mine]
     into, out, speed = arrivals.into[theirs], arrivals.out[theirs], arrivals.speed[theirs]
-    if who < 0:
+    if owner < 0:
         early = math.inf if speed < QUEUEING and into > 0.0 else time_to(
             into, speed, rules.acceleration, speed)
         late = max(out, 0.0) / max(speed, 0.1)
     else:
-        early = time_to(into, speed, rules.acceleration, desired[who])
-        late = time_to(out, speed, TIMID, max(0.8 * desired[who], 2.0))
-    i = arrivals.who[mine]
+        early = time_to(into, speed, rules.acceleration, desired[owner])
+        late = time_to(out, speed, TIMID, max(0.8 * desired[owner], 2.0))
+    i = arrivals.owner[mine]
     there = time_to(arrivals.into[mine], arrivals.speed[mine], HURRY, desired[i])
     gone = time_to(arrivals.out[mine], arrivals.speed[mine], rules.acceleration, desired[i])
-    found.who[n], found.into[n] = who, arrivals.into[mine]
+    found.other[n], found.into[n] = owner, arrivals.into[mine]
     found.step[n], found.theirs[n] = arrivals.step[mine], arrivals.step[theirs]
     found.priority[n] = conflicts.priority[conflict]
     found.apart[n] = there > late + rules.gap_after or gone + rules.gap_before < early
     found.inside[n] = into <= 0.0 and out > 0.0
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
-    found.courteous[n] = who >= 0 and into > 2.0 * speed + speed**2 / 3.0
+    found.courteous[n] = owner >= 0 and into > 2.0 * speed + speed**2 / 3.0
     found.joins[n] = conflicts.merges[conflict]

@@ -261,12 +261,12 @@ class Traffic:
         row = np.flatnonzero((source != NONE) & (source != agents.lane[slots]))
         if not len(row):
             return
-        who, lane = slots[row], source[row]
-        center, _ = centers_of(agents.table, who)
-        guess = agents.s[who] * self._graph.length[lane] / self._graph.length[agents.lane[who]]
+        slot, lane = slots[row], source[row]
+        center, _ = centers_of(agents.table, slot)
+        guess = agents.s[slot] * self._graph.length[lane] / self._graph.length[agents.lane[slot]]
         s, d, _ = self._graph.project(lane, center[:, 0], center[:, 1], guess)
-        corridor = corridors(agents.table, who, d, d)
-        pairs = ahead(lanes, entries, ways(lanes, self._routes.next, agents.table, who, lane, s),
+        corridor = corridors(agents.table, slot, d, d)
+        pairs = ahead(lanes, entries, ways(lanes, self._routes.next, agents.table, slot, lane, s),
                       corridor, NO_REFERENCE)
         # An agent that steers out from behind an obstacle gets nearer to it than s0.
         pairs.gap[standing[pairs.entry]] += CLOSE
