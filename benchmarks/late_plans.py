@@ -7,9 +7,11 @@ Check that an AV's motion is one motion, however late its planner answers.
     python benchmarks/late_plans.py
     python benchmarks/late_plans.py scenarios/cut_in.yaml --planner idm --latencies 0 20 40
     python benchmarks/late_plans.py FOLDER/*.xml --time-steps 0.04 0.2
+    python benchmarks/late_plans.py scenarios/cut_in.yaml --live
 
 Each game runs offline, also with scenarios of other time steps. In a CommonRoad scenario with a
-planning problem, an AV drives among reactive traffic. Of the AVs the table gives the largest
+planning problem, an AV drives among reactive traffic. With `--live` the whole graph runs, and
+planners wait before they answer. Of the AVs the table gives the largest
 difference between the speed and the displacement, over a simulation step and over a scenario
 step, the largest step to the side, the refused and the realigned plans, and the transitions that
 the drivability checker refuses.
@@ -19,6 +21,7 @@ import argparse
 from pathlib import Path
 import sys
 import tempfile
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
@@ -29,35 +32,22 @@ from commonroad.prediction.prediction import TrajectoryPrediction  # noqa: E402
 from commonroad.scenario.obstacle import DynamicObstacle  # noqa: E402
 from commonroad.scenario.state import CustomState, InitialState  # noqa: E402
 from commonroad.scenario.trajectory import Trajectory  # noqa: E402
+from continuous_motion import disagreement  # noqa: E402
 import crgame_ros  # noqa: E402
 from crgame_ros.errors import CrgameError  # noqa: E402
 from crgame_ros.game.file import parse_game  # noqa: E402
 from crgame_ros.game.game import Game  # noqa: E402
 from crgame_ros.geometry.angles import wrap_pi_array  # noqa: E402
-from crgame_ros.vehicle.state import StateColumn  # noqa: E402
+from crgame_ros.schema.writing import write  # noqa: E402
+from crgame_ros.simulation.setup import build_setup  # noqa: E402
+from live_graph import LiveGraph  # noqa: E402
 import numpy as np  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
 from placed_runs import played_values, write_exactly  # noqa: E402
+import yaml  # noqa: E402
 
 LATENCIES = (0, 1, 5, 10, 12, 20, 40, 70, 100)
 HEAD = f'{"game":20} {"dt":>5} {"late":>4} {"av":5} {"dv step":>8} {"dv tick":>8} {"aside":>8} ' \
     f'{"refused":>7} {"realigned":>9} {"infeasible":>10}'
-
-
-def disagreement(states: NDArray[np.float64], dt_s: float) -> tuple[float, float]:
-    """
-    Return how far displacements differ from what the speeds say [m/s], and go to the side [m/s].
-
-    :param states: (N, 8) at the rear axle
-    :param dt_s: between them
-    """
-    steps = np.diff(states[:, :2], axis=0) / dt_s
-    yaws = np.unwrap(states[:, StateColumn.YAW])
-    middle, speeds = 0.5 * (yaws[1:] + yaws[:-1]), states[:, StateColumn.SPEED]
-    along = steps[:, 0] * np.cos(middle) + steps[:, 1] * np.sin(middle)
-    aside = steps[:, 1] * np.cos(middle) - steps[:, 0] * np.sin(middle)
-    return (float(np.abs(along - 0.5 * (speeds[1:] + speeds[:-1])).max()),
-            float(np.abs(aside).max()))
 
 
 def resample(obstacle: DynamicObstacle, ratio: float) -> None:
@@ -128,6 +118,8 @@ def main() -> None:
     parser.add_argument('--duration', type=float, default=10.0, help='of each run [s]')
     parser.add_argument('--feasibility', action='store_true',
                         help='with the drivability checker, which takes seconds for each run')
+    parser.add_argument('--live', action='store_true',
+                        help='the whole graph, whose planners answer so much later')
     given = parser.parse_args()
     print(HEAD)
     games = given.games or sorted(path for path in (ROOT / 'scenarios').glob('*.yaml')
@@ -138,28 +130,46 @@ def main() -> None:
                 try:
                     game = game_at(path, time_step_s, Path(folder))
                     for latency in given.latencies:
-                        measure(path.stem, game, latency, given)
+                        measure(path.stem, game, latency, given, Path(folder))
                 except CrgameError as error:
                     print(f'{path.stem}: {error}', flush=True)
 
 
-def measure(name: str, game: Game, latency: int, given: argparse.Namespace) -> None:
+def measure(name: str, game: Game, latency: int, given: argparse.Namespace, folder: Path) -> None:
     """Print the lines of a run."""
-    run = crgame_ros.run(game, planner=given.planner, latency_steps=latency,
-                         duration_s=given.duration)
-    setup = run.result.setup
+    setup = build_setup(game)
+    if given.live:
+        run = live_run(game, given.planner, latency * setup.scheduler.dt_s, given.duration, folder)
+        states, planners = run.recorded_traces(), run.timing['planners']
+    else:
+        run = crgame_ros.run(game, planner=given.planner, latency_steps=latency,
+                             duration_s=given.duration)
+        states = {av.id: run.result.states_of(av.id) for av in setup.avs}
+        planners = {av: vars(record.counters) for av, record in run.result.planners.items()}
     scores = run.scores() if given.feasibility else {}
     for av in setup.avs:
-        states = run.result.states_of(av.id)
         every = setup.scheduler.steps_per_tick
-        step, aside = disagreement(states, setup.scheduler.dt_s)
-        tick, _ = disagreement(states[::every], setup.scheduler.time_step_s)
-        counters = run.result.planners[av.id].counters
+        step, aside = disagreement(states[av.id], setup.scheduler.dt_s)
+        tick, _ = disagreement(states[av.id][::every], setup.scheduler.time_step_s)
         score = scores[av.id].commonroad if scores else None
         infeasible = score.feasibility.infeasible if score else '-'
         print(f'{name:20} {setup.scheduler.time_step_s:5} {latency:4} {av.id:5} {step:8.3f} '
-              f'{tick:8.3f} {aside:8.3f} {counters.refused:7} {counters.realigned:9} '
-              f'{infeasible:>10}', flush=True)
+              f'{tick:8.3f} {aside:8.3f} {planners[av.id]["refused"]:7} '
+              f'{planners[av.id]["realigned"]:9} {infeasible:>10}', flush=True)
+
+
+def live_run(game: Game, planner: str | None, latency_s: float, duration_s: float,
+             folder: Path) -> Any:
+    """Run the whole graph with late planners, and return the recorded run."""
+    values = write(game, game.base)
+    for av in values['avs']:
+        av['options'] = {'planner': planner or av['planner'], 'latency': latency_s}
+        av['planner'] = f'{ROOT}/benchmarks/late_planner.py:LatePlanner'
+    file = folder / 'late.yaml'
+    file.write_text(yaml.safe_dump(values))
+    runs = folder / f'{len(list(folder.iterdir()))}'
+    LiveGraph(runs, [str(file), '--duration', f'{duration_s:g}', '--no-report']).wait()
+    return crgame_ros.read_run(runs)
 
 
 if __name__ == '__main__':

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Between planned states, and into a plan that comes late: one motion without a jump."""
 
+from continuous_motion import disagreement
 from crgame_ros.control.plan_motion import JoinedMotion, PlanMotion
 from crgame_ros.errors import InputError
 from crgame_ros.vehicle.parameters import load_vehicle_parameters
@@ -34,18 +35,6 @@ def arc(start: VehicleState, acceleration: float, curvature: float, count: int =
         np.where(speed != 0.0, acceleration, 0.0), curvature * speed, np.zeros(count)))
 
 
-def slips(states: Array, dt_s: float = DT) -> tuple[float, float]:
-    """Return how far displacements differ from speed times heading: along and aside [m/s]."""
-    steps = np.diff(states[:, :2], axis=0) / dt_s
-    yaw = np.unwrap(states[:, StateColumn.YAW])
-    middle = 0.5 * (yaw[1:] + yaw[:-1])
-    speed = states[:, StateColumn.SPEED]
-    along = steps[:, 0] * np.cos(middle) + steps[:, 1] * np.sin(middle)
-    aside = steps[:, 1] * np.cos(middle) - steps[:, 0] * np.sin(middle)
-    return (float(np.abs(along - 0.5 * (speed[1:] + speed[:-1])).max()),
-            float(np.abs(aside).max()))
-
-
 @pytest.mark.matrix('0.0-3.0-0.3', '0.02--8.0--3.0', '0.02-0.0-15.0')
 @pytest.mark.parametrize('speed', [0.0, 0.3, 15.0, -3.0])
 @pytest.mark.parametrize('acceleration', [-8.0, -1.0, 0.0, 3.0])
@@ -59,7 +48,7 @@ def test_motion_between_states_is_that_of_the_plan(
     at = np.arange(0, 401) / 10.0
     sampled = plan.sample(at)
     # Where it comes to rest, and has no acceleration from then on, speeds are not linear.
-    along, aside = slips(sampled)
+    along, aside = disagreement(sampled, DT)
     assert along < abs(acceleration) * DT / 4.0 + 2e-3 and aside < 5e-3
     for i, index in enumerate(at[:-1]):
         one = plan.at(int(index), index - int(index))
@@ -133,7 +122,7 @@ def test_a_late_plan_is_joined_in_one_motion(seed: int) -> None:
     plan, since, vehicle, acceleration = random_case(seed)
     states = joined(plan, since, vehicle, acceleration)
     assert states[0].tolist() == list(vehicle)
-    along, aside = slips(states)
+    along, aside = disagreement(states, DT)
     assert along < 0.05
     assert aside < 0.02 * max(1.0, np.abs(states[:, 3]).max())
     sign = 1.0 if seed % 4 else -1.0
