@@ -47,11 +47,14 @@ if ! uv=$(command -v uv); then
         "$venv/uv/bin/python" -m pip uninstall --quiet --yes setuptools pip 2>/dev/null || true
     fi
 fi
+unreachable='the packages are not installed: see above; check network and disk, or name your index'
+unreachable+=' of packages in UV_INDEX'
 site=() without='^$'
 [[ $ros != jazzy ]] || site=(--system-site-packages) without='^ros-'
 # With pip, so that `pip install` after sourcing scripts/env.sh means this environment.
 if [[ ! -e $venv/stamp ]]; then
-    "$uv" venv --quiet --seed --allow-existing --python "$python" "${site[@]}" "$venv"
+    "$uv" venv --quiet --seed --allow-existing --python "$python" "${site[@]}" "$venv" ||
+        fail "$unreachable"
 fi
 
 # Not in the project's folder, where uv would leave out what pyproject.toml excludes.
@@ -63,8 +66,8 @@ pins=$root/requirements.txt
 [[ ${CRGAME_DEVELOP:-} != 1 ]] || pins=$root/requirements-dev.txt
 # The lines of a package with its hashes are one for sed and grep.
 sed -e ':a' -e '/\\$/{N;ba}' "$pins" | grep -v "$without" >"$venv/requirements.txt"
-install -r "$venv/requirements.txt" ||
-    fail 'the packages are not installed: see above; check network, disk and the settings of pip'
+# A line for each large download, not one for each of a hundred packages.
+install -r "$venv/requirements.txt" 2> >(grep -v '^ [-+~] ' >&2) || fail "$unreachable"
 # 45 MB that are never used: ROS headers, as nothing is compiled against them, and tests of packages.
 rm -rf "$venv/include"
 find "$venv"/lib/python*/site-packages -type d \
