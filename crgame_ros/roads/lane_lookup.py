@@ -10,7 +10,6 @@ from crgame_ros.geometry.polyline import EQUAL_DIGITS
 from crgame_ros.geometry.reference_point import seen_from
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 FloatArray = NDArray[np.float64]
 # Nearest samples that are compared: among lanes side by side, crossing and merging, these contain
@@ -32,6 +31,8 @@ class LaneLookup:
     """
 
     def __init__(self, tables: Sequence[FloatArray], spacing: float, max_angle: float) -> None:
+        # A slow import, which only some predictions need.
+        from scipy.spatial import cKDTree
         tables = [table[::STRIDE] for table in tables]
         self._poses = np.concatenate(tables)
         self._lane = np.repeat(np.arange(len(tables)), [len(table) for table in tables])

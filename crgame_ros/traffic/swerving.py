@@ -9,7 +9,7 @@ from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.pursuit import pursuit_distance
 from crgame_ros.traffic.routes import Routes
 import numpy as np
-from scipy.signal import bilinear, lfilter
+from scipy.linalg.lapack import dtbtrs
 
 # A swerve begins and ends within this distance of its obstacle [m].
 REACH = 80.0
@@ -143,8 +143,7 @@ def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArra
 
     The faster they drive, the farther ahead is the point for which they steer, so that they cut
     swerves shorter than that. For small angles a rear axle that steers for the point at the
-    distance l moves as l^2 y'' / 2 + l y' + y = d(s + l), and a point f in front of it is at
-    y + f y'.
+    distance l moves as `pursued` has it, and a point f in front of it is at y + f y'.
 
     :param d: (S,) offsets at s = 0, step, ... [m]
     :return: (S,) infinite away from obstacles [m/s]
@@ -159,8 +158,7 @@ def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArra
     fine = np.ones(len(obstacles.s), dtype=bool)
     for speed in SPEEDS:
         distance = pursuit_distance(speed, 0.0)
-        driven = lfilter(*bilinear([2.0], [distance**2, 2.0 * distance, 2.0], 1.0 / step),
-                         np.interp(s + distance, s, d))
+        driven = pursued(np.interp(s + distance, s, d), distance, step)
         slope = np.gradient(driven, step)
         lost = np.max([d - np.interp(s - front, s, driven + front * slope)
                        for front in FRONTS], axis=0)[:, None]
@@ -175,3 +173,22 @@ def cutting_speed(d: FloatArray, step: float, obstacles: Obstacles) -> FloatArra
             s < at + length + max(FRONTS))
         result[near] = np.minimum(result[near], speed)
     return result
+
+
+def pursued(aim: FloatArray, distance: float, step: float) -> FloatArray:
+    """
+    Return the offsets (S,) of a rear axle that steers for points at a distance in front of it.
+
+    They follow l^2 y'' / 2 + l y' + y = d(s + l) from rest, by the bilinear transform.
+
+    :param aim: (S,) offsets d(s + l) of the points, at s = 0, step, ... [m]
+    :param distance: l [m]
+    """
+    rate = 2.0 * distance / step
+    bands = np.empty((3, len(aim)))
+    bands[:] = np.array((rate**2 + 2.0 * rate + 2.0, 4.0 - 2.0 * rate**2,
+                         rate**2 - 2.0 * rate + 2.0))[:, None]
+    right = 2.0 * aim
+    right[1:] += 4.0 * aim[:-1]
+    right[2:] += 2.0 * aim[:-2]
+    return np.asarray(dtbtrs(bands, right[:, None], uplo='L')[0][:, 0])

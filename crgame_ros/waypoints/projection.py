@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -64,6 +63,8 @@ class CurveIndex:
     """
 
     def __init__(self, pieces: CurvePieces) -> None:
+        # A slow import, which most runs do not need.
+        from scipy.spatial import cKDTree
         self._pieces = pieces
         most = int(np.clip(_MAX_SAMPLES // len(pieces.start), 1, _MAX_PER_PIECE))
         counts = np.clip(np.ceil(pieces.length / _SAMPLING), 1, most).astype(np.int64)

@@ -8,7 +8,7 @@ from crgame_ros.traffic.passage import Obstacles
 from crgame_ros.traffic.placement import Entries
 from crgame_ros.traffic.pursuit import pursuit_distance
 from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.swerving import CUT, cutting_speed, Swerving
+from crgame_ros.traffic.swerving import CUT, cutting_speed, pursued, Swerving
 import numpy as np
 import pytest
 from test_pursuit import move, steer
@@ -105,3 +105,12 @@ def test_a_slalom_is_slow_enough_for_its_clearance(spacing: float) -> None:
                 gap = np.abs(y[beside] - side).min() - 1.2 - 1.25
                 least = min(least, float(gap))
         assert (least > 0.5 - CUT - 0.05) is kept, (value, least)
+
+
+@pytest.mark.parametrize('distance', [3.0, 12.0, 60.0])
+def test_the_axle_follows_its_aim_as_a_filter_of_scipy(distance: float) -> None:
+    """The bilinear transform of 2 / (l^2 p^2 + 2 l p + 2)."""
+    from scipy.signal import bilinear, lfilter
+    aim = np.random.default_rng(5).normal(0.0, 0.3, 200).cumsum()
+    theirs = lfilter(*bilinear([2.0], [distance**2, 2.0 * distance, 2.0], 1.0 / 0.5), aim)
+    assert pursued(aim, distance, 0.5) == pytest.approx(theirs, abs=1e-11)
