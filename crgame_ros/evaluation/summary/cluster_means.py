@@ -74,7 +74,7 @@ class CountedCells:
     participants: set[int] = field(default_factory=set)
     runs: set[int] | None = field(default_factory=set)
 
-    def add(self, found: 'CellClusters') -> None:
+    def add(self, found: CellClusters) -> None:
         """Count cells."""
         runs = found.runs
         self.cells += len(runs)
