@@ -34,17 +34,15 @@ const shown = { ...crgame.store.displayed(performance.now()) };
 shown.vehicles = Float64Array.from(shown.vehicles);
 const most = { draw_calls: 0, triangles: 0, cars: shown.objects.length / 6, drawn: 0,
   ratio: picture.stats.ratio, width: document.querySelector('#view3d').width };
-for (const [x, y] of [[5, 2], [320, 182], [595, 542]]) {
-  // Across the map, where most is in view.
-  for (let yaw = Math.PI / 4; yaw < 2 * Math.PI; yaw += Math.PI / 2) {
-    shown.vehicles.set([x, y, yaw]);
-    for (const viewpoint of ['driver', 'driver', 'driver', 'chase', 'bird']) {
-      const done = picture.draw(shown, 0, { viewpoint, index: 0, aside: 0, height: 0.8,
-        mirrors: true, plans: true });
-      most.drawn += done;
-      for (const count of ['draw_calls', 'triangles']) {
-        most[count] = Math.max(most[count], picture.stats[count]);
-      }
+const [x, y] = arguments;
+// Across the map, where most is in view.
+for (let yaw = Math.PI / 4; yaw < 2 * Math.PI; yaw += Math.PI / 2) {
+  shown.vehicles.set([x, y, yaw]);
+  for (const viewpoint of ['driver', 'driver', 'driver', 'chase', 'bird']) {
+    most.drawn += picture.draw(shown, 0, { viewpoint, index: 0, aside: 0, height: 0.8,
+      mirrors: true, plans: true });
+    for (const count of ['draw_calls', 'triangles']) {
+      most[count] = Math.max(most[count], picture.stats[count]);
     }
   }
 }
@@ -105,11 +103,12 @@ def test_60_vehicles_on_400_lanelets_take_few_calls_and_triangles(
     cockpit.publish('scene', large_scene(run) | {
         'environment': {'light': light, 'visibility': 30000.0}})
     page.wait('crgame.store.scene.lanelets.length === 400 && crgame.store.latest')
-    found = page.run_async(ALL_AROUND)
-    assert (found['ratio'], found['width'], found['cars']) == (1, 1920, 60)
-    assert found['drawn'] == 3 * 4 * 5
-    assert 20 < found['draw_calls'] <= MOST_CALLS
-    assert 20_000 < found['triangles'] <= MOST_TRIANGLES
+    around = [page.run_async(ALL_AROUND, *place) for place in ((5, 2), (320, 182), (595, 542))]
+    for found in around:
+        assert (found['ratio'], found['width'], found['cars']) == (1, 1920, 60)
+        assert found['drawn'] == 4 * 5
+    assert 20 < max(found['draw_calls'] for found in around) <= MOST_CALLS
+    assert 20_000 < max(found['triangles'] for found in around) <= MOST_TRIANGLES
     assert page.console_errors() == []
 
 
