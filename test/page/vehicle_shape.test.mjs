@@ -78,7 +78,8 @@ test('glass and roof lie within the outline of a car', () => {
 });
 
 test('a circle and a polygon keep their shape', () => {
-  const { body } = vehicleLook('pillar', { kind: 'circle', length: 3, width: 3, vertices: [] }, false);
+  const pillar = { kind: 'circle', length: 3, width: 3, vertices: [] };
+  const { body } = vehicleLook('pillar', pillar, false);
   assert.deepEqual(body.arcs, [{ x: 0, y: 0, rx: 1.5, ry: 1.5 }]);
   const triangle = { kind: 'polygon', length: 2, width: 1, vertices: [-1, 0, 1, 0.5, 1, -0.5] };
   const block = vehicleLook('building', triangle, false).body;

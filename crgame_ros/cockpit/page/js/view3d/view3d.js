@@ -177,7 +177,8 @@ export class View3d {
       this.picture ??= new module.Picture(three, this.#canvas, this.#store);
       return true;
     } catch (error) {
-      this.#notify(`The 3D view cannot be drawn: ${error instanceof Error ? error.message : error}`);
+      const reason = error instanceof Error ? error.message : error;
+      this.#notify(`The 3D view cannot be drawn: ${reason}`);
       return false;
     }
   }
