@@ -10,11 +10,11 @@ Check that an AV's motion is one motion, however late its planner answers.
     python benchmarks/late_plans.py scenarios/cut_in.yaml --live
 
 Each game runs offline, also with scenarios of other time steps. In a CommonRoad scenario with a
-planning problem, an AV drives among reactive traffic. With `--live` the whole graph runs, and
-planners wait before they answer. Of the AVs the table gives the largest
-difference between the speed and the displacement, over a simulation step and over a scenario
-step, the largest step to the side, the refused and the realigned plans, and the transitions that
-the drivability checker refuses.
+planning problem, an AV drives among reactive traffic. With `--live` the whole graph runs: planners
+with their default options wait before they answer. Of the AVs the table gives the largest
+difference between the speed and the displacement, over a simulation step and over a scenario step,
+the largest step to the side, the refused and the realigned plans, and the transitions that the
+drivability checker refuses.
 """
 
 import argparse

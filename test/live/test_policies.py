@@ -56,6 +56,8 @@ def test_every_plan_of_the_policy_is_followed(run: Launcher) -> None:
 
 def test_the_recording_names_the_policy_and_holds_what_it_did(run: Launcher) -> None:
     log = read_trajectories(run.out / 'bag')
+    # Both were ready in time.
+    assert not run.says('starting without')
     vehicles = [item.id for item in log.vehicles]
     human = log.vehicle_states[:, vehicles.index('hv0')]
     # The human's policy presses pedals: its car does not only roll.
