@@ -25,11 +25,10 @@ from crgame_ros.ros.live_force import LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.seat import GAME
-from crgame_ros.ros.spinning import prompt_executor, spin
+from crgame_ros.ros.spinning import prompt_executor, PromptNode, spin
 from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Joy
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 DEVICE_POLL_S = 0.02
 
 
-class DriverNode(Node):
+class DriverNode(PromptNode):
     """
     The node that publishes the command of each next cycle, and again when the input changes.
 
