@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+import re
 
 from crgame_ros.geometry.shape import Shape
 import numpy as np
@@ -32,7 +33,8 @@ class ObjectDescription:
     One object that may appear; a row of `/scenario/objects`.
 
     :param id: name used in joint names: hv0, av0, o<obstacle id> for scenario obstacles, t0 for
-        agents of traffic, and the game's own names for its objects (scripted, or static).
+        agents of traffic, and the game's own names for its objects (scripted, or static). Where
+        an obstacle has several shapes, each is an object: o30, o30_2, o30_3.
     :param type: CommonRoad obstacle type in its XML spelling (car, pedestrian, parkedVehicle…).
     :param role: what moves it.
     :param shape: footprint around its centre.
@@ -50,6 +52,11 @@ class ObjectDescription:
     def reference_point(self) -> str:
         """Return the reference point of the object's poses: rear_axle or center."""
         return 'rear_axle' if self.role.is_ego else 'center'
+
+
+def whole_id(object_id: str) -> str:
+    """Return the id of the obstacle that an object is a part of: o30 for o30_2."""
+    return re.sub(r'^(o\d+)_\d+$', r'\1', object_id)
 
 
 @dataclass(frozen=True)

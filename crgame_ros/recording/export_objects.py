@@ -2,22 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes vehicles and objects of a run as CommonRoad obstacles."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.objects import ObjectDescription, Role, whole_id
 from crgame_ros.geometry.angles import wrap_pi_array
-from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.geometry.reference_point import seen_from, shifted
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.export_elements import (
     dynamic_obstacle,
     DYNAMIC_TYPES,
     environment_obstacle,
     ENVIRONMENT_TYPES,
+    Parts,
     phantom_obstacle,
     static_obstacle,
     STATIC_TYPES,
+    whole,
 )
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
@@ -62,28 +66,34 @@ class ObjectWriter:
         self.vehicle_rows = _vehicle_rows(log)
         self.ids: dict[str, int] = {}
         seen = np.flatnonzero(np.isfinite(log.object_poses).all(axis=2).any(axis=0)).tolist()
-        for item in (log.objects[column] for column in seen):
-            number = item.id.removeprefix('o')
-            self.ids[item.id] = ids.keep(int(number), item.id) if number.isdecimal() \
-                else ids.fresh()
+        self._wholes: defaultdict[str, list[int]] = defaultdict(list)
+        for column in seen:
+            name = whole_id(log.objects[column].id)
+            number = name.removeprefix('o')
+            if name not in self.ids:
+                self.ids[name] = ids.keep(int(number), name) if number.isdecimal() \
+                    else ids.fresh()
+            self.ids[log.objects[column].id] = self.ids[name]
+            self._wholes[name].append(column)
         if len(seen) < len(log.objects):
             notices.append(f'{len(log.objects) - len(seen)} objects never appeared in the run and '
                            'are left out')
 
     def write(self) -> None:
         """Write all objects, then the driven vehicles."""
-        for column, item in enumerate(self._log.objects):
-            if item.id in self.ids:
-                poses = self._log.object_poses[:, column].copy()
-                poses[:, 2] = wrap_pi_array(poses[:, 2])
-                if item.role is Role.STATIC and np.isfinite(poses).all():
-                    self._write_static(item, poses[np.isfinite(poses).all(axis=1)][0].tolist())
-                else:
-                    self._write_moving(item, poses, self._log.object_velocities[:, column])
+        for column, *others in self._wholes.values():
+            item = self._log.objects[column]
+            poses = self._log.object_poses[:, column].copy()
+            poses[:, 2] = wrap_pi_array(poses[:, 2])
+            parts = (*whole(item.shape), *(self._beside(column, other) for other in others))
+            if item.role is Role.STATIC and np.isfinite(poses).all():
+                self._write_static(item, parts, poses[0].tolist())
+            else:
+                self._write_moving(item, parts, poses, self._log.object_velocities[:, column])
         for column, item in enumerate(self._log.vehicles):
             self.ids[item.id] = self._pool.fresh()
             self._parts['dynamic'].append(named(item.id) + dynamic_obstacle(
-                self.ids[item.id], self._type(item, DYNAMIC_TYPES), item.shape,
+                self.ids[item.id], self._type(item, DYNAMIC_TYPES), whole(item.shape),
                 self.vehicle_rows[:, column].tolist(), True, self._signals(column)))
 
     def text(self) -> str:
@@ -116,16 +126,23 @@ class ObjectWriter:
                              'is "unknown"')
         return 'unknown'
 
-    def _write_static(self, item: ObjectDescription, pose: list[float]) -> None:
+    def _beside(self, first: int, column: int) -> tuple[Shape, list[float]]:
+        """Return the shape of another part of an object, and its pose relative to the first's."""
+        poses = self._log.object_poses[:, (first, column)]
+        own, other = poses[np.isfinite(poses).all(axis=(1, 2))][0]
+        x, y = seen_from(own, other)
+        return self._log.objects[column].shape, [float(x), float(y), float(other[2] - own[2])]
+
+    def _write_static(self, item: ObjectDescription, parts: Parts, pose: list[float]) -> None:
         number = self.ids[item.id]
         if item.type in ENVIRONMENT_TYPES:
             self._parts['environment'].append(
-                environment_obstacle(number, item.type, item.shape, pose))
+                environment_obstacle(number, item.type, parts, pose))
         else:
             self._parts['static'].append(
-                static_obstacle(number, self._type(item, STATIC_TYPES), item.shape, pose))
+                static_obstacle(number, self._type(item, STATIC_TYPES), parts, pose))
 
-    def _write_moving(self, item: ObjectDescription, poses: FloatArray,
+    def _write_moving(self, item: ObjectDescription, parts: Parts, poses: FloatArray,
                       velocities: FloatArray) -> None:
         """Write a dynamic obstacle from step 0 on, and phantom obstacles for later pieces."""
         pieces = list(_pieces(poses))
@@ -137,10 +154,10 @@ class ObjectWriter:
             if first == 0:
                 rows = np.column_stack((poses, _signed_speeds(poses, velocities)))[:end]
                 self._parts['dynamic'].append(dynamic_obstacle(
-                    number, self._type(item, DYNAMIC_TYPES), item.shape, rows.tolist(), False))
+                    number, self._type(item, DYNAMIC_TYPES), parts, rows.tolist(), False))
                 continue
             self._parts['phantom'].append(named(item.id) + phantom_obstacle(
-                number, item.shape, first, poses[first:end].tolist()))
+                number, parts, first, poses[first:end].tolist()))
             self._notices.append(
                 f'{item.id} appears at time step {first}: from then on it is the phantom obstacle '
                 f'{number}, which holds its places, but not its type and speed')

@@ -7,7 +7,7 @@ import pickle
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription
-from crgame_ros.scenario.export_elements import planning_problem, static_obstacle
+from crgame_ros.scenario.export_elements import planning_problem, static_obstacle, whole
 from crgame_ros.scenario.export_goals import goals_of
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import framed, schema_errors, used_ids, write_roads
@@ -37,7 +37,7 @@ def refuse_unwritable(loaded: LoadedScenario, objects: Sequence[ObjectDescriptio
     roads = write_roads(loaded, 0, [])
     frame = framed(roads.elements)
     ids = IdPool(used_ids([frame]), [])
-    text = [static_obstacle(ids.fresh(), 'unknown', shape, _ORIGIN[:3]) for shape in shapes]
+    text = [static_obstacle(ids.fresh(), 'unknown', whole(shape), _ORIGIN[:3]) for shape in shapes]
     written = [planning_problem(ids.fresh(), _ORIGIN, goals_of(
         known[number], str(number), 0, 1, roads.lanelets, [])) for number in problems]
     last = frame[-1]

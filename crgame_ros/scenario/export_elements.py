@@ -7,14 +7,15 @@ Text is composed directly: a run has tens of thousands of states, and building a
 of their values would take seconds. Numbers never have an exponent, which the schema forbids.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from commonroad.common.util import Interval
-from commonroad.geometry.shape import Circle, Polygon, Rectangle, ShapeGroup
+from commonroad.geometry.shape import Circle, Polygon, Rectangle
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.shape import Shape
+from crgame_ros.scenario.loading import parts_of
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +37,13 @@ _PROBLEM_STATE = _OBJECT_STATE + ''.join(
     _VALUE.format(name) for name in ('acceleration', 'yawRate', 'slipAngle'))
 
 FloatArray = NDArray[np.float64]
+# The shapes of an object, each with the pose of its centre relative to the object's.
+Parts = Sequence[tuple[Shape, Sequence[float]]]
+
+
+def whole(shape: Shape) -> Parts:
+    """Return the parts of an object of one shape."""
+    return ((shape, (0.0, 0.0, 0.0)),)
 
 
 def exact_number(value: float) -> str:
@@ -44,25 +52,25 @@ def exact_number(value: float) -> str:
     return text + '0' if text.endswith('.') else text
 
 
-def static_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float]) -> str:
+def static_obstacle(number: int, kind: str, parts: Parts, pose: Sequence[float]) -> str:
     """
     Return the XML of an obstacle that never moves.
 
     :param kind: one of `STATIC_TYPES`
     :param pose: its centre's x [m], y [m], yaw [rad]
     """
-    return (f'<staticObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>'
+    return (f'<staticObstacle id="{number}"><type>{kind}</type><shape>{_body(parts)}</shape>'
             f'<initialState>{_POSE.format(*pose)}{_TIME.format(0)}</initialState>'
             '</staticObstacle>\n')
 
 
-def environment_obstacle(number: int, kind: str, shape: Shape, pose: Sequence[float]) -> str:
+def environment_obstacle(number: int, kind: str, parts: Parts, pose: Sequence[float]) -> str:
     """Return the XML of a building or another of `ENVIRONMENT_TYPES`, in map coordinates."""
     return (f'<environmentObstacle id="{number}"><type>{kind}</type>'
-            f'<shape>{_placed_shape(shape, pose)}</shape></environmentObstacle>\n')
+            f'<shape>{_placed(parts, pose)}</shape></environmentObstacle>\n')
 
 
-def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequence[float]],
+def dynamic_obstacle(number: int, kind: str, parts: Parts, states: Iterable[Sequence[float]],
                      driven: bool, signals: Sequence[Sequence[bool]] = ()) -> str:
     """
     Return the XML of an obstacle with its trajectory.
@@ -77,7 +85,7 @@ def dynamic_obstacle(number: int, kind: str, shape: Shape, states: Iterable[Sequ
     lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states)]
     trajectory = '</state>\n<state>'.join(lines[1:])
     initial, series = _signal_series(signals)
-    return (f'<dynamicObstacle id="{number}"><type>{kind}</type><shape>{_shape(shape)}</shape>\n'
+    return (f'<dynamicObstacle id="{number}"><type>{kind}</type><shape>{_body(parts)}</shape>\n'
             f'<initialState>{lines[0]}</initialState>\n{initial}'
             f'<trajectory>\n<state>{trajectory}</state>\n</trajectory>{series}'
             '</dynamicObstacle>\n')
@@ -95,7 +103,7 @@ def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:
             f'\n<signalSeries>\n<signalState>{states}</signalState>\n</signalSeries>\n')
 
 
-def phantom_obstacle(number: int, shape: Shape, first: int,
+def phantom_obstacle(number: int, parts: Parts, first: int,
                      poses: Iterable[Sequence[float]]) -> str:
     """
     Return the XML of occupancies at consecutive time steps, which need not begin with 0.
@@ -104,7 +112,7 @@ def phantom_obstacle(number: int, shape: Shape, first: int,
     :param poses: its centre's x [m], y [m], yaw [rad]
     """
     occupancies = '\n'.join(
-        f'<occupancy><shape>{_placed_shape(shape, pose)}</shape>{_TIME.format(step)}</occupancy>'
+        f'<occupancy><shape>{_placed(parts, pose)}</shape>{_TIME.format(step)}</occupancy>'
         for step, pose in enumerate(poses, first))
     return (f'<phantomObstacle id="{number}"><occupancySet>\n{occupancies}\n'
             '</occupancySet></phantomObstacle>\n')
@@ -157,20 +165,12 @@ def goal_position(shape: CommonRoadShape) -> str:
     The schema requires all parts of a group to be of one kind: those of a mixed group become
     polygons.
     """
-    parts = list(_parts(shape))
+    parts = list(parts_of(shape))
     if len({type(part) for part in parts}) > 1:
         return ''.join(_polygon(part.shapely_object.exterior.coords[:-1])
                        if not isinstance(part, Polygon) else _commonroad_shape(part)
                        for part in parts)
     return ''.join(_commonroad_shape(part) for part in parts)
-
-
-def _parts(shape: CommonRoadShape) -> Iterator[CommonRoadShape]:
-    if isinstance(shape, ShapeGroup):
-        for part in shape.shapes:
-            yield from _parts(part)
-    else:
-        yield shape
 
 
 def _commonroad_shape(shape: CommonRoadShape) -> str:
@@ -192,6 +192,22 @@ def interval_bounds(value: Any) -> tuple[float, float]:
 
 def _interval(start: str, end: str) -> str:
     return f'<intervalStart>{start}</intervalStart><intervalEnd>{end}</intervalEnd>'
+
+
+def _body(parts: Parts) -> str:
+    """Return the XML of shapes in the coordinates of their object."""
+    return _shape(parts[0][0]) if len(parts) == 1 else _placed(parts, (0.0, 0.0, 0.0))
+
+
+def _placed(parts: Parts, pose: Sequence[float]) -> str:
+    """Return the XML of the shapes of an object at a pose, all of one kind (`goal_position`)."""
+    x, y, yaw = pose
+    places = [(*placed_at(np.array([own[:2]]), x, y, yaw)[0], yaw + own[2]) for _, own in parts]
+    if len({shape.kind for shape, _ in parts}) > 1:
+        return ''.join(_polygon(placed_at(outline(shape), *place).tolist())
+                       for (shape, _), place in zip(parts, places, strict=True))
+    return ''.join(_placed_shape(shape, place)
+                   for (shape, _), place in zip(parts, places, strict=True))
 
 
 def _shape(shape: Shape) -> str:

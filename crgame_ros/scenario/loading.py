@@ -27,7 +27,8 @@ from crgame_ros.scenario import guard
 from crgame_ros.scenario.format_2017a import upgrade
 from crgame_ros.scenario.heights import LaneletHeights, read_heights
 from crgame_ros.scenario.recorded_humans import read_human_note
-from crgame_ros.scenario.repair import mend
+from crgame_ros.scenario.repair import mend, mend_places
+from crgame_ros.scenario.simplifications import simplifications, uncertain_values
 from lxml import etree
 import numpy as np
 from numpy.typing import NDArray
@@ -106,13 +107,14 @@ def _pickled(xml_text: str, source: str) -> bytes:
 
 def _parsed(xml_text: str, source: str) -> LoadedScenario:
     root = guard.parse_hardened(xml_text, source)
-    notices = upgrade(root)
+    notices = upgrade(root) + mend_places(root)
     guard.refuse_malformed(root, source)
     heights = read_heights(root)
     notices += mend(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
     exact = tuple(_exact_problem(problem, notices) for problem in problems)
+    notices += simplifications(scenario)
     for lanelet in scenario.lanelet_network.lanelets:
         if not 1e-3 < lanelet.distance[-1] < _MAX_LANELET_LENGTH:
             raise InputError(f'the centre line is {lanelet.distance[-1]:g} m long',
@@ -151,12 +153,20 @@ def exact_position(position: NDArray[np.float64] | Shape) -> NDArray[np.float64]
     return np.asarray(position, dtype=np.float64)[:2]
 
 
+def parts_of(shape: Shape) -> Iterator[Shape]:
+    """Yield the shapes of a group, and of the groups in it; any other shape is its only one."""
+    if isinstance(shape, ShapeGroup):
+        for part in shape.shapes:
+            yield from parts_of(part)
+    else:
+        yield shape
+
+
 def group_outline(group: ShapeGroup) -> shapely.Geometry:
     """Return the union of a group's shapes; commonroad-io's own outline halves circles' radii."""
     return shapely.union_all([
-        group_outline(shape) if isinstance(shape, ShapeGroup)
-        else shapely.Point(shape.center).buffer(shape.radius) if isinstance(shape, Circle)
-        else shape.shapely_object for shape in group.shapes])
+        shapely.Point(shape.center).buffer(shape.radius) if isinstance(shape, Circle)
+        else shape.shapely_object for shape in parts_of(group)])
 
 
 def exact_value(value: float | Interval | None) -> float:
@@ -223,8 +233,7 @@ def _element_of(error: BaseException, source: str) -> str:
 
 def _exact_problem(problem: PlanningProblem, notices: list[str]) -> PlanningProblem:
     state = problem.initial_state
-    uncertain = [name for name in state.used_attributes
-                 if isinstance(getattr(state, name), Shape | Interval)]
+    uncertain = uncertain_values(state)
     if not uncertain:
         return problem
     notices.append(f'planning problem {problem.planning_problem_id}: the uncertain initial '

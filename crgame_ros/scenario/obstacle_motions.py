@@ -3,6 +3,7 @@
 """The obstacles of one run: their motions in the scenario, and those that events changed."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 import math
 
 from crgame_ros.game.objects import ObjectStates
@@ -62,18 +63,19 @@ class Braking(ObstacleMotion):
 
     :param k: time step at which it begins to brake.
     :param path: (n, 3) poses from there on.
+    :param s: (n) distances driven there [m]
     :param speed: v0 at the beginning [m/s]
     :param deceleration: [m/s^2]
     :param final_speed: v1 [m/s]
     :param time_step_s: Delta t_c [s]
     """
 
-    def __init__(self, k: int, path: FloatArray, speed: float, deceleration: float,
-                 final_speed: float, time_step_s: float) -> None:
+    def __init__(self, k: int, path: FloatArray, s: FloatArray, speed: float,
+                 deceleration: float, final_speed: float, time_step_s: float) -> None:
         self._k, self._time_step_s = k, time_step_s
         self._speed, self._deceleration = speed, deceleration
         self._final_speed = min(speed, final_speed)
-        self._s = arc_length(path[:, :2])
+        self._s = s
         self._path = path.copy()
         self._path[:, 2] = np.unwrap(path[:, 2])
         self._stops = self._final_speed == 0.0
@@ -163,27 +165,33 @@ class ObstacleMotions:
         """Return whether an obstacle is held until an event releases it."""
         return column in self._obstacles.held and column not in self._courses
 
-    def release(self, column: int, k: int) -> None:
-        """Release a held obstacle at a time step."""
-        self._courses[column] = Released(k, self._obstacles.track(column))
+    def release(self, columns: Sequence[int], k: int) -> None:
+        """Release a held obstacle at a time step: the columns of all its parts."""
+        for column in columns:
+            self._courses[column] = Released(k, self._obstacles.track(column))
 
-    def brake(self, column: int, k: int, deceleration: float, speed: float) -> None:
+    def brake(self, columns: Sequence[int], k: int, deceleration: float, speed: float) -> None:
         """
         Brake a present obstacle along its current course.
 
+        :param columns: of its parts, which stay together: all are as far as the first one.
         :param deceleration: [m/s^2]
         :param speed: final speed [m/s]
         """
-        states = self.states_at(k)
-        x, y, _ = states.velocities[column].tolist()
+        x, y, _ = self.states_at(k).velocities[columns[0]].tolist()
+        paths = [self._path_from(column, k) for column in columns]
+        s = arc_length(paths[0][:, :2])
+        for column, path in zip(columns, paths, strict=True):
+            self._courses[column] = Braking(
+                k, path, s, math.hypot(x, y), deceleration, speed, self._obstacles.time_step_s)
+
+    def _path_from(self, column: int, k: int) -> FloatArray:
+        """Return the known poses (n, 3) of an object from time step k on."""
         course = self._courses.get(column)
-        if course is None:
-            path = self._obstacles.poses[k - self._obstacles.first_k:, column]
-            path = path[np.isfinite(path[:, 0])]
-        else:
-            path = course.path_from(k)
-        self._courses[column] = Braking(
-            k, path, math.hypot(x, y), deceleration, speed, self._obstacles.time_step_s)
+        if course is not None:
+            return course.path_from(k)
+        path = self._obstacles.poses[k - self._obstacles.first_k:, column]
+        return path[np.isfinite(path[:, 0])]
 
     def put(self, column: int, pose: tuple[float, float, float]) -> None:
         """Place an obstacle at a pose permanently."""

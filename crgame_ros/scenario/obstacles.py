@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The obstacles of a scenario: their descriptions, and their states at each time step."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 import copy
 from dataclasses import dataclass, replace
 import math
 
 from commonroad.common.util import Interval
-from commonroad.geometry.shape import Circle, Rectangle, ShapeGroup
+from commonroad.geometry.shape import Circle, Rectangle
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
@@ -17,13 +17,33 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.loading import exact_position, exact_value, group_outline, LoadedScenario
+from crgame_ros.scenario.loading import exact_position, exact_value, LoadedScenario, parts_of
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
 _MAX_CELLS = 20_000_000
+
+
+@dataclass(frozen=True)
+class _Part:
+    """
+    One of the shapes of an obstacle, of which most have one.
+
+    :param description: of the object that it becomes.
+    :param index: among the obstacle's shapes.
+    :param count: of these shapes.
+    :param offset: its centre, relative to the obstacle's reference point [m]
+    :param aside: its centre, relative to that of the whole obstacle [m]
+    """
+
+    obstacle: Obstacle
+    description: ObjectDescription
+    index: int
+    count: int
+    offset: tuple[float, float]
+    aside: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -40,9 +60,10 @@ class ScenarioObstacles:
     All obstacles of a scenario that are not driven vehicles, as arrays over time steps.
 
     Poses are those of the shape's centre: a centre offset of a CommonRoad shape is fixed to the
-    body and turns with it. Uncertain states count as their centres, a set-based prediction as
-    the centres of its occupancies, and gaps inside a trajectory are interpolated. Before its
-    first and after its last state an obstacle is absent (NaN); static ones are always present.
+    body and turns with it. Each shape of a group is an object. Uncertain states count as their
+    centres, a set-based prediction as the centres of its occupancies, and gaps inside a trajectory
+    are interpolated. Before its first and after its last state an obstacle is absent (NaN); static
+    ones are always present.
 
     :param loaded: the scenario.
     :param without: obstacle ids to leave out.
@@ -60,10 +81,11 @@ class ScenarioObstacles:
             *scenario.dynamic_obstacles, *scenario.phantom_obstacle)
             if obstacle.obstacle_id not in without]
         self.time_step_s = loaded.time_step_s
-        described = [_describe(obstacle, loaded.source) for obstacle in obstacles]
-        self.descriptions: tuple[ObjectDescription, ...] = (*(d for d, _ in described), *put)
+        parts = [part for obstacle in obstacles for part in _parts(obstacle, loaded.source)]
+        self.descriptions: tuple[ObjectDescription, ...] = (
+            *(part.description for part in parts), *put)
         self.ids: tuple[str, ...] = tuple(d.id for d in self.descriptions)
-        tracks = [_track(o, offset) for o, (_, offset) in zip(obstacles, described, strict=True)]
+        tracks = [_track(part) for part in parts]
         moving = [t for t in tracks if len(t.steps)]
         self.first_k: int = min((int(t.steps[0]) for t in moving), default=0)
         self.last_k: int = max((int(t.steps[-1]) for t in moving), default=0)
@@ -77,8 +99,8 @@ class ScenarioObstacles:
             self._fill(column, track)
         # Columns of those that the run itself moves.
         self.living: NDArray[np.int_] = np.empty(0, dtype=int)
-        self._held = {column: self._hold(column) for column, obstacle in enumerate(obstacles)
-                      if obstacle.obstacle_id in held}
+        self._held = {column: self._hold(column) for column, part in enumerate(parts)
+                      if part.obstacle.obstacle_id in held}
         self._poses.flags.writeable = False
         self._velocities.flags.writeable = False
         self._static = ObjectStates(*self._only_static())
@@ -190,7 +212,12 @@ class ScenarioObstacles:
         return poses, velocities
 
 
-def _describe(obstacle: Obstacle, source: str) -> tuple[ObjectDescription, tuple[float, float]]:
+def _parts(obstacle: Obstacle, source: str) -> Iterator[_Part]:
+    """
+    Yield the parts of an obstacle.
+
+    :raises InputError: if one of its shapes cannot be used.
+    """
     role = Role.RECORDED if isinstance(obstacle, DynamicObstacle | PhantomObstacle) \
         else Role.STATIC
     where = f'{source}, obstacle {obstacle.obstacle_id}'
@@ -199,21 +226,28 @@ def _describe(obstacle: Obstacle, source: str) -> tuple[ObjectDescription, tuple
         if obstacle.prediction is None:
             raise InputError('a phantom obstacle has no occupancy set', where, 'remove it')
         shape = obstacle.prediction.occupancy_set[0].shape
-        if isinstance(shape, Rectangle):
-            # Occupancies are rotated in the map; here the pose rotates the footprint.
-            shape = Rectangle(shape.length, shape.width)
-    try:
-        footprint, offset = convert_shape(shape)
-    except InputError as error:
-        raise InputError(error.what, where, error.remedy) from error
     kind = getattr(obstacle, 'obstacle_type', None)
     name = 'unknown' if kind is None else str(kind.value)
-    return ObjectDescription(f'o{obstacle.obstacle_id}', name, role, footprint), offset
+    shapes = list(parts_of(shape))
+    middle = exact_position(shape) if len(shapes) > 1 else None
+    for index, part in enumerate(shapes):
+        if isinstance(obstacle, PhantomObstacle) and isinstance(part, Rectangle):
+            # Occupancies are rotated in the map; here the pose rotates the footprint.
+            part = Rectangle(part.length, part.width, part.center)
+        try:
+            footprint, offset = convert_shape(part)
+        except InputError as error:
+            raise InputError(error.what, where, error.remedy) from error
+        number = f'o{obstacle.obstacle_id}' + (f'_{index + 1}' if index else '')
+        aside = (0.0, 0.0) if middle is None else (
+            offset[0] - float(middle[0]), offset[1] - float(middle[1]))
+        yield _Part(obstacle, ObjectDescription(number, name, role, footprint), index,
+                    len(shapes), offset, aside)
 
 
 def convert_shape(shape: CommonRoadShape) -> tuple[Shape, tuple[float, float]]:
     """
-    Convert a CommonRoad shape; groups become their convex hull.
+    Convert a CommonRoad shape that is no group.
 
     :return: the shape around its centre, and the centre relative to the reference point [m]
     :raises InputError: if the shape has no positive, finite extent.
@@ -222,8 +256,7 @@ def convert_shape(shape: CommonRoadShape) -> tuple[Shape, tuple[float, float]]:
         return Shape.rectangle(shape.length, shape.width), _pair(shape.center)
     if isinstance(shape, Circle):
         return Shape.circle(shape.radius), _pair(shape.center)
-    outline = group_outline(shape).convex_hull if isinstance(shape, ShapeGroup) \
-        else shape.shapely_object
+    outline = shape.shapely_object
     if outline.geom_type != 'Polygon' or not outline.area > 0.0:
         raise InputError('the shape has no area', 'shape', 'correct it')
     center = outline.centroid
@@ -236,37 +269,41 @@ def _pair(center: FloatArray) -> tuple[float, float]:
     return float(center[0]), float(center[1])
 
 
-def _track(obstacle: Obstacle, offset: tuple[float, float]) -> _Track:
+def _track(part: _Part) -> _Track:
+    obstacle = part.obstacle
     if not isinstance(obstacle, DynamicObstacle | PhantomObstacle):
         state = getattr(obstacle, 'initial_state', None)
         pose = np.zeros(3) if state is None else _pose(state)
-        return _Track(np.empty(0, dtype=np.int64), _centers(pose[None, :], np.ones(1), offset))
-    # The last column says whether the position is the reference point (1) or the centre (0).
+        return _Track(np.empty(0, dtype=np.int64), _centers(pose[None, :], np.array(part.offset)))
+    # Poses, each with where the part's centre lies from there [m].
     entries: dict[int, FloatArray] = {}
     speed = 0.0
     if isinstance(obstacle, DynamicObstacle):
         state = obstacle.initial_state
-        entries[_step(state.time_step)] = np.array([*_pose(state), 1.0])
+        entries[_step(state.time_step)] = np.array([*_pose(state), *part.offset])
         speed = exact_value(getattr(state, 'velocity', None))
     prediction = obstacle.prediction
     if isinstance(prediction, TrajectoryPrediction):
         for state in prediction.trajectory.state_list:
-            entries.setdefault(_step(state.time_step), np.array([*_pose(state), 1.0]))
+            entries.setdefault(_step(state.time_step), np.array([*_pose(state), *part.offset]))
     elif isinstance(prediction, SetBasedPrediction):
         for occupancy in prediction.occupancy_set:
-            yaw = getattr(occupancy.shape, 'orientation', math.nan)
+            shapes = list(parts_of(occupancy.shape))
+            shape, offset = (shapes[part.index], (0.0, 0.0)) if len(shapes) == part.count \
+                else (occupancy.shape, part.aside)
+            yaw = getattr(shape, 'orientation', math.nan)
             entries.setdefault(_step(occupancy.time_step),
-                               np.array([*exact_position(occupancy.shape), yaw, 0.0]))
+                               np.array([*exact_position(shape), yaw, *offset]))
     steps = np.array(sorted(entries), dtype=np.int64)
     rows = np.array([entries[int(k)] for k in steps])
-    return _Track(steps, _centers(_with_headings(rows[:, :3]), rows[:, 3], offset), speed)
+    return _Track(steps, _centers(_with_headings(rows[:, :3]), rows[:, 3:]), speed)
 
 
-def _centers(poses: FloatArray, share: FloatArray, offset: tuple[float, float]) -> FloatArray:
-    """Move reference poses (n, 3) to the centre, by the share (n) of a body-fixed offset."""
+def _centers(poses: FloatArray, offsets: FloatArray) -> FloatArray:
+    """Move poses (n, 3) by body-fixed offsets (n, 2)."""
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.stack((poses[:, 0] + share * (cos * offset[0] - sin * offset[1]),
-                     poses[:, 1] + share * (sin * offset[0] + cos * offset[1]),
+    x, y = offsets.T
+    return np.stack((poses[:, 0] + (cos * x - sin * y), poses[:, 1] + (sin * x + cos * y),
                      poses[:, 2]), axis=-1)
 
 

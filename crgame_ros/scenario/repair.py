@@ -13,10 +13,30 @@ from lxml import etree
 
 # A published map has an intended gap of 160 m; paths are sampled along gaps [m].
 MAX_GAP = 1000.0
+# A gap that a person would see [m].
+TOLD_GAP = 5.0
 # Elements that link a lanelet to others.
 LINKS = ('successor', 'predecessor', 'adjacentLeft', 'adjacentRight')
 _LENIENT_ID = re.compile(
-    r'(C-)?([A-Z]{3})[-_]([A-Za-z0-9]+)[-_](\d+)(?:[-_](\d+)(?:[-_]([STPI])((?:[-_]\d+)+))?)?')
+    r'(C-)?([A-Z]{3})[-_.]([A-Za-z0-9]+)[-_.](\d+)'
+    r'(?:[-_.](\d+)(?:[-_.]([STPI])((?:[-_.]\d+)+))?)?')
+
+
+def mend_places(root: etree._Element) -> list[str]:
+    """
+    Remove positions of signs and lights that are no numbers; they are drawn at their lanelets.
+
+    :param root: changed in place, before `guard.refuse_malformed`.
+    :return: remarks, one line each.
+    """
+    notices = []
+    for element in root.iterchildren('trafficSign', 'trafficLight'):
+        for position in element.findall('position'):
+            if not guard.has_finite_numbers(position.iter('x', 'y', 'z')):
+                element.remove(position)
+                notices.append(f'{element.tag} {element.get("id")}: its position is no number and '
+                               'is ignored')
+    return notices
 
 
 def mend(root: etree._Element) -> list[str]:
@@ -72,13 +92,18 @@ def _mend_header(root: etree._Element, notices: list[str]) -> None:
 
 
 def _valid_benchmark_id(given: str) -> str:
+    """Return a valid id with as much of the given one as can be read: at least its country."""
     candidates = [given]
     parts = _LENIENT_ID.fullmatch(given)
     if parts is not None:
         cooperative, country, name, map_id, configuration, kind, numbers = parts.groups('')
         candidates.append(f'{cooperative}{country}_{name}-{map_id}'
                           + (f'_{configuration}' if configuration else '')
-                          + (f'_{kind}{numbers.replace("_", "-")}' if kind else ''))
+                          + (f'_{kind}{re.sub("[_.]", "-", numbers)}' if kind else ''))
+    # The country decides what the ids of traffic signs mean.
+    known = re.match('(?:C-)?([A-Z]{3})[-_.]', given)
+    if known is not None:
+        candidates.append(f'{known[1]}_{_plain(given[known.end():])}-1')
     for candidate in candidates:
         if len(candidate) <= 100 and ScenarioID.benchmark_id_pattern.fullmatch(candidate):
             try:
@@ -86,7 +111,12 @@ def _valid_benchmark_id(given: str) -> str:
             except (ValueError, AssertionError):
                 continue
             return candidate
-    return f'ZAM_{re.sub("[^A-Za-z0-9]", "", given)[:40] or "Unnamed"}-1'
+    return f'ZAM_{_plain(given) or "Unnamed"}-1'
+
+
+def _plain(text: str) -> str:
+    """Return the letters and digits of a text, at most 40."""
+    return re.sub('[^A-Za-z0-9]', '', text)[:40]
 
 
 def _mend_references(root: etree._Element, notices: list[str]) -> None:
@@ -107,8 +137,17 @@ def _mend_references(root: etree._Element, notices: list[str]) -> None:
                 lanelet.remove(link)
                 dropped[f'<{link.tag}> of lanelet {lanelet.get("id")}, without a ref'] += 1
     if dropped:
-        notices.append(f'{dropped.total()} references lead nowhere and are ignored, the first: '
+        many = dropped.total() > 1
+        notices.append(f'{dropped.total()} reference{"s lead" if many else " leads"} nowhere and '
+                       f'{"are" if many else "is"} ignored{", the first" * many}: '
                        f'{next(iter(dropped))}')
+    # A sign or light that only the stop line names concerns its lanelet.
+    for line in root.iterfind('lanelet/stopLine'):
+        lanelet = line.getparent()
+        for reference in line.iterfind('*[@ref]'):
+            if reference.get('ref') not in {each.get('ref') for each in
+                                            lanelet.iterchildren(reference.tag)}:
+                etree.SubElement(lanelet, reference.tag, ref=reference.get('ref'))
     for tag in ('trafficSign', 'trafficLight'):
         used = {e.get('ref') for e in root.iterfind(f'lanelet/{tag}Ref')}
         for element in root.findall(tag):
@@ -123,6 +162,7 @@ def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
     ends = {lanelet.get('id'): (_middle(lanelet, 0), _middle(lanelet, -1))
             for lanelet in root.iterchildren('lanelet')}
     cut: list[tuple[float, str]] = []
+    kept: list[tuple[float, str]] = []
     for lanelet in root.iterchildren('lanelet'):
         start, end = ends[lanelet.get('id')]
         for link in _links(lanelet):
@@ -133,6 +173,12 @@ def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
             if not gap <= MAX_GAP:
                 lanelet.remove(link)
                 cut.append((gap, f'<{link.tag}> of lanelet {lanelet.get("id")}'))
+            elif link.tag == 'successor' and gap > TOLD_GAP:
+                kept.append((gap, f'from {lanelet.get("id")} to {link.get("ref")}'))
+    if kept:
+        notices.append(f'{len(kept)} connections of lanelets have a gap of more than '
+                       f'{TOLD_GAP:g} m, which vehicles cross straight, the widest, '
+                       f'{max(kept)[0]:.0f} m: {max(kept)[1]}')
     if cut:
         notices.append(f'{len(cut)} links of lanelets more than {MAX_GAP:g} m apart are ignored, '
                        f'the widest, {max(cut)[0]:.0f} m: {max(cut)[1]}')

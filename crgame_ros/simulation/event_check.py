@@ -20,7 +20,7 @@ from crgame_ros.game.events import (
     TrafficChange,
 )
 from crgame_ros.game.game import AvSpec, Game
-from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.objects import ObjectDescription, Role, whole_id
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.planner.registry import EXTERNAL
 from crgame_ros.roads.network import RoadNetwork
@@ -55,7 +55,8 @@ def check_events(game: Game, where: str, network: RoadNetwork, obstacles: Scenar
     """
     if not game.events:
         return
-    recorded = [item.id for item in obstacles.descriptions if item.role is Role.RECORDED]
+    recorded = [item.id for item in obstacles.descriptions
+                if item.role is Role.RECORDED and item.id == whole_id(item.id)]
     ids: dict[str, list[str | int]] = {
         'moving obstacle': [*recorded], 'lanelet': [*network.lanelet_ids],
         'AV': [spec.id for spec in avs],

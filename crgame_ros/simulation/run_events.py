@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The events of one run: which are due at a tick, and how they change the objects."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 import math
 
@@ -15,7 +16,7 @@ from crgame_ros.game.events import (
     Release,
     TrafficChange,
 )
-from crgame_ros.game.objects import ObjectStates
+from crgame_ros.game.objects import ObjectStates, whole_id
 from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.simulation.condition_check import ConditionCheck
 from crgame_ros.simulation.setup import Setup
@@ -47,6 +48,9 @@ class RunEvents:
         self._triggered: set[str] = set()
         self._columns = {item.id: column
                          for column, item in enumerate(setup.obstacles.descriptions)}
+        self._wholes: defaultdict[str, list[int]] = defaultdict(list)
+        for object_id, column in self._columns.items():
+            self._wholes[whole_id(object_id)].append(column)
         self._k = setup.scheduler.k0
         self._objects: ObjectStates | None = None
 
@@ -127,10 +131,9 @@ class RunEvents:
         action, object_id = event.action, event.object_id
         if object_id is None:
             return
-        column = self._columns[object_id]
         if isinstance(action, Release):
-            self.obstacles.release(column, k)
+            self.obstacles.release(self._wholes[object_id], k)
         elif isinstance(action, Brake):
-            self.obstacles.brake(column, k, action.deceleration, action.speed)
+            self.obstacles.brake(self._wholes[object_id], k, action.deceleration, action.speed)
         elif isinstance(action, PutObstacle):
-            self.obstacles.put(column, (action.x, action.y, action.yaw))
+            self.obstacles.put(self._columns[object_id], (action.x, action.y, action.yaw))

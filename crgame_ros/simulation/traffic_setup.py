@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reactive traffic of a run before its first step, for both runners and for traffic_node."""
 
+from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from crgame_ros.game.objects import ObjectDescription, ObjectStates
+from crgame_ros.game.objects import ObjectDescription, ObjectStates, whole_id
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
@@ -42,14 +43,16 @@ def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, netw
     """
     Choose the recorded obstacles that become agents.
 
-    :param kept: ids of obstacles named by events, which stay as recorded.
+    :param kept: ids of obstacles named by events, which stay as recorded, as do those of several
+        shapes.
     :return: their columns, in order
     """
     if spec is None or spec.recorded != 'reactive':
         return ()
     from crgame_ros.traffic.adoption import adoptable
+    parts = Counter(map(whole_id, obstacles.ids))
     return tuple(column for column, item in enumerate(obstacles.descriptions)
-                 if item.id not in kept
+                 if item.id not in kept and parts[whole_id(item.id)] == 1
                  and adoptable(item, obstacles.track(column)[0], network))
 
 

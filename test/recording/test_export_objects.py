@@ -110,6 +110,39 @@ def test_shapes_and_types_of_everything(runs: Any, tmp_path: Path) -> None:
         'o903: the schema knows no car of this kind; its type is "unknown"']
 
 
+def test_parts_of_an_obstacle_are_one_obstacle_again(runs: Any, tmp_path: Path) -> None:
+    """A group is written with all its shapes, of one kind as the schema wants it."""
+    log = runs.drive(runs.own(CUT_IN), tmp_path)
+    steps = len(log.ks)
+
+    def tracks(of: Any, first: Any) -> list[Any]:
+        at_left = of.copy()
+        at_left[:, 0] -= 3.0 * np.sin(of[:, 2])
+        at_left[:, 1] += 3.0 * np.cos(of[:, 2])
+        return [(first, of), (replace(first, id=f'{first.id}_2'), at_left),
+                (replace(first, id=f'{first.id}_3', shape=Shape.circle(0.5)), at_left)]
+
+    still = np.tile((7.0, 8.0, math.pi / 2), (steps, 1))
+    moving = runs.track(steps, set(range(steps)))
+    later = runs.track(steps, set(range(5, steps)))
+    exported = export_scenario(runs.with_objects(
+        log, *tracks(still, runs.described('o900', 'parkedVehicle', Role.STATIC)),
+        *tracks(still, runs.described('o901', 'building', Role.STATIC)),
+        *tracks(moving, runs.described('o902', 'truck')),
+        *tracks(later, runs.described('o903', 'truck'))))
+    scenario, _ = runs.read_back(exported)
+    numbers = {each.obstacle_id for each in scenario.obstacles}
+    assert numbers >= {900, 901, 902, 903} and len(numbers) == 4 + len(log.vehicles)
+    assert exported.obstacle_ids['o902'] == exported.obstacle_ids['o902_3'] == 902
+    again = ScenarioObstacles(parse_scenario(exported.xml_text, 'export'))
+    for k in (0, 6, steps - 1):
+        found = dict(zip(again.ids, again.states_at(k).poses[:, :2].tolist(), strict=True))
+        for name, of in (('o900', still), ('o901', still), ('o902', moving), ('o903', later)):
+            middle = [track[k, :2] for _, track in tracks(of, runs.described(name))]
+            np.testing.assert_allclose(
+                [found[name], found[f'{name}_2'], found[f'{name}_3']], middle, atol=2e-4)
+
+
 def test_objects_that_drive_backwards_have_negative_speed(runs: Any, tmp_path: Path) -> None:
     """The sign is that of the motion along the heading."""
     log = runs.drive(runs.own(CUT_IN), tmp_path)

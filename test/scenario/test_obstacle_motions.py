@@ -5,10 +5,11 @@
 import math
 
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
+from crgame_ros.geometry.reference_point import seen_from
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.scenario.loading import load_scenario, LoadedScenario
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.prediction import LanePrediction, recorded_future
@@ -18,6 +19,22 @@ import pytest
 
 DT = 0.1
 LEADER, WALKER, PUT = 0, 1, 2
+# A truck and its trailer as one obstacle, on a circle of 50 m at 10 m/s.
+BENDING = (
+    '<commonRoad timeStepSize="0.1" commonRoadVersion="2020a" benchmarkID="ZAM_Bend-1">'
+    '<lanelet id="1"><leftBound><point><x>0</x><y>2</y></point><point><x>9</x><y>2</y></point>'
+    '</leftBound><rightBound><point><x>0</x><y>-2</y></point><point><x>9</x><y>-2</y></point>'
+    '</rightBound></lanelet><dynamicObstacle id="7"><type>truck</type><shape>'
+    '<rectangle><length>4</length><width>2</width></rectangle><rectangle><length>3</length>'
+    '<width>2</width><center><x>-4</x><y>1</y></center></rectangle></shape>{}'
+    '</dynamicObstacle></commonRoad>').format(''.join(
+        f'{tag}<position><point><x>{50 * math.sin(0.02 * k)}</x>'
+        f'<y>{50 - 50 * math.cos(0.02 * k)}</y></point></position><orientation><exact>{0.02 * k}'
+        f'</exact></orientation><time><exact>{k}</exact></time><velocity><exact>10</exact>'
+        f'</velocity>{end}' for k, tag, end in (
+            (0, '<initialState>', '</initialState><trajectory>'),
+            *((k, '<state>', '</state>') for k in range(1, 70)),
+            (70, '<state>', '</state></trajectory>'))))
 CONE = ObjectDescription('e_cone', 'constructionZone', Role.STATIC, Shape.rectangle(2.0, 1.0))
 
 
@@ -69,7 +86,7 @@ def test_released_obstacle_plays_its_recording_shifted(loaded: LoadedScenario,
     """The same bits, 83 time steps later, and absent after its end; no other obstacle changes."""
     courses, plain = ObstacleMotions(obstacles), ScenarioObstacles(loaded)
     assert courses.is_held(WALKER) and not courses.is_held(LEADER)
-    courses.release(WALKER, 83)
+    courses.release((WALKER,), 83)
     assert courses.changed == [WALKER] and not courses.is_held(WALKER)
     for k in (83, 90, 120, 383):
         before, after = plain.states_at(k - 83), courses.states_at(k)
@@ -86,7 +103,7 @@ def test_braking_obstacle_follows_the_closed_form(obstacles: ScenarioObstacles) 
     """12.5 m/s, 4 m/s^2: s = v t - a t^2 / 2 up to 19.53 m after 3.125 s, then it stands."""
     courses = ObstacleMotions(obstacles)
     start = obstacles.states_at(40).poses[LEADER]
-    courses.brake(LEADER, 40, 4.0, 0.0)
+    courses.brake((LEADER,), 40, 4.0, 0.0)
     time = np.minimum(DT * np.arange(60), 12.5 / 4.0)
     expected = start[0] + 12.5 * time - 2.0 * time**2
     found = poses(courses, LEADER, range(40, 100))
@@ -99,10 +116,20 @@ def test_braking_obstacle_follows_the_closed_form(obstacles: ScenarioObstacles) 
     assert courses.states_at(1000).velocities[LEADER].tolist() == [0.0, 0.0, 0.0]
 
 
+def test_parts_of_an_obstacle_brake_together() -> None:
+    """On a bend the outer part goes further than the first one, which brakes to the speed."""
+    found = ScenarioObstacles(parse_scenario(BENDING, 'bend'))
+    courses = ObstacleMotions(found)
+    courses.brake((0, 1), 10, 2.0, 0.0)
+    between = [seen_from(*pair) for pair in (courses.states_at(k).poses for k in range(60))]
+    np.testing.assert_allclose(between, [(-4.0, 1.0)] * 60, atol=1e-3)
+    assert np.hypot(*courses.states_at(60).velocities[0, :2]) == 0.0
+
+
 def test_braking_to_a_speed_keeps_it_to_the_end_of_the_path(obstacles: ScenarioObstacles) -> None:
     """To 5 m/s at 2 m/s^2; the recorded path ends at x = 510 m, and the car with it."""
     courses = ObstacleMotions(obstacles)
-    courses.brake(LEADER, 100, 2.0, 5.0)
+    courses.brake((LEADER,), 100, 2.0, 5.0)
     speeds = [float(np.hypot(*courses.states_at(k).velocities[LEADER, :2]))
               for k in range(100, 160)]
     assert speeds[0] == pytest.approx(12.5 - 0.1, abs=1e-2)
@@ -117,12 +144,12 @@ def test_obstacle_never_speeds_up_and_stops_beyond_its_path(
         obstacles: ScenarioObstacles) -> None:
     """A final speed above the present one has no effect; a short path is continued straight on."""
     courses = ObstacleMotions(obstacles)
-    courses.brake(LEADER, 10, 4.0, 30.0)
+    courses.brake((LEADER,), 10, 4.0, 30.0)
     np.testing.assert_allclose(poses(courses, LEADER, range(10, 50)),
                                [obstacles.states_at(k).poses[LEADER] for k in range(10, 50)],
                                atol=1e-3)
     short = ObstacleMotions(obstacles)
-    short.brake(LEADER, 299, 4.0, 0.0)
+    short.brake((LEADER,), 299, 4.0, 0.0)
     end = obstacles.states_at(299).poses[LEADER]
     np.testing.assert_allclose(short.states_at(400).poses[LEADER],
                                end + (12.5**2 / 8.0, 0.0, 0.0), atol=1e-3)
@@ -131,9 +158,9 @@ def test_obstacle_never_speeds_up_and_stops_beyond_its_path(
 def test_released_obstacle_brakes_on_its_new_course(obstacles: ScenarioObstacles) -> None:
     """Two events about one object: the pedestrian walks, slows down on the way, then halts."""
     courses = ObstacleMotions(obstacles)
-    courses.release(WALKER, 50)
-    courses.brake(WALKER, 60, 1.4, 0.7)
-    courses.brake(WALKER, 70, 1.4, 0.0)
+    courses.release((WALKER,), 50)
+    courses.brake((WALKER,), 60, 1.4, 0.7)
+    courses.brake((WALKER,), 70, 1.4, 0.0)
     start = obstacles.track(WALKER)[0][10]
     walked = 1.4 * 0.5 - 0.7 * 0.5**2 + 0.7 * 0.5
     np.testing.assert_allclose(courses.states_at(70).poses[WALKER],
@@ -169,8 +196,8 @@ def test_prediction_of_changed_obstacles(loaded: LoadedScenario,
     standing, _ = predicted(loaded, obstacles, courses, 30)
     np.testing.assert_array_equal(standing[:, WALKER],
                                   np.tile(standing[0, WALKER], (31, 1)))
-    courses.brake(LEADER, 20, 4.0, 0.0)
-    courses.release(WALKER, 25)
+    courses.brake((LEADER,), 20, 4.0, 0.0)
+    courses.release((WALKER,), 25)
     courses.put(PUT, (300.0, 0.0, 0.0))
     poses_, velocities = predicted(loaded, obstacles, courses, 30)
     speed = 12.5 - 4.0 * 1.05
@@ -206,6 +233,6 @@ def test_prediction_on_a_bend_follows_the_lane(loaded: LoadedScenario) -> None:
 def test_recorded_future_knows_what_has_happened(obstacles: ScenarioObstacles) -> None:
     """`prediction: recorded` gives the true motion with all events so far."""
     courses = ObstacleMotions(obstacles)
-    courses.release(WALKER, 20)
+    courses.release((WALKER,), 20)
     found, _ = recorded_future(courses, 30, 30)
     np.testing.assert_array_equal(found[:, WALKER], obstacles.track(WALKER)[0][10:41])

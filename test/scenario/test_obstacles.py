@@ -5,15 +5,17 @@
 import math
 from pathlib import Path
 
-from commonroad.geometry.shape import Circle, Polygon, Rectangle, ShapeGroup
+from commonroad.geometry.shape import Circle, Polygon, Rectangle
 from commonroad.scenario.obstacle import StaticObstacle
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi_array
+from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacles import convert_shape, ScenarioObstacles
 import numpy as np
 import pytest
+from shapely import affinity
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 
@@ -44,12 +46,17 @@ def dynamic(body: str, center: str = '') -> str:
             + f'</shape>{body}</dynamicObstacle>')
 
 
-def obstacles(text: str) -> ScenarioObstacles:
+def road_with(text: str) -> LoadedScenario:
     """Read obstacles on a road of one lanelet; Delta t_c is 0.5 s."""
-    return ScenarioObstacles(parse_scenario(
+    return parse_scenario(
         '<commonRoad timeStepSize="0.5" commonRoadVersion="2020a" benchmarkID="ZAM_Mini-1">'
         '<lanelet id="1">' + BOUND.format('leftBound', 2) + BOUND.format('rightBound', -2)
-        + f'</lanelet>{text}</commonRoad>', 'x'))
+        + f'</lanelet>{text}</commonRoad>', 'x')
+
+
+def obstacles(text: str) -> ScenarioObstacles:
+    """Return the obstacles of `road_with`."""
+    return ScenarioObstacles(road_with(text))
 
 
 @pytest.mark.matrix('USA_US101-4_1_T-1.xml', 'OSC_PedestrianCollision-1_1_T-1.xml')
@@ -190,16 +197,59 @@ def test_static_and_environment_obstacles_are_always_there() -> None:
 
 
 def test_shapes() -> None:
-    """Circles keep their radius, turned rectangles are polygons, groups become their hull."""
+    """Circles keep their radius, turned rectangles are polygons."""
     circle, offset = convert_shape(Circle(1.5, np.array([0.5, 0.0])))
     assert (circle.kind, circle.radius, offset) == ('circle', 1.5, (0.5, 0.0))
     turned, _ = convert_shape(Rectangle(4.0, 2.0, orientation=math.pi / 2))
     assert (turned.kind, turned.length, turned.width) == (
         'polygon', pytest.approx(2.0), pytest.approx(4.0))
-    group, offset = convert_shape(ShapeGroup([
-        Rectangle(4.0, 2.0), Rectangle(4.0, 2.0, np.array([4.0, 0.0]))]))
-    assert (group.length, group.width) == (pytest.approx(8.0), pytest.approx(2.0))
-    assert offset == pytest.approx((2.0, 0.0))
+
+
+GROUP = ('<rectangle><length>4</length><width>2</width></rectangle>'
+         '<rectangle><length>3</length><width>1</width><orientation>{turn}</orientation>'
+         '<center><x>-5</x><y>1</y></center></rectangle>')
+
+
+@pytest.mark.parametrize('turn', [0.0, 0.3])
+def test_a_group_is_as_many_objects_that_keep_together(turn: float) -> None:
+    """Each of them is where the whole, as a rigid body, has it."""
+    loaded = road_with(
+        '<dynamicObstacle id="7"><type>truck</type><shape>' + GROUP.format(turn=turn)
+        + f'</shape>{state("initialState", 0, 0.0)}<trajectory>{state("state", 1, 3.0, 1.0, 0.6)}'
+        f'{state("state", 2, 5.0, 3.0, 1.1)}</trajectory></dynamicObstacle>')
+    found = ScenarioObstacles(loaded)
+    assert found.ids == ('o7', 'o7_2')
+    assert {item.type for item in found.descriptions} == {'truck'}
+    truck = loaded.scenario.obstacle_by_id(7)
+    for k in range(3):
+        poses = found.states_at(k).poses
+        ours = [placed_polygon(item.shape, *pose) for item, pose in
+                zip(found.descriptions, poses, strict=True)]
+        at = truck.state_at_time(k)
+        for polygon, part in zip(ours, truck.obstacle_shape.shapes, strict=True):
+            turned = affinity.rotate(part.shapely_object, at.orientation, (0.0, 0.0), True)
+            moved = affinity.translate(turned, *at.position)
+            assert polygon.symmetric_difference(moved).area < 1e-9
+
+
+def test_groups_of_occupancies() -> None:
+    """Each part has its own place in them; sets of another number of shapes move all parts."""
+    found = obstacles(
+        '<phantomObstacle id="7"><occupancySet>' + ''.join(
+            f'<occupancy><shape>{shapes}</shape><time><exact>{k}</exact></time></occupancy>'
+            for k, shapes in enumerate((
+                '<circle><radius>1</radius><center><x>5</x><y>0</y></center></circle>'
+                '<circle><radius>2</radius><center><x>9</x><y>0</y></center></circle>',
+                '<circle><radius>1</radius><center><x>6</x><y>1</y></center></circle>'
+                '<circle><radius>2</radius><center><x>9</x><y>3</y></center></circle>',
+                '<circle><radius>4</radius><center><x>9</x><y>5</y></center></circle>'), 1))
+        + '</occupancySet></phantomObstacle>')
+    assert [item.shape.radius for item in found.descriptions] == [1.0, 2.0]
+    places = [found.states_at(k).poses[:, :2].tolist() for k in (1, 2)]
+    assert places == [[[5.0, 0.0], [9.0, 0.0]], [[6.0, 1.0], [9.0, 3.0]]]
+    # The circles' areas weigh 1 and 4: the whole's centre was at 8.2 m.
+    np.testing.assert_allclose(found.states_at(3).poses[:, :2], [(5.8, 5.0), (9.8, 5.0)],
+                               atol=1e-6)
 
 
 def test_shape_without_area_is_refused() -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenario against which solutions are checked, without the judged vehicle itself."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 import functools
 import math
@@ -16,6 +16,7 @@ from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import CustomState, InitialState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.errors import InputError
+from crgame_ros.game.objects import whole_id
 from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.recording.export import export_scenario, ExportedScenario
@@ -124,15 +125,22 @@ class ScoredScenario:
         scenario.add_objects([
             *original.static_obstacles,
             *(each for each in original.dynamic_obstacles if each.obstacle_id not in own),
-            *(self._later(int(each.obstacle_id)) for each in original.phantom_obstacle)])
+            *(part for each in original.phantom_obstacle
+              for part in self._later(int(each.obstacle_id)))])
         return scenario
 
     def own_obstacles(self, numbers: Collection[int]) -> frozenset[int]:
         """Return the obstacles that represent the vehicles of some planning problems."""
         return frozenset(self.own[number] for number in numbers if number in self.own)
 
-    def _later(self, obstacle_id: int) -> DynamicObstacle:
-        column = self.obstacles.ids.index(f'o{obstacle_id}')
+    def _later(self, obstacle_id: int) -> Iterator[DynamicObstacle]:
+        """Yield an obstacle for each part of a phantom obstacle."""
+        for column, name in enumerate(self.obstacles.ids):
+            if whole_id(name) == f'o{obstacle_id}':
+                yield self._part(column, obstacle_id if name == whole_id(name)
+                                 else self.loaded.scenario.generate_object_id())
+
+    def _part(self, column: int, obstacle_id: int) -> DynamicObstacle:
         first = self.obstacles.first_step(column)
         poses, velocities = self.obstacles.track(column)
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
