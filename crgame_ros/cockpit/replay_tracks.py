@@ -204,9 +204,9 @@ class TrackCollector:
     def _add_latched(self, kind: str, text: str, newest: int | None) -> None:
         try:
             if kind == 'signals':
-                k, states = parse_signals_document(text)
-                n = (k - self._scheduler.k0) * self._scheduler.steps_per_tick
-                self._put(kind, max(n, 0), {'k': k, 'states': states})
+                signals = parse_signals_document(text)
+                n = (signals.k - self._scheduler.k0) * self._scheduler.steps_per_tick
+                self._put(kind, max(n, 0), signals._asdict())
             elif kind == 'seats':
                 self._put(kind, newest or 0, {'seats': _seats(text)})
             else:

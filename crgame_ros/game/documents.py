@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, NamedTuple
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import (
@@ -31,6 +31,7 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
+from crgame_ros.vehicle.lights import ALL_LIGHTS
 
 GAME_TOPIC = '/scenario/game'
 OBJECTS_TOPIC = '/scenario/objects'
@@ -188,17 +189,33 @@ def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
                          OBJECTS_TOPIC) from error
 
 
-def parse_signals_document(text: str) -> tuple[int, dict[str, str]]:
+class Signals(NamedTuple):
     """
-    Read `/scenario/signals`.
+    What is shown from a scenario step on.
 
-    :return: the scenario step k, and the state of each traffic light by its id.
+    :param k: scenario step.
+    :param states: of each traffic light, by its id.
+    :param objects: bits of `Light` of recorded vehicles with signals, by id.
+    """
+
+    k: int
+    states: dict[str, str]
+    objects: dict[str, int]
+
+
+def parse_signals_document(text: str) -> Signals:
+    """
+    Read `/scenario/signals`; earlier recordings lack the objects.
+
     :raises InputError: if it is malformed.
     """
     try:
         content = json.loads(text)
-        return int(content['k']), {str(light): str(state)
-                                   for light, state in content['states'].items()}
+        return Signals(
+            int(content['k']),
+            {str(light): str(state) for light, state in content['states'].items()},
+            {str(name): int(bits) & ALL_LIGHTS
+             for name, bits in content.get('objects', {}).items()})
     except MALFORMED as error:
         raise InputError(f'is no list of states ({type(error).__name__}: {error})',
                          SIGNALS_TOPIC) from error

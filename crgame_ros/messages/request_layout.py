@@ -87,8 +87,11 @@ def with_lights(series: JointSeries, lights: Mapping[str, float]) -> JointSeries
     Add the present lights of vehicles; future lights are unknown, which is NaN.
 
     :param series: a request without lights.
-    :param lights: bits of `Light` by vehicle; NaN where they are not seen.
+    :param lights: bits of `Light` by vehicle; NaN where they are not seen. Those of a vehicle that
+        is not in the request are left out.
     """
+    known = {name.rpartition('/')[0] for name in series.names}
+    lights = {name: bits for name, bits in lights.items() if name in known}
     shape = (len(series.positions), len(lights))
     shown, nothing = np.full(shape, math.nan), np.full(shape, math.nan)
     shown[0] = [*lights.values()]

@@ -6,7 +6,7 @@ from contextlib import suppress
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import parse_signals_document
+from crgame_ros.game.documents import parse_signals_document, Signals
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.nodes.markers.markers import SceneMarkers
@@ -48,7 +48,7 @@ class MarkerNode(Node):
         self._paths: dict[str, tuple[PolledSubscription, PolledSubscription]] = {}
         self._set: ScenarioSet | None = None
         self._scene: SceneMarkers | None = None
-        self._light_states: dict[str, str] = {}
+        self._shown = Signals(0, {}, {})
         self._skipped = False
         self._clear = True
         self._time = RunTime()
@@ -124,7 +124,7 @@ class MarkerNode(Node):
         self._start_over()
         self._set, self._scene = documents, SceneMarkers(documents)
         self._time = RunTime()
-        self._scene.set_signals(self._light_states)
+        self._scene.set_signals(self._shown)
         self._reader = WorldMessages(documents.objects)
         self._clear = True
         self._transforms.place_sensors(documents.game.avs,
@@ -146,7 +146,7 @@ class MarkerNode(Node):
         offset_ns = documents.game.scheduler.clock_offset_ns
         if (signals := self._signals.latest()) is not None:
             self._read_signals(signals.data)
-            scene.set_signals(self._light_states)
+            scene.set_signals(self._shown)
         message = self._objects.latest()
         if message is not None and from_time(message.header.stamp) >= offset_ns:
             # States of the game before or after this one are skipped.
@@ -185,7 +185,7 @@ class MarkerNode(Node):
 
     def _read_signals(self, text: str) -> None:
         try:
-            _, self._light_states = parse_signals_document(text)
+            self._shown = parse_signals_document(text)
         except InputError as error:
             self.get_logger().error(str(error))
 

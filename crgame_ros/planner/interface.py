@@ -64,7 +64,7 @@ class Planner(ABC):
     Options from the game file arrive as keyword arguments of the constructor; unknown ones
     must raise `InputError`, which a signature without `**kwargs` does through the registry.
 
-    A class that sets `wants_lights` gets others' indicators and horn (`PlanRequest.lights`).
+    A class that sets `wants_lights` gets others' lights and horn (`PlanRequest.lights`).
     """
 
     name: ClassVar[str]

@@ -183,7 +183,7 @@ def export_scenario(log: RunTrajectories, *, author: str | None = None,
         notices.append(f'time step 0 is scenario step {shift} of the original')
     roads = write_roads(loaded, shift, notices)
     ids = IdPool(used_ids(roads.elements), notices)
-    objects = ObjectWriter(log, ids, notices)
+    objects = ObjectWriter(log, loaded.scenario, ids, notices)
     writer = ProblemWriter(log, loaded, roads.lanelets, ids, notices)
     objects.write()
     problems = writer.text(objects.vehicle_rows)

@@ -6,7 +6,9 @@ from collections import defaultdict
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
+from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import InputError
+from crgame_ros.game.events import Release
 from crgame_ros.game.objects import ObjectDescription, Role, whole_id
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.reference_point import seen_from, shifted
@@ -24,6 +26,7 @@ from crgame_ros.scenario.export_elements import (
     whole,
 )
 from crgame_ros.scenario.export_ids import IdPool
+from crgame_ros.scenario.recorded_signals import recorded_signals
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.lights import BRAKING, HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn
@@ -50,6 +53,7 @@ class ObjectWriter:
     Ids are assigned at construction: those of the original first, so that they stay the same.
 
     :param log: the run.
+    :param scenario: in which it took place.
     :param ids: the ids of the file.
     :param notices: receives a line for each thing that could not be expressed.
     :ivar ids: ids in the file, by name.
@@ -58,8 +62,14 @@ class ObjectWriter:
     :raises InputError: if the state of a vehicle holds no numbers.
     """
 
-    def __init__(self, log: RunTrajectories, ids: IdPool, notices: list[str]) -> None:
+    def __init__(self, log: RunTrajectories, scenario: Scenario, ids: IdPool,
+                 notices: list[str]) -> None:
         self._log = log
+        self._recorded_signals = {
+            f'o{obstacle.obstacle_id}': signals for obstacle in scenario.dynamic_obstacles
+            if (signals := recorded_signals(obstacle)) is not None}
+        self._released = {event.object_id for event in log.game.events
+                          if isinstance(event.action, Release)}
         self._pool = ids
         self._notices = notices
         self._parts: dict[str, list[str]] = {group: [] for group in _GROUPS}
@@ -119,6 +129,16 @@ class ObjectWriter:
             ~hazard & (lights & Light.RIGHT > 0), brakes, hazard)),
             strict=True))
 
+    def _signals_of(self, name: str) -> list[tuple[bool, ...]]:
+        """Return the recorded signals of an object at each step; none if it has none."""
+        signals = self._recorded_signals.get(name)
+        if signals is None:
+            return []
+        if name in self._released:
+            self._notices.append(f'{name}: its signals are left out, as an event may release it')
+            return []
+        return [_switches(signals.at(k)) for k in self._log.ks.tolist()]
+
     def _type(self, item: ObjectDescription, known: frozenset[str]) -> str:
         if item.type in known:
             return item.type
@@ -154,7 +174,8 @@ class ObjectWriter:
             if first == 0:
                 rows = np.column_stack((poses, _signed_speeds(poses, velocities)))[:end]
                 self._parts['dynamic'].append(dynamic_obstacle(
-                    number, self._type(item, DYNAMIC_TYPES), parts, rows.tolist(), False))
+                    number, self._type(item, DYNAMIC_TYPES), parts, rows.tolist(), False,
+                    self._signals_of(item.id)[:end]))
                 continue
             self._parts['phantom'].append(named(item.id) + phantom_obstacle(
                 number, parts, first, poses[first:end].tolist()))
@@ -177,6 +198,14 @@ def _vehicle_rows(log: RunTrajectories) -> FloatArray:
     rows[:, :, :2] = shifted(rows[:, :, :3], offset)[:, :, :2]
     rows[:, :, 2] = wrap_pi_array(yaw)
     return rows
+
+
+def _switches(bits: int) -> tuple[bool, ...]:
+    """Return whether each of `SIGNALS` is on."""
+    hazard = bits & HAZARD == HAZARD
+    return (bool(bits & Light.HORN), not hazard and bool(bits & Light.LEFT),
+            not hazard and bool(bits & Light.RIGHT), bool(bits & Light.BRAKE), hazard,
+            bool(bits & Light.BLUE))
 
 
 def _signed_speeds(poses: FloatArray, velocities: FloatArray) -> FloatArray:

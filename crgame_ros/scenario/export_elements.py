@@ -23,8 +23,9 @@ STATIC_TYPES = frozenset({'unknown', 'parkedVehicle', 'constructionZone', 'roadB
 DYNAMIC_TYPES = frozenset({'unknown', 'car', 'truck', 'bus', 'motorcycle', 'bicycle', 'pedestrian',
                            'priorityVehicle', 'train', 'taxi'})
 ENVIRONMENT_TYPES = frozenset({'building', 'pillar', 'median_strip'})
-# Lights and horn of a vehicle.
-SIGNALS = ('horn', 'indicatorLeft', 'indicatorRight', 'brakingLights', 'hazardWarningLights')
+# Lights and horn of a vehicle; only recorded ones have the last.
+SIGNALS = ('horn', 'indicatorLeft', 'indicatorRight', 'brakingLights', 'hazardWarningLights',
+           'flashingBlueLights')
 
 _POSE = ('<position><point><x>{:.4f}</x><y>{:.4f}</y></point></position>'
          '<orientation><exact>{:.4f}</exact></orientation>')
@@ -79,7 +80,8 @@ def dynamic_obstacle(number: int, kind: str, parts: Parts, states: Iterable[Sequ
     :param states: two or more rows from time step 0 on: x, y, yaw of the centre, speed; for a
         driven vehicle also acceleration, yaw rate, steering angle
     :param driven: whether the rows have the values of a driven vehicle
-    :param signals: at each of these steps, in the order of `SIGNALS`; empty if unknown
+    :param signals: at each of these steps, in the order of `SIGNALS`, or its first ones; empty if
+        unknown
     """
     template = _VEHICLE_STATE if driven else _OBJECT_STATE
     lines = [template.format(*row[:3], step, *row[3:]) for step, row in enumerate(states)]
@@ -96,7 +98,7 @@ def _signal_series(signals: Sequence[Sequence[bool]]) -> tuple[str, str]:
     if not signals:
         return '', ''
     first, *rest = [_TIME.format(step) + ''.join(
-        f'<{name}>{str(on).lower()}</{name}>' for name, on in zip(SIGNALS, row, strict=True))
+        f'<{name}>{str(on).lower()}</{name}>' for name, on in zip(SIGNALS, row, strict=False))
         for step, row in enumerate(signals)]
     states = '</signalState>\n<signalState>'.join(rest)
     return (f'<initialSignalState>{first}</initialSignalState>\n',

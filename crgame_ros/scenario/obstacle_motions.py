@@ -141,6 +141,7 @@ class ObstacleMotions:
     def __init__(self, obstacles: ScenarioObstacles) -> None:
         self._obstacles = obstacles
         self._courses: dict[int, ObstacleMotion] = {}
+        self._released: dict[int, int] = {}
 
     @property
     def changed(self) -> list[int]:
@@ -157,6 +158,11 @@ class ObstacleMotions:
             poses[column], velocities[column] = course.state_at(k)
         return ObjectStates(poses, velocities)
 
+    def lights_at(self, k: int) -> dict[str, int]:
+        """Return the bits of `Light` of the present objects with signals, by id."""
+        return self._obstacles.lights_at(k, self.states_at(k), self._released) \
+            if self._obstacles.signals else {}
+
     def is_present(self, column: int, k: int) -> bool:
         """Return whether an obstacle is present at a time step."""
         return bool(np.isfinite(self.states_at(k).poses[column, 0]))
@@ -169,6 +175,7 @@ class ObstacleMotions:
         """Release a held obstacle at a time step: the columns of all its parts."""
         for column in columns:
             self._courses[column] = Released(k, self._obstacles.track(column))
+            self._released[column] = k
 
     def brake(self, columns: Sequence[int], k: int, deceleration: float, speed: float) -> None:
         """

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The obstacles of a scenario: their descriptions, and their states at each time step."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 import copy
 from dataclasses import dataclass, replace
 import math
+from types import MappingProxyType
 
 from commonroad.common.util import Interval
 from commonroad.geometry.shape import Circle, Rectangle
@@ -18,6 +19,7 @@ from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.scenario.loading import exact_position, exact_value, LoadedScenario, parts_of
+from crgame_ros.scenario.recorded_signals import recorded_signals
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,6 +72,7 @@ class ScenarioObstacles:
     :param held: ids of dynamic obstacles that stand at their first pose until an event releases
         them.
     :param put: obstacles that events may add later; absent until then.
+    :ivar signals: of the recorded vehicles that have any, by column.
     :raises InputError: if a shape cannot be used, or there are too many states.
     """
 
@@ -86,6 +89,8 @@ class ScenarioObstacles:
             *(part.description for part in parts), *put)
         self.ids: tuple[str, ...] = tuple(d.id for d in self.descriptions)
         tracks = [_track(part) for part in parts]
+        self.signals = {column: signals for column, part in enumerate(parts)
+                        if part.index == 0 and (signals := recorded_signals(part.obstacle))}
         moving = [t for t in tracks if len(t.steps)]
         self.first_k: int = min((int(t.steps[0]) for t in moving), default=0)
         self.last_k: int = max((int(t.steps[-1]) for t in moving), default=0)
@@ -129,6 +134,25 @@ class ScenarioObstacles:
             return ObjectStates(self._poses[row], self._velocities[row])
         return self._static
 
+    def lights_at(self, k: int, states: ObjectStates | None = None,
+                  released: Mapping[int, int] = MappingProxyType({})) -> dict[str, int]:
+        """
+        Return the bits of `Light` of the present objects with recorded signals, by id.
+
+        :param states: of all objects then, if events have changed some.
+        :param released: the time steps at which events released held obstacles, by column.
+        """
+        if not self.signals:
+            return {}
+        poses = (self.states_at(k) if states is None else states).poses
+        lights: dict[str, int] = {}
+        for column, signals in self.signals.items():
+            passed = k - released[column] if column in released else \
+                0 if column in self._held else k - signals.first_k
+            if np.isfinite(poses[column, 0]):
+                lights[self.ids[column]] = signals.at(signals.first_k + passed)
+        return lights
+
     def with_living(self, agents: Collection[int],
                     more: Sequence[ObjectDescription]) -> 'ScenarioObstacles':
         """
@@ -153,6 +177,8 @@ class ScenarioObstacles:
             values[:, other.living] = np.nan
             values.flags.writeable = False
         other._static = ObjectStates(*other._only_static())
+        other.signals = {column: signals for column, signals in self.signals.items()
+                         if column not in agents}
         return other
 
     @property

@@ -136,6 +136,11 @@ class Simulation:
                 for bits, command in zip(planned, self.commands, strict=True)]
 
     @property
+    def object_lights(self) -> dict[str, int]:
+        """Return the bits of `Light` of the present objects with signals, by id."""
+        return self._world.lights
+
+    @property
     def command_rows(self) -> list[Sequence[float]]:
         """Return `COMMAND_COLUMNS` of each driven vehicle at n; without driver only lights."""
         return [lights_alone(bits) if command is None else command
@@ -279,7 +284,8 @@ class Simulation:
                 k, self.n, states, self.avs, objects, self._world.changed)
             stamp_ns = self.scheduler.stamp_ns(self.n)
             for av in asking:
-                request = self._requests.build(av.setup, stamp_ns, states, forecast, self.lights)
+                request = self._requests.build(av.setup, stamp_ns, states, forecast, self.lights,
+                                               self.object_lights)
                 av.request_sent(self.n, stamp_ns, ego_of(request))
                 requests[av.setup.id] = request
         return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k,

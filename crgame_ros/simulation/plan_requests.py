@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Builds plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.objects import ObjectStates
@@ -122,7 +122,8 @@ class PlanRequests:
                                  state.yaw_rate)
 
     def build(self, av: AvSetup, stamp_ns: int, states: list[VehicleState],
-              forecast: Forecast, lights: Sequence[int]) -> JointSeries:
+              forecast: Forecast, lights: Sequence[int],
+              object_lights: Mapping[str, int]) -> JointSeries:
         """
         Pack the request of one AV, in its scenario coordinates.
 
@@ -131,6 +132,7 @@ class PlanRequests:
 
         :param lights: bits of `Light` that each driven vehicle shows now, for planners that need
             them.
+        :param object_lights: of recorded vehicles with signals, by id.
         """
         order = self._order[av.id]
         vehicles = len(order)
@@ -159,7 +161,7 @@ class PlanRequests:
         if not av.spec.perception:
             series = without_absent(series, vehicles)
         return series if av.id not in self._lit else with_lights(
-            series, {self._ids[index]: lights[index] for index in order[1:]})
+            series, {**{self._ids[index]: lights[index] for index in order[1:]}, **object_lights})
 
 
 def _is_told_lights(setup: Setup, av: AvSetup) -> bool:

@@ -172,6 +172,11 @@ class World:
         moved = [] if self._events is None else self._events.obstacles.changed
         return sorted({*moved, *self._setup.obstacles.living.tolist()})
 
+    @property
+    def lights(self) -> dict[str, int]:
+        """Return the bits of `Light` of the present objects with signals, by id."""
+        return self._courses.lights_at(self._k)
+
     def advance(self, k: int) -> ObjectStates:
         """
         Move the reactive objects to tick k, before the events of that tick.

@@ -5,7 +5,7 @@
 from struct import Struct
 from typing import NamedTuple
 
-from crgame_ros.vehicle.lights import ALL_LIGHTS
+from crgame_ros.vehicle.lights import OF_DRIVERS
 
 
 class DriverCommand(NamedTuple):
@@ -39,7 +39,7 @@ class DriverCommand(NamedTuple):
         return DriverCommand(
             _clip_float32(self.throttle, 0.0), _clip_float32(self.brake, 0.0),
             _clip_float32(self.steering, -1.0), bool(self.reverse),
-            int(self.lights) & ALL_LIGHTS, bool(self.put_back))
+            int(self.lights) & OF_DRIVERS, bool(self.put_back))
 
 
 RELEASED = DriverCommand()

@@ -9,20 +9,24 @@ import json
 
 class Light(IntFlag):
     """
-    A bit of `DriverCommand.lights`; both indicators together are the hazard lights.
+    A light that is on, or the horn; both indicators together are the hazard lights.
 
-    It is the state of the switch; the blinking of indicators is left to the viewers.
+    It is the state of the switch; the blinking of indicators is left to the viewers. Drivers have
+    the first three, `DriverCommand.lights`. The others are those of recorded vehicles.
     """
 
     LEFT = 1
     RIGHT = 2
     HORN = 4
+    BRAKE = 8
+    BLUE = 16
 
 
 # ECE R13-H: below this deceleration a car must not show brake lights by itself [m/s^2].
 BRAKING = 0.7
 HAZARD = int(Light.LEFT | Light.RIGHT)
-ALL_LIGHTS = int(HAZARD | Light.HORN)
+OF_DRIVERS = int(HAZARD | Light.HORN)
+ALL_LIGHTS = int(OF_DRIVERS | Light.BRAKE | Light.BLUE)
 INDICATORS = {0: 'off', int(Light.LEFT): 'left', int(Light.RIGHT): 'right', HAZARD: 'hazard'}
 
 

@@ -201,7 +201,7 @@ const now = (time, more) => (
 
 test('the documents that are valid at a time, forward and back', () => {
   const { store, shown } = documentsOf({
-    signals: [[1, { k: 10, states: { 5: 'red' } }], [2, { k: 20, states: { 5: 'green' } }]],
+    signals: [[1, { k: 10, states: { 5: 'red' }, objects: {} }], [2, { k: 20, states: { 5: 'green' }, objects: {} }]],
     frames_skipped: [[1.5, true]], timing: [[1, { final_error_ms: 7 }]],
   });
   const light = (time) => {
@@ -218,7 +218,7 @@ test('the documents that are valid at a time, forward and back', () => {
 });
 
 test('each valid document is sent once, the status five times a second', () => {
-  const { told, shown } = documentsOf({ signals: [[1, { k: 10, states: {} }]] });
+  const { told, shown } = documentsOf({ signals: [[1, { k: 10, states: {}, objects: {} }]] });
   for (let now_ms = 0; now_ms <= 1000; now_ms += 20) {
     shown.show(now(1 + now_ms / 1000), now_ms, false);
   }

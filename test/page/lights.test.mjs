@@ -12,6 +12,8 @@ import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.
 import { LIGHT, shining } from '../../crgame_ros/cockpit/page/js/lights.js';
 import { keepStorage } from './support.mjs';
 
+const DARK = { left: false, right: false, horn: false, brake: false, blue: false };
+
 test('indicators blink three times in two seconds of simulation time, the horn sounds on', () => {
   const all = LIGHT.left | LIGHT.right | LIGHT.horn;
   const times = Array.from({ length: 2000 }, (_, i) => i / 1000);
@@ -19,13 +21,20 @@ test('indicators blink three times in two seconds of simulation time, the horn s
   assert.equal(lit.filter((on, i) => on && !(i > 0 && lit[i - 1])).length, 3);
   assert.ok(Math.abs(lit.filter(Boolean).length - 1000) <= 3, 'half of the time');
   assert.ok(times.every((t) => shining(all, t).horn));
-  assert.deepEqual(shining(LIGHT.right, 0), { left: false, right: true, horn: false });
+  assert.deepEqual(shining(LIGHT.right, 0), { ...DARK, right: true });
 });
 
 test('a vehicle without a command has no lights', () => {
   for (const lights of [NaN, undefined, 0]) {
-    assert.deepEqual(shining(lights, 0), { left: false, right: false, horn: false });
+    assert.deepEqual(shining(lights, 0), DARK);
   }
+});
+
+test('blue lights flash twice a second, brake lights shine on', () => {
+  const times = Array.from({ length: 1000 }, (_, i) => i / 1000);
+  const lit = times.map((t) => shining(LIGHT.blue | LIGHT.brake, t));
+  assert.equal(lit.filter(({ blue }, i) => blue && !(i > 0 && lit[i - 1].blue)).length, 2);
+  assert.ok(lit.every(({ brake, left, right }) => brake && !left && !right));
 });
 
 test('lights are not interpolated', () => {

@@ -17,6 +17,7 @@ from crgame_ros.scenario.loading import parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 import numpy as np
 import pytest
+from signalling import expected_bits, signalling_vehicle
 
 CUT_IN = 'ZAM_CutIn-1_1_T-1.xml'
 # The file has four decimals: half a unit of the last one, in each direction.
@@ -141,6 +142,18 @@ def test_parts_of_an_obstacle_are_one_obstacle_again(runs: Any, tmp_path: Path) 
             middle = [track[k, :2] for _, track in tracks(of, runs.described(name))]
             np.testing.assert_allclose(
                 [found[name], found[f'{name}_2'], found[f'{name}_3']], middle, atol=2e-4)
+
+
+def test_recorded_signals_are_written_again(runs: Any, tmp_path: Path) -> None:
+    """With all their elements, in a run that begins at the original's step 0."""
+    text = runs.own(CUT_IN).replace('<planningProblem', signalling_vehicle(900, 9.0)
+                                    + '<planningProblem', 1)
+    exported = export_scenario(runs.drive(text, tmp_path))
+    scenario, _ = runs.read_back(exported)
+    assert scenario.obstacle_by_id(900).signal_state_at_time_step(6).flashing_blue_lights
+    again = ScenarioObstacles(parse_scenario(exported.xml_text, 'export'))
+    for k in range(21):
+        assert again.lights_at(k)['o900'] == expected_bits(k)
 
 
 def test_objects_that_drive_backwards_have_negative_speed(runs: Any, tmp_path: Path) -> None:

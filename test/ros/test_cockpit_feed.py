@@ -250,8 +250,9 @@ def test_events_and_signals_are_passed_on(setup: Setup) -> None:
         assert graph.document('events')['fired'] == [
             {'name': 'rain', 'n': 30, 'k': 3, 'by': 'trigger'}]
         await graph.say('/scenario/signals', String(data=json.dumps(
-            {'type': 'scene', 'k': 4, 'states': {'7': 'red'}})))
+            {'type': 'scene', 'k': 4, 'states': {'7': 'red'}, 'objects': {'o7': 9}})))
         await graph.until(lambda: graph.document('signals'), 'the signals')
-        assert graph.document('signals') == {'type': 'signals', 'k': 4, 'states': {'7': 'red'}}
+        assert graph.document('signals') == {
+            'type': 'signals', 'k': 4, 'states': {'7': 'red'}, 'objects': {'o7': 9}}
         assert graph.scene == before
     lived(check)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import math
 from pathlib import Path
 
-from crgame_ros.game.documents import objects_document
+from crgame_ros.game.documents import objects_document, Signals
 from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.outline import outline
@@ -297,10 +297,10 @@ def test_lights_have_the_colour_of_their_state() -> None:
     assert (light.pose.position.x, light.pose.position.y) == (4.0, -6.5)
     for state, code in (('red', '#D55E00'), ('redYellow', '#E69F00'), ('yellow', '#F0E442'),
                         ('green', '#009E73'), ('inactive', '#666666')):
-        scene.set_signals({'900': state})
+        scene.set_signals(Signals(0, {'900': state}, {}))
         assert _rgb(_by_key(scene.message().markers)['lights', 900]) == code
-    scene.set_signals({'900': 'green'})
-    scene.set_signals({})
+    scene.set_signals(Signals(0, {'900': 'green'}, {}))
+    scene.set_signals(Signals(0, {}, {}))
     assert _rgb(_by_key(scene.message().markers)['lights', 900]) == '#666666'
 
 

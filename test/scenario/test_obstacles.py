@@ -12,10 +12,12 @@ from crgame_ros.game.objects import Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario, parse_scenario
+from crgame_ros.scenario.obstacle_motions import ObstacleMotions
 from crgame_ros.scenario.obstacles import convert_shape, ScenarioObstacles
 import numpy as np
 import pytest
 from shapely import affinity
+from signalling import expected_bits, signalling_vehicle
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'scenarios'
 
@@ -250,6 +252,23 @@ def test_groups_of_occupancies() -> None:
     # The circles' areas weigh 1 and 4: the whole's centre was at 8.2 m.
     np.testing.assert_allclose(found.states_at(3).poses[:, :2], [(5.8, 5.0), (9.8, 5.0)],
                                atol=1e-6)
+
+
+def test_signals_hold_until_the_next_state() -> None:
+    """Of a present vehicle with signals alone; others have none."""
+    found = obstacles(signalling_vehicle(7, 0.0, last=20) + dynamic(
+        state('initialState', 0, 0)).replace('"7"', '"8"'))
+    assert [found.lights_at(k) for k in range(21)] == [{'o7': expected_bits(k)} for k in range(21)]
+    assert found.lights_at(21) == {}
+
+
+def test_signals_of_a_held_obstacle_begin_with_its_release() -> None:
+    """It shows its first signals until then."""
+    courses = ObstacleMotions(ScenarioObstacles(road_with(signalling_vehicle(7, 0.0)), held=(7,)))
+    assert courses.lights_at(9) == {'o7': expected_bits(0)}
+    courses.release((0,), 10)
+    assert [courses.lights_at(10 + k) for k in range(20)] == [
+        {'o7': expected_bits(k)} for k in range(20)]
 
 
 def test_shape_without_area_is_refused() -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requests hold others' indicators and horn only for planners that ask for them."""
 
+from dataclasses import replace
 import importlib.util
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,14 @@ from crgame_ros.planner.registry import BUILT_IN, planner_class
 from crgame_ros.planner.request_reader import RequestReader
 from crgame_ros.simulation.av_models import published_states
 from crgame_ros.simulation.engine import Simulation, StepResult
-from crgame_ros.simulation.offline import OfflineResult, PlannerSeat, run_offline
+from crgame_ros.simulation.offline import OfflineResult, perceive, PlannerSeat, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.lights import HAZARD, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 import pytest
+from signalling import expected_bits, signalling_vehicle
 import yaml
 
 COURTEOUS = '''
@@ -112,6 +114,25 @@ def test_a_planner_that_asks_reacts_to_an_indicator(file: Path) -> None:
     assert braking[300] == pytest.approx(braking[0] - 2.0 * 1.9, abs=0.3)
     for other in (('Courteous', int(Light.RIGHT)), ('Blind', int(Light.LEFT))):
         np.testing.assert_allclose(speeds[other], braking[0], atol=1e-9)
+
+
+@pytest.mark.parametrize('av', [{}, {'perception': ALL_ROUND}], ids=['truth', 'perceived'])
+def test_signals_of_recorded_vehicles_are_told(file: Path, tmp_path: Path, av: Any) -> None:
+    """The request at 1 s has those of time step 10, also for an AV whose sensors see all."""
+    text = (scenarios_directory() / 'ZAM_CutIn-1_1_T-1.xml').read_text()
+    (tmp_path / 'scenario.xml').write_text(text.replace(
+        '<planningProblem', signalling_vehicle(900, 9.0) + '<planningProblem', 1))
+    setup = game(f'{file}:Courteous', **av)
+    setup = build_setup(replace(setup.game, scenario=tmp_path / 'scenario.xml'))
+    simulation, result = first_request(setup, 0)
+    request = result.requests['av0']
+    if av:
+        seat = PlannerSeat(setup, 0, simulation, 0, None)
+        assert seat.perception is not None
+        perceive(simulation, [seat.perception])
+        request = seat.perception.perceive(request)
+    assert told(setup, request, simulation) == {
+        'hv0': Light(0), 'o900': Light(expected_bits(10))}
 
 
 def test_the_game_may_say_otherwise(file: Path) -> None:

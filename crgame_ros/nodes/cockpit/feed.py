@@ -363,8 +363,7 @@ class CockpitFeed:
                 self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
                 self.status.add_events(events, self.scenario.game.scheduler.dt_s)
         if signals is not None:
-            k, states = parse_signals_document(signals.data)
-            self._hub.set_document('signals', {'k': k, 'states': states})
+            self._hub.set_document('signals', parse_signals_document(signals.data)._asdict())
 
     def _poll_diagnostics(self) -> None:
         for slot in (self._diagnostics, *self._verdicts.values()):

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 
+from crgame_ros.game.documents import Signals
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.geometry.rigid_transform import RigidTransform
@@ -20,7 +21,7 @@ from crgame_ros.nodes.markers.bodies import (
 from crgame_ros.nodes.markers.roads import light_positions, map_markers
 from crgame_ros.ros.messages import set_time
 from crgame_ros.ros.scenario_documents import ScenarioSet
-from crgame_ros.vehicle.lights import BRAKING
+from crgame_ros.vehicle.lights import BRAKING, Light
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,8 @@ class SceneMarkers:
         self._objects: ObjectStates | None = None
         self._objects_ns = 0
         self._objects_brake = np.zeros(len(documents.others), dtype=bool)
+        self._recorded_brake = np.zeros(len(documents.others), dtype=bool)
+        self._object_ids = [item.id for item in documents.others]
         self._message = MarkerArray()
         self.set_vehicles(np.array([item.state for item in game.vehicles]),
                           self._stamp_ns)
@@ -107,10 +110,12 @@ class SceneMarkers:
             self._objects_brake = slower < -BRAKING
         self._objects, self._objects_ns = objects, stamp_ns
 
-    def set_signals(self, states: Mapping[str, str]) -> None:
-        """Set traffic-light states by light id; lights that are not named are inactive."""
+    def set_signals(self, signals: Signals) -> None:
+        """Set traffic lights, inactive if not named, and brake lights of recorded vehicles."""
         for number, light in self._lights.items():
-            light.show(states.get(str(number), 'inactive'))
+            light.show(signals.states.get(str(number), 'inactive'))
+        self._recorded_brake[:] = [
+            signals.objects.get(name, 0) & Light.BRAKE > 0 for name in self._object_ids]
 
     def set_plan(self, av_id: str, series: JointSeries) -> None:
         """Set an AV's plan."""
@@ -141,7 +146,8 @@ class SceneMarkers:
         since_ns = min(max(self._stamp_ns - self._objects_ns, 0), self._time_step_ns)
         poses = self._objects.poses + np.nan_to_num(self._objects.velocities) * (since_ns * 1e-9)
         for body, (x, y, yaw), brakes in zip(self._bodies[self._vehicles:], poses.tolist(),
-                                             self._objects_brake.tolist(), strict=True):
+                                             (self._objects_brake | self._recorded_brake).tolist(),
+                                             strict=True):
             body.place(x, y, yaw, brakes)
 
 

@@ -123,6 +123,7 @@ class SimOutputs:
         self._epoch = 0
         self._lights = TrafficLights(setup.loaded.scenario)
         self._light_states: dict[int, str] | None = None
+        self._object_lights: dict[str, int] = {}
         self._vehicle_lights: list[int] | None = None
         self._build_messages()
 
@@ -204,7 +205,7 @@ class SimOutputs:
         self._publish_lights(simulation)
         if result.objects is not None:
             self._publish_objects(result.objects, stamp_ns)
-            self._publish_signals(result.k)
+            self._publish_signals(result.k, simulation.object_lights)
             for vehicle in self._vehicles:
                 vehicle.count_subscribers()
         self._publish_states(simulation.states, stamp_ns, result.objects is not None)
@@ -252,12 +253,12 @@ class SimOutputs:
         if tick:
             self._tick_state.publish(message.message)
 
-    def _publish_signals(self, k: int) -> None:
+    def _publish_signals(self, k: int, objects: dict[str, int]) -> None:
         states = self._lights.states_at(k)
-        if states is not self._light_states:
-            self._light_states = states
+        if states is not self._light_states or objects != self._object_lights:
+            self._light_states, self._object_lights = states, objects
             self._latched['/scenario/signals'].publish(
-                String(data=json.dumps({'k': k, 'states': states})))
+                String(data=json.dumps({'k': k, 'states': states, 'objects': objects})))
 
     def _publish_lights(self, simulation: Simulation) -> None:
         lights = simulation.lights

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors
 // SPDX-License-Identifier: Apache-2.0
-/** Indicators and horn of a vehicle, as encoded in the column `lights` of its state. */
+/** Lights and horn of a vehicle: the column `lights` of its state, or a recorded one's signals. */
 
-/** Bits of the column; both indicators together are the hazard lights. */
-export const LIGHT = Object.freeze({ left: 1, right: 2, horn: 4 });
+/** Bits; both indicators together are the hazard lights. Only recorded vehicles have the last. */
+export const LIGHT = Object.freeze({ left: 1, right: 2, horn: 4, brake: 8, blue: 16 });
 
 /** The buttons of an input message's `lights`, in its order. */
 export const LIGHT_BUTTONS = /** @type {const} */ ([
@@ -11,19 +11,21 @@ export const LIGHT_BUTTONS = /** @type {const} */ ([
 ]);
 
 const BLINKS_PER_S = 1.5;
+const FLASHES_PER_S = 2;
 
 /**
- * Return the lights that are lit at a time: active indicators blink in simulation time.
+ * Return the lights that are lit at a time: indicators and blue lights blink in simulation time.
  *
- * @param {number|undefined} lights the column; undefined means none
+ * @param {number|undefined} lights bits; undefined means none
  * @param {number} t simulation time [s]
- * @returns {{left: boolean, right: boolean, horn: boolean}}
+ * @returns {{left: boolean, right: boolean, horn: boolean, brake: boolean, blue: boolean}}
  */
 export function shining(lights, t) {
   const bits = Number.isFinite(lights) ? Number(lights) : 0;
   const lit = (t * BLINKS_PER_S) % 1 < 0.5;
   return {
     left: lit && (bits & LIGHT.left) > 0, right: lit && (bits & LIGHT.right) > 0,
-    horn: (bits & LIGHT.horn) > 0,
+    horn: (bits & LIGHT.horn) > 0, brake: (bits & LIGHT.brake) > 0,
+    blue: (bits & LIGHT.blue) > 0 && (t * FLASHES_PER_S) % 1 < 0.5,
   };
 }

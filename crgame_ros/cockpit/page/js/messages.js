@@ -309,7 +309,8 @@ export {};
  *   version: string, program?: string, rights: Rights, framed_by?: string}} HelloMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
- * @typedef {{type: 'signals', k: number, states: Record<string, string>}} SignalsMessage
+ * @typedef {{type: 'signals', k: number, states: Record<string, string>,
+ *   objects: Record<string, number>}} SignalsMessage
  * @typedef {{type: 'events', fired: FiredEvent[]}} EventsMessage
  * @typedef {{type: 'alarms', active: Alarm[]}} AlarmsMessage
  * @typedef {{type: 'status'} & Status} StatusMessage

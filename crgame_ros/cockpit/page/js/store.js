@@ -71,7 +71,7 @@ export class Store {
   /** @type {Record<string, Seat>} */
   seats = {};
   /** @type {Omit<SignalsMessage, 'type'>} */
-  signals = { k: 0, states: {} };
+  signals = { k: 0, states: {}, objects: {} };
   /** @type {FiredEvent[]} */
   fired = [];
   /** @type {Omit<TasksMessage, 'type'>} */

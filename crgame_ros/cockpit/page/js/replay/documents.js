@@ -13,7 +13,7 @@ const STATUS_MS = 200;
 const KINDS = /** @type {const} */ (['signals', 'events', 'seats', 'alarms']);
 /** @type {{[Kind in typeof KINDS[number]]: Omit<StoreMessage & {type: Kind}, 'type'>}} */
 const EMPTY = {
-  signals: { k: 0, states: {} }, events: { fired: [] }, seats: { seats: {} },
+  signals: { k: 0, states: {}, objects: {} }, events: { fired: [] }, seats: { seats: {} },
   alarms: { active: [] },
 };
 const STATUS_PARTS = /** @type {const} */ (

@@ -16,6 +16,7 @@ import { mergeable, SeenInstances } from './seen_instances.js';
 
 const BRAKE = 0xff2a16;
 const AMBER = 0xffa000;
+const BLUE = 0x2f6bff;
 const WHITE = 0xffffff;
 const SHADOW_TEXELS = 32;
 const SHADOW_DARKNESS = 0.55;
@@ -152,6 +153,20 @@ export class FittedParts {
         this.#addLamp(place, (rear[0] - 0.045) * sx, side * rear[1] * 1.1 * sy,
           (rear[2] - 0.1) * sz, 0.16, 0.1, AMBER, own);
       }
+    }
+  }
+
+  /**
+   * Add the blue lights of a priority vehicle to its roof.
+   *
+   * @param {Matrix4} place of the vehicle's middle
+   * @param {Body} body
+   * @param {Scale} scale of the body
+   * @param {boolean} own
+   */
+  addBlueLights(place, { height }, [, sy, sz], own) {
+    for (const side of [1, -1]) {
+      this.#addLamp(place, 0, side * 0.35 * sy, (height + 0.05) * sz, 0.4 * sy, 0.12, BLUE, own);
     }
   }
 

@@ -60,11 +60,12 @@ export class Traffic {
   /** @type {Scene|null} */
   #scene = null;
   #shown_t = NaN;
+  #store;
 
   /**
    * @param {Three} three
    * @param {Group} group gets everything
-   * @param {Store} store whose scenario steps show which objects brake
+   * @param {Store} store whose scenario steps and signals show which objects brake or indicate
    */
   constructor(three, group, store) {
     this.#three = three;
@@ -73,6 +74,7 @@ export class Traffic {
     this.#scaling = new three.Vector3();
     this.#parts = new FittedParts(three, group);
     this.#headlights = new Headlights(three, group);
+    this.#store = store;
     store.on('objects', (step) => this.#brakeLights.update(step));
   }
 
@@ -141,7 +143,8 @@ export class Traffic {
       const speed = vx * Math.cos(yaw) + vy * Math.sin(yaw);
       this.#place(this.#objects[i], { x, y, yaw, dt, heightAt, eye, own: false, speed,
         steering: steeringOf(this.#objects[i].wheelbase, speed, yaw_rate),
-        brakes: this.#brakeLights.ofObject(i), lights: 0 });
+        brakes: this.#brakeLights.ofObject(i),
+        lights: this.#store.signals.objects[this.#objects[i].id] ?? 0 });
     }
     for (let i = 0; i < this.#vehicles.length; i += 1) {
       const row = i * VEHICLE_WIDTH;
@@ -231,8 +234,12 @@ export class Traffic {
       this.#parts.addWheels(matrix, body.wheels, scale, steering || 0, thing.rolled, own);
     }
     if (body.lamps !== null) {
+      const shines = shining(lights, this.#shown_t);
       this.#parts.addLamps(matrix, body.lamps, scale, {
-        brakes, ...shining(lights, this.#shown_t) }, own);
+        ...shines, brakes: brakes || shines.brake }, own);
+      if (shines.blue) {
+        this.#parts.addBlueLights(matrix, body, scale, own);
+      }
       if (this.#headlights.on && !thing.parked) {
         this.#headlights.add(matrix, body.lamps, scale, distance, own);
       }

@@ -6,9 +6,8 @@ const NAMES = /** @type {const} */ ([
   'human', 'av', 'recorded', 'vulnerable', 'static', 'traffic', 'scripted', 'alarm', 'accent',
   'map-ground', 'map-grid', 'map-road', 'map-junction', 'map-walk', 'map-cycle', 'map-parking',
   'map-kerb', 'map-mark', 'map-seam', 'map-arrow', 'map-stop', 'map-outline', 'map-glass',
-  'map-lamp', 'map-brake', 'map-indicator', 'map-shadow', 'map-label', 'map-label-ground',
-  'map-overlay',
-  'map-ray', 'map-estimate', 'map-occupied',
+  'map-lamp', 'map-brake', 'map-indicator', 'map-blue', 'map-shadow', 'map-label',
+  'map-label-ground', 'map-overlay', 'map-ray', 'map-estimate', 'map-occupied',
 ]);
 
 /**

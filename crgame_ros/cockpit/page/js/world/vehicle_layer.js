@@ -3,7 +3,7 @@
 /** The layer of humans' vehicles, AVs, obstacles and pedestrians at their current poses. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
-import { shining } from '../lights.js';
+import { LIGHT, shining } from '../lights.js';
 import { BrakeLights } from './brake_lights.js';
 import { drawOutline } from './hollow.js';
 import { vehicleLook, TYRE } from './vehicle_shape.js';
@@ -21,6 +21,7 @@ const LEAST_PX = { driven: 15, vulnerable: 14, other: 6 };
 // Below this length on the screen only the body of a thing is drawn [px].
 const DETAIL_PX = 13;
 const TYRE_INSET_M = 0.2;
+const BLUE_LIGHTS = new Path2D('M-.2-.65h.4v.5h-.4zM-.2 .15h.4v.5h-.4z');
 const SHADOW_PX = 2;
 
 /**
@@ -110,7 +111,7 @@ export class VehicleLayer {
    * @param {LiveView} view
    */
   draw(context, view) {
-    const { camera, shown } = view;
+    const { camera, shown, ratio, store } = view;
     const hollow = this.hollow(view);
     for (let i = 0; i < this.objects.length; i += 1) {
       const row = i * OBJECT_WIDTH;
@@ -122,8 +123,14 @@ export class VehicleLayer {
         if (hollow?.[this.vehicles.length + i]) {
           drawOutline(context, view, object, x, y, shown.objects[row + 2], leastPx);
         } else {
-          drawLook(context, view, object, x, y, shown.objects[row + 2],
-            this.brakeLights.ofObject(i), leastPx);
+          const yaw = shown.objects[row + 2];
+          const lights = store.signals.objects[object.id] ?? 0;
+          const factor = drawLook(context, view, object, x, y, yaw,
+            this.brakeLights.ofObject(i) || (lights & LIGHT.brake) > 0, leastPx);
+          if (lights > 0) {
+            camera.enterPose(context, ratio, x, y, yaw, factor);
+            drawLights(context, view, object, lights);
+          }
         }
       }
     }
@@ -241,15 +248,15 @@ function drawTyres(context, { camera, ratio, palette }, vehicle, x, y, yaw, stee
 }
 
 /**
- * Draw indicators at the corners, and the horn as arcs ahead of the front.
+ * Draw indicators at the corners, blue lights on the roof, and the horn as arcs ahead.
  *
  * @param {CanvasRenderingContext2D} context in the vehicle's coordinates
  * @param {LiveView} view
- * @param {DrawnVehicle} vehicle
+ * @param {Thing} vehicle
  * @param {number} lights
  */
 function drawLights(context, { shown, palette }, { look }, lights) {
-  const { left, right, horn } = shining(lights, shown.t);
+  const { left, right, horn, blue } = shining(lights, shown.t);
   context.fillStyle = palette.indicator;
   context.strokeStyle = palette.outline;
   context.lineWidth = 0.08;
@@ -259,6 +266,11 @@ function drawLights(context, { shown, palette }, { look }, lights) {
       context.fill(path);
       context.stroke(path);
     }
+  }
+  if (blue) {
+    context.fillStyle = palette.blue;
+    context.fill(BLUE_LIGHTS);
+    context.stroke(BLUE_LIGHTS);
   }
   if (horn) {
     context.strokeStyle = palette.indicator;
