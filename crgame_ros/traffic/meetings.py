@@ -135,8 +135,8 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
             counterpart = conflicts.other[conflict]
             for theirs in range(arrivals.begin[counterpart], arrivals.begin[counterpart + 1]):
                 owner = arrivals.owner[theirs]
-                if owner == i or not touch(conflicts, conflict, agents.width[slot],
-                                         arrivals.width[theirs]):
+                if owner == i or not touch(
+                        conflicts, conflict, agents.width[slot], arrivals.width[theirs]):
                     continue
                 if owner >= 0 and stays[owner] and arrivals.into[theirs] > 0.0 \
                         and not is_let_in(agents, at.slots[owner], passage, owner,
