@@ -252,17 +252,25 @@ def _listed_files(folder: Path) -> tuple[tuple[Path, ...], str, bool]:
     """Return the files in a folder's metadata, their storage, and whether they are compressed."""
     metadata = read_metadata(folder)
     where = str(folder / METADATA_FILE)
-    if metadata.storage not in _SUFFIXES.values():
-        raise InputError(f'unknown storage {metadata.storage!r}', where,
-                         'convert it with `ros2 bag convert` to mcap or sqlite3')
     if not metadata.files:
         raise InputError('it names no files', where, 'write it again with `crgame recover`')
+    compressed = metadata.compression_mode in ('file', 'message')
+    storage = metadata.storage
+    if not storage:
+        # `ros2 bag reindex` leaves it empty.
+        storage = _SUFFIXES.get(Path(metadata.files[0].name).suffix, '')
+        if storage != 'mcap' or compressed:
+            raise InputError('it does not name the storage', where,
+                             'write mcap or sqlite3 behind storage_identifier')
+    if storage not in _SUFFIXES.values():
+        raise InputError(f'unknown storage {storage!r}', where,
+                         'convert it with `ros2 bag convert` to mcap or sqlite3')
     paths = tuple(folder / file.name for file in metadata.files)
     for path in paths:
         if not path.is_file():
             raise InputError('the file is missing', str(path),
                              f'{METADATA_FILE} names it: put it back, or recover what is there')
-    return paths, metadata.storage, metadata.compression_mode in ('file', 'message')
+    return paths, storage, compressed
 
 
 def _single_file(path: Path) -> Path:
@@ -270,10 +278,15 @@ def _single_file(path: Path) -> Path:
     if path.is_file():
         candidates = [path]
     else:
-        candidates = sorted(p for p in path.iterdir() if p.is_file() and p.suffix in _SUFFIXES)
+        candidates = sorted(p for p in path.iterdir() if p.is_file() and p.suffix in (
+            *_SUFFIXES, '.zstd'))
         if not candidates:
             raise InputError('no recording in this folder', str(path),
                              'give the folder that holds a .mcap or .db3 file')
+    packed = [item for item in candidates if item.suffix == '.zstd']
+    if packed:
+        raise InputError(f'is compressed, and {METADATA_FILE} is missing', str(packed[0]),
+                         'unpack it with `zstd -d`')
     if len(candidates) > 1:
         raise InputError(f'{len(candidates)} files but no {METADATA_FILE}', str(path),
                          'name one of the files, or write it with `crgame recover`')

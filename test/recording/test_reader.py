@@ -4,6 +4,7 @@
 
 from pathlib import Path
 import random
+import re
 import time
 from typing import Any
 
@@ -12,7 +13,7 @@ from crgame_ros.recording.mcap_file import McapFile
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.writer import BagWriter
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 import numpy as np
 import pytest
 from rosbags.interfaces import (
@@ -195,6 +196,39 @@ def test_recordings_compressed_by_rosbag2(tmp_path: Path, samples: Any, storage:
         assert list(reader.messages()) == expected
 
 
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_metadata_that_do_not_name_the_storage(tmp_path: Path, samples: Any,
+                                               storage: StoragePlugin) -> None:
+    """As `ros2 bag reindex` writes them: MCAP is read, other files need one line."""
+    expected = record_others(tmp_path / 'bag', samples, storage, 9)
+    metadata = tmp_path / 'bag' / 'metadata.yaml'
+    text = metadata.read_text()
+    metadata.write_text(re.sub('storage_identifier: .*', "storage_identifier: ''", text))
+    assert metadata.read_text() != text
+    if storage is StoragePlugin.SQLITE3:
+        with pytest.raises(InputError, match='does not name the storage'):
+            BagReader(tmp_path / 'bag')
+        return
+    with BagReader(tmp_path / 'bag') as reader:
+        assert (list(reader.messages()), reader.storage) == (expected, 'mcap')
+
+
+def test_chunk_indexes_without_message_indexes(tmp_path: Path, samples: Any) -> None:
+    """Nothing says which channels are in a chunk, so that all are read."""
+    file, sent = tmp_path / 'a.mcap', [f'message {i}' for i in range(30)]
+    with file.open('wb') as stream:
+        writer = Writer(stream, chunk_size=200, index_types=IndexType.CHUNK)
+        writer.start('ros2')
+        schema = writer.register_schema(STRING, 'ros2msg', b'string data')
+        channels = [writer.register_channel(name, 'cdr', schema) for name in ('/a', '/b')]
+        for i, text in enumerate(sent):
+            writer.add_message(channels[i % 2], i, samples.string(text), i)
+        writer.finish()
+    with BagReader(file) as reader:
+        assert reader.complete and reader.message_count == 30
+        assert [item.message.data for item in reader.decoded(['/b'])] == sent[1::2]
+
+
 @pytest.mark.parametrize('compression', list(CompressionType))
 @pytest.mark.parametrize('chunked', [True, False])
 @pytest.mark.parametrize('summary', [True, False])
@@ -349,8 +383,8 @@ def make_refused(folder: Path, kind: str, samples: Any) -> Path:
     elif kind == 'text':
         (folder / 'notes.txt').write_text('hello')
         return folder / 'notes.txt'
-    elif kind in ('no mcap', 'no sqlite', 'empty file'):
-        name = 'a.db3' if kind == 'no sqlite' else 'a.mcap'
+    elif kind in ('no mcap', 'no sqlite', 'empty file', 'packed'):
+        name = {'no sqlite': 'a.db3', 'packed': 'a.mcap.zstd'}.get(kind, 'a.mcap')
         (folder / name).write_text('' if kind == 'empty file' else 'hello' * 1000)
     elif kind == 'broken metadata':
         (folder / 'metadata.yaml').write_text('rosbag2_bagfile_information: [}')
@@ -372,6 +406,7 @@ def make_refused(folder: Path, kind: str, samples: Any) -> Path:
 @pytest.mark.parametrize(('kind', 'message'), [
     ('missing', 'no such file or folder'), ('empty folder', 'no recording in this folder'),
     ('several files', '2 files but no metadata.yaml'), ('text', 'not a recording'),
+    ('packed', 'is compressed, and metadata.yaml is missing'),
     ('no mcap', 'no MCAP file'), ('no sqlite', 'cannot be read'),
     ('empty file', 'the file is empty'), ('broken metadata', 'is no YAML'),
     ('other metadata', 'not the metadata of a recording'),
