@@ -75,6 +75,18 @@ class ConflictTable(NamedTuple):
 
 
 @compiled
+def spare_room(width: float) -> float:
+    """
+    Return how far a front may stand in a conflict so that a vehicle passes it there [m].
+
+    A conflict begins where the widest vehicle on the other lane has its whole margin.
+
+    :param width: of the vehicle that passes [m]
+    """
+    return CROSSING_MARGIN + 0.5 * (WIDEST - width)
+
+
+@compiled
 def touch(conflicts: ConflictTable, row: int, width: float, other_width: float) -> bool:
     """Return whether vehicles of two widths are in each other's way in a conflict."""
     between = 0.5 * (width + other_width) + conflicts.margin[row]

@@ -26,6 +26,8 @@ import numpy as np
 AT_LINE = 3.0
 # An agent that can halt with this braking lets another go that has waited very long [m/s^2].
 MERCY = 1.5
+# An agent whose front is farther than this behind its waiting place is inside the junction [m].
+STARTED = -1.0
 # A grant ends this far behind its junction [m].
 PASSED = 1.0
 
@@ -82,7 +84,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     halt = np.full(count, math.inf)
     for i, slot in enumerate(slots):
         # No agent is let in past another that waits before the same junction.
-        stopped[i] = min(at.light[i], at.queued[i]) < passage.hold[i] + 2.0
+        stopped[i] = _is_stopped(at, i, passage.hold[i])
         full[i] = is_full(rules, promised, agents, slot, way, passage, at, i)
     # Other agents leave the room behind the junction to an agent that has waited very long.
     first = full & ~stopped
@@ -101,7 +103,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
             continue
         # Agents let in before it take room as well.
         full[i] = full[i] or is_full(rules, promised, agents, slot, way, passage, at, i)
-        if passage.hold[i] < -1.0 or _may_enter(
+        if passage.hold[i] < STARTED and not stopped[i] or _may_enter(
                 rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
             _grant(k, agents, slot, way, passage, i)
             promise(promised, agents, slot, way, passage, i)
@@ -153,6 +155,12 @@ def _release(agents: AgentTable, slots: IntArray, way: Ways, dt_s: float) -> Non
 
 
 @compiled
+def _is_stopped(at: Situation, i: int, hold: float) -> bool:
+    """Return whether a red light or a queue stops an agent before its hold [m], or close by."""
+    return bool(min(at.light[i], at.queued[i]) < max(hold, 0.0) + 2.0)
+
+
+@compiled
 def _see_junctions(rules: CrossingRules, agents: AgentTable, slots: IntArray, passage: Passages,
                    dt_s: float) -> None:
     """Mark when late drivers notice a junction: at the last tick at which hard braking helps."""
@@ -185,7 +193,8 @@ def _withdraws(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     slot = at.slots[i]
     speed, hold = agents.speed[slot], agents.grant_hold[slot]
     easy = speed**2 <= 2.0 * rules.withdrawal * hold
-    if hold > 0.0 and easy and min(at.light[i], at.queued[i]) < hold + 2.0:
+    if _is_stopped(at, i, hold) and (hold > 0.0 and easy or speed < STANDING):
+        # Otherwise it would block all others for as long as its own light is red.
         return True
     if hold <= 0.0 or not (agents.sees[slot] if agents.late[slot] else easy):
         return False

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The lanes of a road network as flat arrays, for many agents at once."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
@@ -73,6 +74,8 @@ STEP = 0.5
 MAX_LENGTH = 6e5
 # Some successors in published maps begin elsewhere; a link with a greater gap is ignored [m].
 MAX_GAP = 1.0
+# A lanelet that is shorter may be an accident of the map: vehicles pass over it [m].
+DEGENERATE = 2.5
 # Headings of published centre lines jump at vertices; they are smoothed over this length [m].
 SMOOTHING = 4.0
 # Least angle between lanes that slows agents down [rad], and over which distance behind it [m].
@@ -150,8 +153,8 @@ class LaneGraph:
         lanelets = [network.lanelet_network.find_lanelet_by_id(i) for i in self.ids]
         following = [[self.index[j] for j in sorted(set(x.successor)) if j in self.index]
                      for x in lanelets]
-        following = [[j for j in row if self._joined(i, j)] or self._found(i, lanelets[i])
-                     for i, row in enumerate(following)]
+        following = [self._passable(i, following) or self._found(i, lanelets[i])
+                     for i in range(len(self.ids))]
         before: list[list[int]] = [[] for _ in self.ids]
         for i, row in enumerate(following):
             for j in row:
@@ -167,6 +170,26 @@ class LaneGraph:
         self.beside: list[set[int]] = [
             {self.index[j] for j in (x.adj_left, x.adj_right) if j in self.index}
             for x in lanelets]
+
+    def _passable(self, lane: int, given: Sequence[Sequence[int]]) -> list[int]:
+        """
+        Return the followers of a lane that vehicles can drive on.
+
+        A lanelet that is shorter than a vehicle and that cannot be driven, because it is folded
+        back, is skipped: those behind it follow directly.
+
+        :param given: followers of all lanes, as in the file.
+        """
+        found: list[int] = []
+        for follower in given[lane]:
+            behind = given[follower]
+            passes = self._joined(lane, follower)
+            if behind and self.length[follower] < DEGENERATE and not (
+                    passes and any(self._joined(follower, other) for other in behind)):
+                found += [other for other in behind if self._joined(lane, other)]
+            elif passes:
+                found.append(follower)
+        return list(dict.fromkeys(found))
 
     def _found(self, lane: int, lanelet: Lanelet) -> list[int]:
         """Find the followers of a lane whose successors in the file are all impossible."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.conflicts import ConflictTable, touch
+from crgame_ros.traffic.conflicts import ConflictTable, spare_room, touch
 from crgame_ros.traffic.junctions import Arrivals, Passages, time_to
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.leaders import Ways
@@ -115,7 +115,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
     Pair agents with all others that come to the same conflicts, and compare their times.
 
     :param stays: (A) whether an agent waits before a red light or a full junction: it comes to no
-        conflict.
+        conflict, and others pass if its front is in their spare room alone.
     :param first: (A) whether it is the first before a full junction: in a roundabout, agents that
         enter still yield to it.
     :param next_in: (A) whether the next free room behind a full junction is its own: no other
@@ -138,7 +138,8 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                 if owner == i or not touch(
                         conflicts, conflict, agents.width[slot], arrivals.width[theirs]):
                     continue
-                if owner >= 0 and stays[owner] and arrivals.into[theirs] > 0.0 \
+                if owner >= 0 and stays[owner] and arrivals.into[theirs] > -spare_room(
+                        agents.width[slot]) \
                         and not is_let_in(agents, at.slots[owner], passage, owner,
                                           arrivals.step[theirs]) \
                         and not (conflicts.merges[conflict] and (next_in[owner] or (

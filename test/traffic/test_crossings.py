@@ -108,13 +108,13 @@ def test_four_agents_that_arrive_at_once_without_signs_all_get_through() -> None
     assert np.isnan(run.poses[-1]).all(), 'all have left the map'
 
 
-def lane_with_a_light(cycle: tuple[tuple[TrafficLightState, int], ...]) -> Scenario:
-    line = StopLine(np.array([100.0, 1.75]), np.array([100.0, -1.75]), LineMarking.SOLID, set(),
-                    {50})
+def lane_with_a_light(cycle: tuple[tuple[TrafficLightState, int], ...],
+                      at: float = 100.0) -> Scenario:
+    line = StopLine(np.array([at, 1.75]), np.array([at, -1.75]), LineMarking.SOLID, set(), {50})
     scenario = support.roads(
-        support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2], stop_line=line),
-        support.straight_lane(2, 0.0, 100.0, 300.0, predecessor=[1]))
-    light = TrafficLight(50, np.array([100.0, 3.0]), TrafficLightCycle(
+        support.straight_lane(1, 0.0, 0.0, at, successor=[2], stop_line=line),
+        support.straight_lane(2, 0.0, at, 300.0, predecessor=[1]))
+    light = TrafficLight(50, np.array([at, 3.0]), TrafficLightCycle(
         [TrafficLightCycleElement(*part) for part in cycle]))
     scenario.add_objects(light, {1})
     return scenario
@@ -131,6 +131,24 @@ def test_a_red_light_holds_until_it_is_green() -> None:
     front = poses[249, 0] + 2.25
     assert speeds[249] == 0.0 and 98.0 < front <= 100.0
     assert np.isnan(poses[-1, 0]) or poses[-1, 0] > 150.0
+
+
+@pytest.mark.parametrize('line', [118.2, 118.5])
+@pytest.mark.parametrize('green', [8, 17])
+def test_an_agent_at_a_red_light_close_to_a_crossing_lane_lets_others_pass(
+        line: float, green: int) -> None:
+    """Its front takes up the room between vehicles, but the crossing lane itself is free."""
+    scenario = lane_with_a_light(((TrafficLightState.GREEN, green), (TrafficLightState.YELLOW, 3),
+                                  (TrafficLightState.RED, 2000)), line)
+    scenario.add_objects(support.lane_strip(
+        3, [(line + 1.8, y) for y in np.linspace(-100.0, 100.0, 80)]))
+    run = support.Run(scenario, TrafficSpec(), 0, (), [
+        support.driving(1, [(line - 8.0, 0.0, 0.0), (290.0, 0.0, 0.0)], 0.0),
+        support.driving(2, [(line + 1.8, -60.0, np.pi / 2), (line + 1.8, 90.0, np.pi / 2)],
+                        8.0)]).ticks(400)
+    assert line - 2.0 < run.series(0)[0][-1, 0] + 2.25 < line
+    assert np.isnan(run.series(1)[0][-1]).all()
+    assert run.overlaps() == []
 
 
 def test_at_a_light_that_turns_yellow_an_agent_stops_unless_it_has_to_brake_hard() -> None:

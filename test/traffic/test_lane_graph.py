@@ -72,6 +72,21 @@ def test_lanes_near_a_point_hold_every_lane_that_contains_it(maps: Path) -> None
             assert abs(s[i] - exact) < 0.3
 
 
+@pytest.mark.parametrize('length', [0.3, 2.0])
+def test_a_tiny_lanelet_that_folds_back_is_passed_over(length: float) -> None:
+    """The lane before it continues in the lane behind it; one that can be driven stays."""
+    def successors(tiny: list[tuple[float, float]]) -> list[int]:
+        graph = LaneGraph(RoadNetwork(support.roads(
+            support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2]),
+            support.lane_strip(2, tiny, predecessor=[1], successor=[3]),
+            support.straight_lane(3, 0.0, 100.0, 200.0, predecessor=[2])).lanelet_network))
+        row = graph.successors[graph.index[1]]
+        return [graph.ids[lane] for lane in row[row >= 0]]
+
+    assert successors([(100.0, 0.0), (100.0 - length, 0.05)]) == [3]
+    assert successors([(100.0, 0.0), (100.0 + 0.1 * length, 0.0)]) == [2]
+
+
 def test_refuses_a_map_without_lanes_for_cars() -> None:
     from commonroad.common.common_lanelet import LaneletType
     path = support.straight_lane(1, 0.0, 0.0, 50.0, lanelet_type={LaneletType.SIDEWALK})
