@@ -4,17 +4,20 @@
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import re
 import traceback
 
 from crgame_ros.errors import CrgameError, PlanningError
+from crgame_ros.geometry.curve import arc_length
 from crgame_ros.messages.plan import Plan, PlanRequest
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.plan_check import check_start
 from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.planner.rollout import braking_plan
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 from crgame_ros.vehicle.stopping import FIRM_BRAKING
+import numpy as np
 
 Clock = Callable[[], float]
 
@@ -26,6 +29,7 @@ class PlannerStatistics:
 
     :param plans: answers given, braking plans included.
     :param fallbacks: braking plans given.
+    :param shortened: plans given that stop before the planner's plan leaves the road.
     :param reasons: how often each reason for braking occurred, numbers replaced by `#`.
     :param durations_s: duration of each call; empty without a clock [s]
     :param failure: traceback of the first failure of the planner's code; empty without one.
@@ -33,6 +37,7 @@ class PlannerStatistics:
 
     plans: int = 0
     fallbacks: int = 0
+    shortened: int = 0
     reasons: Counter[str] = field(default_factory=Counter)
     durations_s: list[float] = field(default_factory=list)
     failure: str = ''
@@ -43,9 +48,11 @@ class PlannerAdapter:
     A wrapper around a planner that always answers.
 
     A braking plan along the last plan (`Plan.fallback` is set) is the answer if `setup` or `plan`
-    raises an exception, or if the plan has the wrong stamp, numbers that are not finite, another
-    first state than the request, or leaves the road further than its start is off it. These
-    fallbacks are counted. Exits and interrupts pass.
+    raises an exception, or if the plan has the wrong stamp, numbers that are not finite, or
+    another first state than the request. A plan that leaves the road further than its start is
+    off it is driven as far as it is right, with a stop before that place; if it is too near for
+    that, the answer is a braking plan. Fallbacks and shortened plans are counted. Exits and
+    interrupts pass.
 
     :param planner: the planner.
     :param clock: seconds from a steady clock, to time each call; None measures nothing.
@@ -116,12 +123,29 @@ class PlannerAdapter:
             if not isinstance(plan, Plan):
                 return None, f'the planner returned a {type(plan).__name__}, not a Plan'
             reason = check_start(plan, request.ego, request.stamp_ns)
-            if reason is None:
+            if reason is None and (found := self._limit.first_beyond(plan.states)) is not None:
+                shortened = self._shortened(request, plan, found[0])
+                if shortened is not None:
+                    self.statistics.shortened += 1
+                    return shortened, None
                 reason = self._limit.refusal(plan.states)
         except Exception as error:
             self._keep_failure(error)
             return None, describe(error)
         return (plan, None) if reason is None else (None, reason)
+
+    def _shortened(self, request: PlanRequest, plan: Plan, end: int) -> Plan | None:
+        """Return a plan that stops on its way before a state; None if that is too near."""
+        states = plan.states[:end]
+        s = arc_length(states[:, :2])
+        stops = states[:, StateColumn.SPEED]**2 <= 2.0 * self._deceleration * (s[-1] - s)
+        last = int(np.flatnonzero(stops)[-1]) if stops.any() else 0
+        if last == 0:
+            return None
+        then = replace(request, ego=VehicleState(*states[last].tolist()),
+                       stamp_ns=request.stamp_ns + round(last * request.time_step_s * 1e9))
+        stop = braking_plan(then, plan, self._vehicle, self._deceleration)
+        return Plan(plan.stamp_ns, np.concatenate((states[:last], stop.states)))
 
     def _keep_failure(self, error: Exception) -> None:
         if not self.statistics.failure and not isinstance(error, PlanningError):

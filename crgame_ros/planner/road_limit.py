@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.geometry.reference_point import shifted
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 # A plan may reach this much further off the road than its start, for a rear overhang in a narrow
 # bend, or a lane that was drawn narrower than the vehicle [m].
 TOLERANCE = 0.2
+# The same at walking speed, to get through a bend that is too narrow, and that speed [m, m/s].
+SLOW_TOLERANCE, SLOW = 0.5, 2.0
 # At this distance a pose is off every road [m].
 FAR = 1e6
 
@@ -72,11 +74,17 @@ class RoadLimit:
         self.refusal(ways)
 
     def refusal(self, states: Array) -> str | None:
+        """Return how far a plan leaves the road and where, or None; as `first_beyond`."""
+        found = self.first_beyond(states)
+        return None if found is None else \
+            f'the plan leaves the road by {found[1]:.2f} m at state {found[0]}'
+
+    def first_beyond(self, states: Array) -> tuple[int, float] | None:
         """
-        Check a plan, whose first state is the vehicle's, in 0.1 ms.
+        Find where a plan, whose first state is the vehicle's, leaves the road, in 0.1 ms.
 
         :param states: (S, 8) finite rear-axle states
-        :return: a message of how far it leaves the road and where, or None.
+        :return: the first state that is too far off the road, and by how much [m]; None without.
         """
         if self._road is None:
             return None
@@ -84,12 +92,16 @@ class RoadLimit:
         off = np.flatnonzero(self._road.are_off_road(centers, self._shape))
         if not len(off):
             return None
-        allowed = TOLERANCE + (self._overhang(*centers[0].tolist()) if off[0] == 0 else 0.0)
-        beyond = off[self._road.are_beyond(centers[off], self._shape, allowed)]
+        now = self._overhang(*centers[0].tolist()) if off[0] == 0 else 0.0
+        beyond = off[self._road.are_beyond(centers[off], self._shape, now + TOLERANCE)]
+        slow = np.abs(states[beyond, StateColumn.SPEED]) <= SLOW
+        if slow.any():
+            slow[slow] = ~self._road.are_beyond(centers[beyond[slow]], self._shape,
+                                                now + SLOW_TOLERANCE)
+            beyond = beyond[~slow]
         if not len(beyond):
             return None
-        far = self._overhang(*centers[beyond[0]].tolist())
-        return f'the plan leaves the road by {far:.2f} m at state {beyond[0]}'
+        return int(beyond[0]), self._overhang(*centers[beyond[0]].tolist())
 
     def _overhang(self, x: float, y: float, yaw: float) -> float:
         if self._road is None or not self._road.is_off_road(x, y, yaw, self._shape):

@@ -3,6 +3,7 @@
 """Builds plan requests: one atomic snapshot with predictions (CRG III-A1c and d)."""
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.objects import ObjectStates
@@ -123,7 +124,7 @@ class PlanRequests:
 
     def build(self, av: AvSetup, stamp_ns: int, states: list[VehicleState],
               forecast: Forecast, lights: Sequence[int],
-              object_lights: Mapping[str, int]) -> JointSeries:
+              object_lights: Mapping[str, int] = MappingProxyType({})) -> JointSeries:
         """
         Pack the request of one AV, in its scenario coordinates.
 

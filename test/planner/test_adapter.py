@@ -14,9 +14,10 @@ from crgame_ros.planner.adapter import PlannerAdapter
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.plan_check import check_plan
+from crgame_ros.planner.road_limit import RoadLimit
 from crgame_ros.planner.rollout import braking_plan
 from crgame_ros.vehicle.parameters import VehicleParameters
-from crgame_ros.vehicle.state import VehicleState
+from crgame_ros.vehicle.state import StateColumn, VehicleState
 import numpy as np
 import planner_support as support
 import pytest
@@ -111,23 +112,52 @@ def sideways(distance: float) -> Answer:
 
 
 # The lane reaches 1.75 m to either side, and the vehicle is 1.61 m wide: 0.945 m are free, and
-# 0.2 m more are tolerated.
-@pytest.mark.parametrize(('start', 'aside', 'refused'), [
-    (0.0, 0.9, False), (0.0, 1.1, False), (0.0, 1.2, True), (0.0, -3.0, True),
+# 0.2 m more are tolerated. It stops from 10 m/s within 12.5 m.
+@pytest.mark.parametrize(('start', 'aside', 'answer'), [
+    (0.0, 0.9, 'the plan'), (0.0, 1.1, 'the plan'), (0.0, 1.2, 'shortened'),
+    (0.0, -3.0, 'braking'),
     # A plan that starts 0.55 m off the road may go along it and return, but not further away.
-    (1.5, 0.0, False), (1.5, 0.15, False), (1.5, 0.3, True), (1.5, -1.5, False),
+    (1.5, 0.0, 'the plan'), (1.5, 0.15, 'the plan'), (1.5, 0.3, 'shortened'),
+    (1.5, -1.5, 'the plan'),
     # The same holds 9 m from the road.
-    (10.0, 0.1, False), (10.0, 1.0, True), (10.0, -5.0, False),
+    (10.0, 0.1, 'the plan'), (10.0, 1.0, 'braking'), (10.0, -5.0, 'the plan'),
 ])
-def test_plan_that_leaves_the_road_is_refused(start: float, aside: float, refused: bool) -> None:
+def test_a_plan_that_leaves_the_road_is_driven_as_far_as_it_is_right(
+        start: float, aside: float, answer: str) -> None:
+    """Then the vehicle stops on its way before that place; if that is too near, at once."""
     made = adapter(sideways(aside), road=support.straight())
-    plan = made.plan(support.request(VehicleState(0.0, start, 0.0, 10.0)))
-    assert plan.fallback is refused
-    if refused:
+    asked = support.request(VehicleState(0.0, start, 0.0, 10.0))
+    plan = made.plan(asked)
+    assert plan.fallback is (answer == 'braking')
+    assert made.statistics.shortened == (answer == 'shortened')
+    if answer == 'shortened':
+        allowed = 0.2 + max(1.75 - 0.805, start)
+        assert made.last_reason is None and plan.states[-1, StateColumn.SPEED] == 0.0
+        assert np.abs(plan.states[:, StateColumn.Y]).max() < allowed
+        assert np.array_equal(plan.states[:5], sideways(aside)(asked).states[:5])
+        vehicle = support.load_vehicle_parameters()
+        later = plan.states[np.flatnonzero(np.diff(plan.states[:, StateColumn.SPEED]))[0]:]
+        assert check_plan(Plan(asked.stamp_ns, later), VehicleState(*later[0]), asked.stamp_ns,
+                          vehicle, support.DT) is None
+    elif answer == 'braking':
         assert made.last_reason is not None
         assert made.last_reason.startswith('the plan leaves the road by ')
         assert len(made.statistics.reasons) == 1
         assert 'leaves the road by # m at state #' in next(iter(made.statistics.reasons))
+
+
+def test_a_narrow_bend_is_driven_through_slowly() -> None:
+    """At walking speed half a metre beside the road is tolerated, for a lane drawn too narrow."""
+    limit = RoadLimit.from_context(support.context(support.straight(), support.problem(2.0)))
+    states = np.tile(np.array(VehicleState(0.0, 0.9, 0.0, 1.9)), (11, 1))
+    states[:, 0] += 0.19 * np.arange(11)
+    states[5:, 1] = 1.4
+    assert limit.first_beyond(states) is None
+    states[:, StateColumn.SPEED] = 2.1
+    assert limit.first_beyond(states) == (5, pytest.approx(0.455, abs=1e-6))
+    states[5:, 1] = 1.5
+    states[:, StateColumn.SPEED] = 1.9
+    assert limit.first_beyond(states) == (5, pytest.approx(0.555, abs=1e-6))
 
 
 def test_road_with_slits_refuses_nothing() -> None:

@@ -14,7 +14,7 @@ const BLINKS_PER_S = 1.5;
 const FLASHES_PER_S = 2;
 
 /**
- * Return the lights that are lit at a time: indicators and blue lights blink in simulation time.
+ * Return the lights that are lit at a time: some blink in simulation time.
  *
  * @param {number|undefined} lights bits; undefined means none
  * @param {number} t simulation time [s]
