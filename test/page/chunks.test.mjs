@@ -201,7 +201,8 @@ const now = (time, more) => (
 
 test('the documents that are valid at a time, forward and back', () => {
   const { store, shown } = documentsOf({
-    signals: [[1, { k: 10, states: { 5: 'red' }, objects: {} }], [2, { k: 20, states: { 5: 'green' }, objects: {} }]],
+    signals: [[1, { k: 10, states: { 5: 'red' }, objects: {} }],
+      [2, { k: 20, states: { 5: 'green' }, objects: {} }]],
     frames_skipped: [[1.5, true]], timing: [[1, { final_error_ms: 7 }]],
   });
   const light = (time) => {
