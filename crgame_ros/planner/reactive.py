@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.messages.plan import Plan, PlanRequest
+from crgame_ros.planner.clearance import Clearance
 from crgame_ros.planner.idm import IdmPlanner
 from crgame_ros.planner.interface import Planner, PlannerContext
 from crgame_ros.planner.path_following import PathPosition
@@ -83,16 +84,18 @@ class ReactivePlanner(Planner):
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
     :param horizon: length of a plan [s]
     :param safety_margin: enlargement of obstacles on each side [m]
+    :param clearance: of people on foot and on bicycles; with less room they are passed slowly [m]
     """
 
     name: ClassVar[str] = 'reactive'
 
     def __init__(self, v0: float | None = None, horizon: float = 3.0,
-                 safety_margin: float = 0.15) -> None:
-        check_positive(self.name, v0=v0, horizon=horizon, safety_margin=safety_margin)
+                 safety_margin: float = 0.15, clearance: float = 1.5) -> None:
+        check_positive(self.name, v0=v0, horizon=horizon, safety_margin=safety_margin,
+                       clearance=clearance)
         self._idm = IdmPlanner(v0=v0, horizon=horizon)
         self._horizon = horizon
-        self._margin = safety_margin
+        self._margin, self._distance = safety_margin, clearance
 
     def setup(self, context: PlannerContext) -> None:
         """Plan the path and build the package's planner."""
@@ -102,7 +105,8 @@ class ReactivePlanner(Planner):
         self._span_s = steps * context.time_step_s
         config = configuration(context, steps)
         config.sampling.num_sampling_levels = LEVELS
-        self._core = ReactiveCore(context, config, self._margin)
+        self._clearance = Clearance(context, self._distance)
+        self._core = ReactiveCore(context, config, self._margin, self._clearance)
         self._heading_for = 0.0
         self._prepare(self._idm.driving)
 
@@ -166,7 +170,9 @@ class ReactivePlanner(Planner):
             loss += LEAVING + RIGHT * (lane.offset < 0.0)
         if abs(lane.offset - self._heading_for) > INSIDE:
             loss += TURNING
-        return _Aim(loss, lane.offset, self._target(request, speeds))
+        limit = self._clearance.speed_limit(self._driving.path, position.s, lane.offset,
+                                            request.ego.speed)
+        return _Aim(loss, lane.offset, min(self._target(request, speeds), limit))
 
     def _target(self, request: PlanRequest, speeds: Array) -> float:
         """

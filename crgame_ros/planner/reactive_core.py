@@ -19,7 +19,9 @@ from commonroad_rp.utility.utils_coordinate_system import CoordinateSystem  # no
 from crgame_ros.errors import PlanningError  # noqa: E402
 from crgame_ros.geometry.angles import wrap_pi  # noqa: E402
 from crgame_ros.geometry.polyline import ReferencePath  # noqa: E402
+from crgame_ros.geometry.reference_point import joined, shifted  # noqa: E402
 from crgame_ros.messages.plan import PlanRequest  # noqa: E402
+from crgame_ros.planner.clearance import Clearance  # noqa: E402
 from crgame_ros.planner.collision_slices import CollisionSlices  # noqa: E402
 from crgame_ros.planner.interface import PlannerContext  # noqa: E402
 from crgame_ros.planner.path_following import PathPosition  # noqa: E402
@@ -80,7 +82,22 @@ def _describe(config: ReactivePlannerConfiguration, vehicle: VehicleParameters) 
 
 
 class _Planner(package.ReactivePlanner):
-    """The package's planner, repaired: at rest it fails in a message if no sample is feasible."""
+    """
+    The package's planner; repaired, as at rest it fails in a message if no sample is feasible.
+
+    :ivar clearance: of people, which samples keep; None for the package's own checks alone.
+    """
+
+    clearance: Clearance | None = None
+
+    def _check_collision_traj_sample(self, trajectory: TrajectorySample) -> bool:
+        if super()._check_collision_traj_sample(trajectory):
+            return True
+        if self.clearance is None:
+            return False
+        path = trajectory.cartesian
+        poses = shifted(joined(path.x, path.y, path.theta), self.vehicle_params.wb_rear_axle)
+        return self.clearance.is_too_fast(poses, path.v)
 
     def _get_optimal_trajectory(self, trajectory_bundle: TrajectoryBundle,
                                 ) -> TrajectorySample | None:
@@ -100,10 +117,11 @@ class ReactiveCore:
     :param context: of the planner.
     :param config: configuration of the package.
     :param margin: enlargement of obstacles on each side [m]
+    :param clearance: of people; None for none.
     """
 
     def __init__(self, context: PlannerContext, config: ReactivePlannerConfiguration,
-                 margin: float) -> None:
+                 margin: float, clearance: Clearance | None = None) -> None:
         logging.getLogger('RP_LOGGER').setLevel(logging.ERROR)
         self._vehicle = context.vehicle
         self._steps: int = config.planning.time_steps_computation
@@ -113,6 +131,7 @@ class ReactiveCore:
         # replace, and it changes the planning problem: it gets an empty scenario and a copy.
         config.update(Scenario(context.time_step_s), None)
         self.planner = _Planner(config)
+        self.planner.clearance = self._clearance = clearance
         config.planning_problem = deepcopy(context.planning_problem)
         self._driving: DrivingPath | None = None
 
@@ -131,6 +150,8 @@ class ReactiveCore:
         if driving is not self._driving or position.s > self._end_s - FRAME_RESERVE:
             self._build_frame(driving, position.s)
         self.slices.update(request, self._steps + 1)
+        if self._clearance is not None:
+            self._clearance.update(request, self._steps + 1)
         system = self._system
         if not system.cartesian_point_inside_projection_domain(ego.x, ego.y):
             raise PlanningError(f'the vehicle is {abs(position.d):.0f} m beside its path, too far '
