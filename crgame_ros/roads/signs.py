@@ -35,8 +35,16 @@ def sign_names(lanelet: Lanelet, roads: LaneletNetwork) -> set[str]:
 
 
 def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
-    """Return whether a sign demands a halt at a lanelet's stop line."""
-    return lanelet.stop_line is not None and STOP in sign_names(lanelet, roads)
+    """
+    Return whether a sign demands a halt on a lanelet: at its stop line, or else at its end.
+
+    Without a stop line, the last of successive lanelets that name the sign counts.
+    """
+    if STOP not in sign_names(lanelet, roads):
+        return False
+    following = [roads.find_lanelet_by_id(number) for number in lanelet.successor]
+    return lanelet.stop_line is not None or not any(
+        after.traffic_signs & lanelet.traffic_signs for after in following if after is not None)
 
 
 def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:

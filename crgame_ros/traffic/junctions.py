@@ -126,6 +126,9 @@ def hold_before(entry: float) -> float:
 @compiled
 def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int) -> float:
     """Return the distance of an agent's centre to where its front waits before a junction [m]."""
+    own = lines[way.lane[i, step]]
+    if own <= entry - 0.5:
+        return float(way.offset[i, step] + own)
     hold = hold_before(entry) + way.offset[i, step]
     if step > 0:
         line = lines[way.lane[i, step - 1]]

@@ -84,9 +84,9 @@ class StopLines:
         rows: list[IntArray] = []
         for lane, lanelet_id in enumerate(graph.ids):
             lanelet = roads.find_lanelet_by_id(lanelet_id)
-            if lanelet.stop_line is not None:
+            self.stop_sign[lane] = has_stop_sign(lanelet, roads)
+            if lanelet.stop_line is not None or self.stop_sign[lane]:
                 self.line[lane] = self.at[lane] = self._position(lane, lanelet)
-                self.stop_sign[lane] = has_stop_sign(lanelet, roads)
             lights = lights_of(lanelet, roads)
             if lights:
                 self._lights[lane] = {movement: _governing(lights, arrow)

@@ -285,8 +285,11 @@ class Traffic:
         if not len(conflicts):
             return before_light
         passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
-        before = way.lane[np.arange(len(slots)), np.maximum(passage.first - 1, 0)]
-        sign = self._lines.stop_sign[before] & (passage.first > 0)
+        number = np.arange(len(slots))
+        first = way.lane[number, np.maximum(passage.first, 0)]
+        before = way.lane[number, np.maximum(passage.first - 1, 0)]
+        sign = self._lines.stop_sign[first] & (passage.first >= 0) \
+            | self._lines.stop_sign[before] & (passage.first > 0)
         coming = arrivals(graph.table, conflicts.table, way, agents.table, slots, entries,
                           self._others.drives, self._others.widths)
         rear_stop, queued = queues(agents.table, slots, pairs, entries, passage)

@@ -192,6 +192,28 @@ def test_a_stop_sign_makes_everybody_stand_once() -> None:
     assert np.nanmax(poses[:, 0]) > 200.0
 
 
+@pytest.mark.parametrize('where', ['no line', 'in the junction'])
+def test_a_stop_sign_counts_without_a_line_and_on_the_junctions_own_lane(where: str) -> None:
+    """It holds at the end of its lane, or at a line 2 m behind the beginning of the junction."""
+    line = StopLine(np.array([102.0, 1.75]), np.array([102.0, -1.75]), LineMarking.SOLID, {60},
+                    set())
+    inside = where == 'in the junction'
+    scenario = support.roads(
+        support.straight_lane(1, 0.0, 0.0, 100.0, successor=[2]),
+        support.straight_lane(2, 0.0, 100.0, 300.0, predecessor=[1],
+                              stop_line=line if inside else None),
+        support.lane_strip(3, [(110.0, y) for y in np.linspace(-100.0, 100.0, 80)]))
+    sign = TrafficSign(60, [TrafficSignElement(TrafficSignIDGermany.STOP)], {2 if inside else 1},
+                       np.array([98.0, -3.0]))
+    scenario.add_objects(sign, {2 if inside else 1})
+    run = support.Run(scenario, TrafficSpec(), 0, (), one()).ticks(500)
+    poses, speeds = run.series(0)
+    stood = np.flatnonzero(speeds < 0.05)
+    at = 102.0 if inside else 100.0
+    assert len(stood) and at - 3.0 < poses[stood[0], 0] + 2.25 <= at + 0.2
+    assert np.nanmax(poses[:, 0]) > 200.0
+
+
 def test_no_agent_blocks_a_junction_behind_which_there_is_no_room() -> None:
     scenario = support.roads(
         support.straight_lane(1, 0.0, 0.0, 200.0),
