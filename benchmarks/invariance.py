@@ -22,7 +22,8 @@ import tempfile
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
-from placed_runs import difference, Placement, run_placed, UTM  # noqa: E402, I100
+from crgame_ros.errors import CrgameError  # noqa: E402, I100
+from placed_runs import difference, Placement, run_placed, UTM  # noqa: E402
 
 
 def main() -> None:
@@ -41,9 +42,13 @@ def main() -> None:
     print(f'{"game":20} {"placed":>8} {"position":>10} {"yaw":>10} {"speed":>10}')
     with tempfile.TemporaryDirectory() as folder:
         for game in games:
-            first, *others = (
-                run_placed(game, Path(folder, place.name), place, given.duration)
-                for place in (Placement(), *places))
+            try:
+                first, *others = (
+                    run_placed(game, Path(folder, place.name), place, given.duration)
+                    for place in (Placement(), *places))
+            except CrgameError as error:
+                print(error, flush=True)
+                continue
             for place, other in zip(places, others, strict=True):
                 print(f'{game.stem:20} {place.name:>8}',
                       *(f'{each:10.1e}' for each in difference(first, other, place)), flush=True)

@@ -10,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.vehicle.driver_command import DriverCommand
-from crgame_ros.vehicle.lights import Light, lights_of
+from crgame_ros.vehicle.lights import Light, lights_of, OF_DRIVERS
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import Joy
@@ -124,7 +124,8 @@ def to_joy(command: DriverCommand, stamp_ns: int, source: str) -> Joy:
     """
     message = Joy(axes=array('f', (command.throttle, command.brake, command.steering)),
                   buttons=array('i', (
-                      int(command.reverse), *(int(bool(command.lights & bit)) for bit in Light),
+                      int(command.reverse),
+                      *(int(bool(command.lights & bit)) for bit in Light if bit & OF_DRIVERS),
                       int(command.put_back))))
     message.header.frame_id = source
     message.header.stamp = to_time(stamp_ns)

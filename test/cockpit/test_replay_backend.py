@@ -256,8 +256,8 @@ def test_what_happened(backend: ReplayBackend) -> None:
 def test_documents_hold_from_their_step_on(backend: ReplayBackend) -> None:
     """Each entry is complete, so the page can use any time on its own."""
     documents = backend.info()['documents']
-    assert documents['signals'] == [[0.0, {'k': 0, 'states': {'7': 'red'}}],
-                                    [3.0, {'k': 30, 'states': {'7': 'green'}}]]
+    assert documents['signals'] == [[0.0, {'k': 0, 'states': {'7': 'red'}, 'objects': {}}],
+                                    [3.0, {'k': 30, 'states': {'7': 'green'}, 'objects': {}}]]
     assert [t for t, _ in documents['events']] == [0.0, 610 * 0.01]
     assert documents['events'][1][1]['fired'][0]['name'] == 'barrier'
     alarms = [(t, [alarm['id'] for alarm in content['active']])
