@@ -55,11 +55,17 @@ def test_signs_and_lights_of_the_stop_line_count() -> None:
     assert has_stop_sign(lanelet, network)
 
 
-def test_without_a_stop_line_a_stop_sign_does_not_count() -> None:
+def test_without_a_stop_line_the_last_lanelet_with_the_stop_sign_counts() -> None:
     lanelet, network = road(None)
     lanelet.traffic_signs = {20, 21}
     assert sign_names(lanelet, network) == {'STOP', 'MAX_SPEED'}
-    assert not has_stop_sign(lanelet, network)
+    assert has_stop_sign(lanelet, network)
+    behind = Lanelet(lanelet.left_vertices + (20.0, 0.0), lanelet.center_vertices + (20.0, 0.0),
+                     lanelet.right_vertices + (20.0, 0.0), 99, predecessor=[lanelet.lanelet_id],
+                     traffic_signs={20, 21})
+    network.add_lanelet(behind)
+    lanelet.successor = [99]
+    assert has_stop_sign(behind, network) and not has_stop_sign(lanelet, network)
     assert [light.traffic_light_id for light in lights_of(lanelet, network)] == [2, 4]
 
 
