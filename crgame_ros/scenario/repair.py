@@ -6,7 +6,7 @@ from collections import Counter
 import math
 import re
 
-from commonroad.scenario.scenario import ScenarioID
+from commonroad.scenario.scenario import ScenarioID, TimeOfDay, Underground, Weather
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_ids import renumber
 from lxml import etree
@@ -89,6 +89,26 @@ def _mend_header(root: etree._Element, notices: list[str]) -> None:
                 *names, 'xTranslation', 'yTranslation', 'zRotation', 'scaling'))):
         root.remove(location)
         notices.append('the location is incomplete or holds no numbers and is ignored')
+    for geometry in root.findall('location/geoTransformation'):
+        if geometry.find('geoReference') is None:
+            geometry.getparent().remove(geometry)
+            notices.append('the geoTransformation has no geoReference and is ignored')
+    for environment in root.iterfind('location/environment'):
+        _mend_environment(environment, notices)
+
+
+def _mend_environment(environment: etree._Element, notices: list[str]) -> None:
+    """Replace words that commonroad-io does not know, among them some of the schema."""
+    for tag, kind, alias in (('timeOfDay', TimeOfDay, {'day': 'unknown'}),
+                             ('weather', Weather, {'sunny': 'clear'}),
+                             ('underground', Underground, {})):
+        node = environment.find(tag)
+        node = etree.SubElement(environment, tag) if node is None else node
+        given = (node.text or '').strip()
+        node.text = alias.get(given, given)
+        if node.text not in {value.value for value in kind}:
+            node.text = 'unknown'
+            notices.append(f'the {tag} {given[:40]!r} is not known and is ignored')
 
 
 def _valid_benchmark_id(given: str) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
 import pytest
 
@@ -138,6 +139,32 @@ def test_mendable_faults_load_with_a_notice(links: str, rest: str, notice: str) 
     assert len(loaded.scenario.lanelet_network.lanelets) == 2
     assert loaded.scenario.lanelet_network.find_lanelet_by_id(1).successor == [2]
     assert sum(notice in n for n in loaded.notices) == 1
+
+
+PLACE = ('<location><geoNameId>1</geoNameId><gpsLatitude>2</gpsLatitude><gpsLongitude>3'
+         '</gpsLongitude>{}</location>')
+
+
+@pytest.mark.parametrize(('light', 'weather', 'shown', 'notices'), [
+    ('day', 'sunny', ('day', 30000.0), 0), ('night', 'fog', ('dusk', 200.0), 0),
+    ('tea time', 'frogs', ('day', 30000.0), 2)])
+def test_words_of_the_schema_that_commonroad_io_lacks(
+        light: str, weather: str, shown: tuple[str, float], notices: int) -> None:
+    """Day and sunny load as such; other words are told and ignored."""
+    loaded = parse_scenario(write(tags=PLACE.format(
+        f'<environment><time>12:00:00</time><timeOfDay>{light}</timeOfDay><weather>{weather}'
+        '</weather><underground>wet</underground></environment>') + '<scenarioTags/>'), 'x')
+    found = environment_of(loaded.scenario, None)
+    assert (found.light, found.visibility) == shown
+    assert sum('is not known and is ignored' in notice for notice in loaded.notices) == notices
+
+
+def test_a_geo_transformation_without_a_reference_is_told() -> None:
+    """The schema allows an empty one."""
+    loaded = parse_scenario(write(tags=PLACE.format('<geoTransformation/>') + '<scenarioTags/>'),
+                            'x')
+    assert loaded.scenario.location.geo_transformation is None
+    assert any('has no geoReference' in notice for notice in loaded.notices)
 
 
 def test_gaps_between_lanelets_are_told_with_the_widest() -> None:
