@@ -129,13 +129,14 @@ class ObjectWriter:
             ~hazard & (lights & Light.RIGHT > 0), brakes, hazard)),
             strict=True))
 
-    def _signals_of(self, name: str) -> list[tuple[bool, ...]]:
+    def _signals_of(self, item: ObjectDescription) -> list[tuple[bool, ...]]:
         """Return the recorded signals of an object at each step; none if it has none."""
-        signals = self._recorded_signals.get(name)
+        signals = self._recorded_signals.get(item.id)
         if signals is None:
             return []
-        if name in self._released:
-            self._notices.append(f'{name}: its signals are left out, as an event may release it')
+        if item.id in self._released or item.role is Role.TRAFFIC:
+            self._notices.append(f'{item.id}: its signals are left out, as it drives at other '
+                                 'times than in the recording')
             return []
         return [_switches(signals.at(k)) for k in self._log.ks.tolist()]
 
@@ -175,7 +176,7 @@ class ObjectWriter:
                 rows = np.column_stack((poses, _signed_speeds(poses, velocities)))[:end]
                 self._parts['dynamic'].append(dynamic_obstacle(
                     number, self._type(item, DYNAMIC_TYPES), parts, rows.tolist(), False,
-                    self._signals_of(item.id)[:end]))
+                    self._signals_of(item)[:end]))
                 continue
             self._parts['phantom'].append(named(item.id) + phantom_obstacle(
                 number, parts, first, poses[first:end].tolist()))

@@ -5,6 +5,7 @@
 from bisect import bisect_right
 from dataclasses import dataclass
 
+from commonroad.common.util import Interval
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle
 from commonroad.scenario.state import SignalState
 from crgame_ros.scenario.loading import exact_value
@@ -44,10 +45,14 @@ def recorded_signals(obstacle: Obstacle) -> RecordedSignals | None:
               *(obstacle.signal_series or ())]
     if not states:
         return None
-    lights = {round(exact_value(state.time_step)): _bits(state) for state in states}
+    lights = {_begin(state.time_step): _bits(state) for state in states}
     steps = sorted(lights)
     return RecordedSignals(tuple(steps), tuple(lights[k] for k in steps),
                            round(exact_value(obstacle.initial_state.time_step)))
+
+
+def _begin(time_step: int | Interval) -> int:
+    return int(time_step.start if isinstance(time_step, Interval) else time_step)
 
 
 def _bits(state: SignalState) -> int:

@@ -15,6 +15,9 @@ from lxml import etree
 MAX_GAP = 1000.0
 # A gap that a person would see [m].
 TOLD_GAP = 5.0
+# Elements that hold a truth value: commonroad-io knows the words, the schema 1 and 0 as well.
+_BOOLEANS = ('horn', 'indicatorLeft', 'indicatorRight', 'brakingLights', 'hazardWarningLights',
+             'flashingBlueLights', 'active', 'virtual')
 # Elements that link a lanelet to others.
 LINKS = ('successor', 'predecessor', 'adjacentLeft', 'adjacentRight')
 _LENIENT_ID = re.compile(
@@ -53,7 +56,11 @@ def mend(root: etree._Element) -> list[str]:
     _mend_adjacency(root, notices)
     _mend_incomings(root, notices)
     _mend_times(root, notices)
-    heights = [point for point in root.iter('point') if point.find('z') is not None]
+    for element in root.iter(*_BOOLEANS):
+        text = (element.text or '').strip()
+        element.text = {'1': 'true', '0': 'false'}.get(text, text)
+    _mend_stop_lines(root, notices)
+    heights = [point for point in root.iter('point', 'center') if point.find('z') is not None]
     for point in heights:
         point.remove(point.find('z'))
     if heights:
@@ -196,8 +203,8 @@ def _mend_gaps(root: etree._Element, notices: list[str]) -> None:
             elif link.tag == 'successor' and gap > TOLD_GAP:
                 kept.append((gap, f'from {lanelet.get("id")} to {link.get("ref")}'))
     if kept:
-        notices.append(f'{len(kept)} connections of lanelets have a gap of more than '
-                       f'{TOLD_GAP:g} m, which vehicles cross straight, the widest, '
+        notices.append(f'gaps of more than {TOLD_GAP:g} m between lanelets and their successors, '
+                       f'which agents of traffic do not cross: {len(kept)}, the widest, '
                        f'{max(kept)[0]:.0f} m: {max(kept)[1]}')
     if cut:
         notices.append(f'{len(cut)} links of lanelets more than {MAX_GAP:g} m apart are ignored, '
@@ -249,11 +256,44 @@ def _mend_times(root: etree._Element, notices: list[str]) -> None:
                 _set_time(state, {'exact': 0})
                 notices.append(f'{element.tag} {element.get("id")}: its initial state has no time '
                                'and counts as that of time step 0')
+            _complete_state(state)
+        between = [time for time in element.iterfind('trajectory/state/time')
+                   if time.find('intervalStart') is not None]
+        for time in between:
+            middle = sum(float(time.findtext(name)) for name in ('intervalStart', 'intervalEnd'))
+            _set_time(time.getparent(), {'exact': int(middle // 2)})
+        if between:
+            notices.append(f'{element.tag} {element.get("id")}: the times of {len(between)} '
+                           'states are intervals and count as their middle')
+        for signal in element.findall('signalSeries/signalState'):
+            if signal.find('time/*') is None:
+                signal.getparent().remove(signal)
+                notices.append(f'{element.tag} {element.get("id")}: a signal state without a time '
+                               'is ignored')
         for goal in element.findall('goalState'):
             if goal.find('time/*') is None:
                 _set_time(goal, {'intervalStart': 0, 'intervalEnd': guard.MAX_TIME_STEP})
                 notices.append(f'planning problem {element.get("id")}: its goal has no time and '
                                'may be reached at any')
+
+
+def _mend_stop_lines(root: etree._Element, notices: list[str]) -> None:
+    """Drop the only point of a stop line: commonroad-io would look for a second one."""
+    for line in root.iterfind('lanelet/stopLine'):
+        points = line.findall('point')
+        if len(points) == 1:
+            line.remove(points[0])
+            notices.append(f'lanelet {line.getparent().get("id")}: its stop line has one point '
+                           'and counts as at the end of the lanelet')
+
+
+def _complete_state(state: etree._Element) -> None:
+    """Write 0 for a missing value in front of others, at which commonroad-io stops reading."""
+    names = ('velocity', 'acceleration', 'yawRate', 'slipAngle')
+    given = [state.find(name) is not None for name in names]
+    for place, name in enumerate(names):
+        if not given[place] and any(given[place:]):
+            etree.SubElement(etree.SubElement(state, name), 'exact').text = '0'
 
 
 def _mend_incomings(root: etree._Element, notices: list[str]) -> None:

@@ -156,6 +156,21 @@ def test_recorded_signals_are_written_again(runs: Any, tmp_path: Path) -> None:
         assert again.lights_at(k)['o900'] == expected_bits(k)
 
 
+def test_signals_of_a_recorded_vehicle_that_became_an_agent_are_left_out(
+        runs: Any, tmp_path: Path) -> None:
+    """It drives at other times; the user is told."""
+    text = runs.own(CUT_IN).replace('<planningProblem', signalling_vehicle(900, 9.0)
+                                    + '<planningProblem', 1)
+    log = runs.drive(text, tmp_path)
+    log = replace(log, descriptions=tuple(
+        replace(item, role=Role.TRAFFIC) if item.id == 'o900' else item
+        for item in log.descriptions))
+    exported = export_scenario(log)
+    scenario, _ = runs.read_back(exported)
+    assert not scenario.obstacle_by_id(900).signal_series
+    assert any('o900: its signals are left out' in notice for notice in exported.notices)
+
+
 def test_objects_that_drive_backwards_have_negative_speed(runs: Any, tmp_path: Path) -> None:
     """The sign is that of the motion along the heading."""
     log = runs.drive(runs.own(CUT_IN), tmp_path)

@@ -262,6 +262,33 @@ def test_signals_hold_until_the_next_state() -> None:
     assert found.lights_at(21) == {}
 
 
+def test_signals_of_an_interval_begin_with_it() -> None:
+    """They hold until the next state."""
+    text = signalling_vehicle(7, 0.0).replace(
+        '<time><exact>4</exact></time><hazard',
+        '<time><intervalStart>4</intervalStart><intervalEnd>10</intervalEnd></time><hazard')
+    assert [obstacles(text).lights_at(k)['o7'] for k in range(20)] == [
+        expected_bits(k) for k in range(20)]
+
+
+def test_missing_values_in_front_of_others_are_zero() -> None:
+    """Without an acceleration, yaw rate and slip angle of an initial state count."""
+    loaded = road_with(dynamic(state('initialState', 0, 0).replace(
+        '</initialState>', '<yawRate><exact>0.3</exact></yawRate><slipAngle><exact>0.1</exact>'
+        '</slipAngle></initialState>')))
+    initial = loaded.scenario.obstacle_by_id(7).initial_state
+    assert (initial.velocity, initial.acceleration, initial.yaw_rate, initial.slip_angle) == (
+        7.0, 0.0, 0.3, 0.1)
+
+
+def test_truth_values_may_be_digits() -> None:
+    """The schema allows 1 for true and 0 for false."""
+    text = signalling_vehicle(7, 0.0).replace('true', '1').replace(
+        '<horn>1</horn>', '<horn>1</horn><brakingLights>0</brakingLights>')
+    assert [obstacles(text).lights_at(k)['o7'] for k in range(20)] == [
+        expected_bits(k) for k in range(20)]
+
+
 def test_signals_of_a_held_obstacle_begin_with_its_release() -> None:
     """It shows its first signals until then."""
     courses = ObstacleMotions(ScenarioObstacles(road_with(signalling_vehicle(7, 0.0)), held=(7,)))
