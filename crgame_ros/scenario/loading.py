@@ -113,6 +113,10 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
     notices += mend(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
+    for element in root.iterchildren('trafficSign'):
+        # commonroad-io looks for an attribute of this name.
+        if element.findtext('virtual') == 'true':
+            scenario.lanelet_network.find_traffic_sign_by_id(int(element.get('id'))).virtual = True
     exact = tuple(_exact_problem(problem, notices) for problem in problems)
     notices += simplifications(scenario)
     for lanelet in scenario.lanelet_network.lanelets:

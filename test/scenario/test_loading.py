@@ -141,6 +141,15 @@ def test_mendable_faults_load_with_a_notice(links: str, rest: str, notice: str) 
     assert sum(notice in n for n in loaded.notices) == 1
 
 
+@pytest.mark.parametrize(('text', 'virtual'), [('true', True), ('1', True), ('false', False)])
+def test_a_virtual_sign_is_one(text: str, virtual: bool) -> None:
+    """The schema has an element for it."""
+    loaded = parse_scenario(write('<trafficSignRef ref="5"/>', (
+        '<trafficSign id="5"><trafficSignElement><trafficSignID>274</trafficSignID>'
+        f'</trafficSignElement><virtual>{text}</virtual></trafficSign>')), 'x')
+    assert loaded.scenario.lanelet_network.find_traffic_sign_by_id(5).virtual is virtual
+
+
 PLACE = ('<location><geoNameId>1</geoNameId><gpsLatitude>2</gpsLatitude><gpsLongitude>3'
          '</gpsLongitude>{}</location>')
 
