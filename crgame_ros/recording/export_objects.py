@@ -123,11 +123,9 @@ class ObjectWriter:
         speed, acceleration = self.vehicle_rows[:, column, 3:5].T
         brakes = np.where(driven, rows[:, _BRAKE] > BRAKE_LIGHTS,
                           acceleration * np.sign(speed) < -BRAKING)
-        hazard = lights & HAZARD == HAZARD
-        return list(zip(*(each.tolist() for each in (
-            lights & Light.HORN > 0, ~hazard & (lights & Light.LEFT > 0),
-            ~hazard & (lights & Light.RIGHT > 0), brakes, hazard)),
-            strict=True))
+        # Only recorded vehicles have the last signal.
+        return [_switches(bits)[:-1]
+                for bits in (lights | np.where(brakes, int(Light.BRAKE), 0)).tolist()]
 
     def _signals_of(self, item: ObjectDescription) -> list[tuple[bool, ...]]:
         """Return the recorded signals of an object at each step; none if it has none."""

@@ -113,10 +113,11 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
     notices += mend(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
-    for element in root.iterchildren('trafficSign'):
-        # commonroad-io looks for an attribute of this name.
-        if element.findtext('virtual') == 'true':
-            scenario.lanelet_network.find_traffic_sign_by_id(int(element.get('id'))).virtual = True
+    # commonroad-io looks for an attribute of this name.
+    virtual = {int(element.get('id')) for element in root.iterchildren('trafficSign')
+               if element.findtext('virtual') == 'true'}
+    for sign in scenario.lanelet_network.traffic_signs:
+        sign.virtual = sign.traffic_sign_id in virtual
     exact = tuple(_exact_problem(problem, notices) for problem in problems)
     notices += simplifications(scenario)
     for lanelet in scenario.lanelet_network.lanelets:

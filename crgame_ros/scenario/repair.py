@@ -258,7 +258,8 @@ def _mend_times(root: etree._Element, notices: list[str]) -> None:
                                'and counts as that of time step 0')
             _complete_state(state)
         between = [time for time in element.iterfind('trajectory/state/time')
-                   if time.find('intervalStart') is not None]
+                   if time.find('intervalStart') is not None
+                   and time.find('intervalEnd') is not None]
         for time in between:
             middle = sum(float(time.findtext(name)) for name in ('intervalStart', 'intervalEnd'))
             _set_time(time.getparent(), {'exact': int(middle // 2)})

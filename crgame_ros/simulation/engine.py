@@ -283,9 +283,10 @@ class Simulation:
             forecast = self._requests.forecast(
                 k, self.n, states, self.avs, objects, self._world.changed)
             stamp_ns = self.scheduler.stamp_ns(self.n)
+            lights, object_lights = self.lights, self.object_lights
             for av in asking:
-                request = self._requests.build(av.setup, stamp_ns, states, forecast, self.lights,
-                                               self.object_lights)
+                request = self._requests.build(av.setup, stamp_ns, states, forecast, lights,
+                                               object_lights)
                 av.request_sent(self.n, stamp_ns, ego_of(request))
                 requests[av.setup.id] = request
         return StepResult(self.n, k, True, requests, objects, fired, self._world.agents_k,

@@ -8,6 +8,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from crgame_ros.errors import InputError
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
 import pytest
@@ -166,6 +167,19 @@ def test_words_of_the_schema_that_commonroad_io_lacks(
     found = environment_of(loaded.scenario, None)
     assert (found.light, found.visibility) == shown
     assert sum('is not known and is ignored' in notice for notice in loaded.notices) == notices
+
+
+def test_half_an_interval_as_the_time_of_a_state_is_refused_in_one_line() -> None:
+    """It has no middle."""
+    states = ''.join(
+        f'<{tag}><position><point><x>1</x><y>0</y></point></position><orientation><exact>0</exact>'
+        f'</orientation><time><{time}>1</{time}></time></{tag}>'
+        for tag, time in (('initialState', 'exact'), ('state', 'intervalStart')))
+    with pytest.raises(InputError, match='commonroad-io cannot read it'):
+        parse_scenario(write(rest=(
+            '<dynamicObstacle id="7"><type>car</type><shape><circle><radius>1</radius></circle>'
+            '</shape>' + states.replace('<state>', '<trajectory><state>')
+            + '</trajectory></dynamicObstacle>')), 'x')
 
 
 def test_a_geo_transformation_without_a_reference_is_told() -> None:
