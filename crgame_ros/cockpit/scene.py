@@ -264,7 +264,7 @@ def _vehicle(item: DrivenVehicle, role: str, perception: PerceptionSpec | None) 
     return {'id': item.id, 'role': role, 'shape': _shape(vehicle.shape),
             'rear_to_center': vehicle.rear_to_center, 'wheelbase': vehicle.wheelbase,
             'max_steering_angle': vehicle.max_steering_angle,
-            'powertrain': vehicle.powertrain,
+            'type': vehicle.type, 'powertrain': vehicle.powertrain,
             'driver_place': asdict(driver_place(vehicle)),
             'perception': None if perception is None else _perception(perception)}
 

@@ -15,7 +15,7 @@ from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 
 # Parameters of a vehicle that are not numbers.
-TEXTS = ('name', 'steering_ratio', 'powertrain')
+TEXTS = ('name', 'steering_ratio', 'type', 'powertrain')
 VEHICLE_ID = re.compile(r'(hv|av)\d{1,3}')
 
 

@@ -25,7 +25,7 @@ from crgame_ros.schema.marks import (
     Within,
     Wording,
 )
-from crgame_ros.vehicle.parameters import DEFAULT_VEHICLE
+from crgame_ros.vehicle.parameters import AUTO
 
 Light = Literal['day', 'dusk']
 # Visibility on a clear day [m].
@@ -143,7 +143,8 @@ class HumanSpec:
     :param id: hv0, hv1, …
     :param driver: source of its commands: auto, cockpit, idle, evdev[:NAME], keys:FILE, joy:FILE,
         joy, policy:FILE.py:load, replay:BAG.
-    :param vehicle: name of the vehicle parameters.
+    :param vehicle: name of the vehicle parameters; `auto` is bmw_320i, or bicycle on a map without
+        lanes for cars.
     :param spawn: where it starts; None places it beside or behind the first AV, where possible.
     :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
     """
@@ -152,7 +153,7 @@ class HumanSpec:
 
     id: Annotated[str, Numbered('hv'), Wording('hv[0-9]{1,3}', 'use hv0, hv1, …')]  # noqa: A003
     driver: Annotated[str, DriverName()] = 'auto'
-    vehicle: Annotated[str, Named()] = DEFAULT_VEHICLE
+    vehicle: Annotated[str, Named()] = AUTO
     spawn: Annotated[LaneletSpawn | PoseSpawn | None, Meaning('auto', None)] = None
     dynamics: ModelSpec | None = None
 
@@ -166,7 +167,8 @@ class AvSpec:
     :param planner: registered name, `module:Class`, `file.py:Class` or `policy:FILE.py:load`.
     :param options: keyword arguments of the planner.
     :param planning_problem: id of its planning problem; None takes the next unused one.
-    :param vehicle: name of the vehicle parameters.
+    :param vehicle: name of the vehicle parameters; `auto` is bmw_320i, or bicycle on a map without
+        lanes for cars.
     :param spawn: `problem` starts at the planning problem's pose; `lanelet` at the nearest pose
         of lanelet geometry, aligned to the former by CRG 6-10.
     :param execution: `perfect` follows the plan exactly (CRG), `tracked` by a controller on a
@@ -184,7 +186,7 @@ class AvSpec:
     planner: Annotated[str, Named()] = DEFAULT_PLANNER
     options: dict[str, Any] = field(default_factory=dict)
     planning_problem: int | None = None
-    vehicle: Annotated[str, Named()] = DEFAULT_VEHICLE
+    vehicle: Annotated[str, Named()] = AUTO
     spawn: Annotated[Literal['problem', 'lanelet'], Meaning('auto', 'problem')] = 'problem'
     execution: Literal['perfect', 'tracked'] = 'perfect'
     tracker: TrackerSpec = TrackerSpec()

@@ -36,6 +36,8 @@ TURNING = 1.0
 INSIDE = 1.0
 # The longest sampled stop takes this many times the time of the hardest stop.
 STOP_SHARE = 2.5
+# Greatest over mean deceleration of the package's profiles.
+PEAK = 1.5
 # Least distance ahead at which side lanes are searched [m].
 SHORTEST_LOOK = 15.0
 
@@ -101,7 +103,7 @@ class ReactivePlanner(Planner):
         """Plan the path and build the package's planner."""
         self._context = context
         self._idm.setup(context)
-        steps = max(10, math.ceil(self._horizon / context.time_step_s - 1e-9))
+        steps = self._steps = max(10, math.ceil(self._horizon / context.time_step_s - 1e-9))
         self._span_s = steps * context.time_step_s
         config = configuration(context, steps)
         config.sampling.num_sampling_levels = LEVELS
@@ -223,9 +225,12 @@ class ReactivePlanner(Planner):
         # once the vehicle brakes. All times are tried, so that a stop that has begun continues.
         dt_s, brake = self._context.time_step_s, self._context.vehicle.max_acceleration
         first = max(2, math.ceil(abs(speed) / brake / dt_s))
-        last = max(first, min(round(self._span_s / dt_s), round(STOP_SHARE * first)))
+        last = min(self._steps, max(first, round(STOP_SHARE * first)))
+        times = {dt_s * count for count in range(first, last + 1)}
+        # A vehicle that cannot stop within the horizon brakes for all of it.
+        slower = 0.0 if times else speed - brake * self._span_s / PEAK
         self._core.sample_over_way()
-        states = self._sample(1, aim, {dt_s * count for count in range(first, last + 1)}, {0.0},
+        states = self._sample(1, aim, times or {self._time(1.0)}, {slower},
                               {aim.offset, position.d})
         self._core.sample_over_time()
         return states

@@ -52,7 +52,7 @@ def side_lanes(driving: DrivingPath, s: float, vehicle: VehicleParameters) -> li
     found = []
     for neighbour_of in (RoadNetwork.left_of, RoadNetwork.right_of):
         beside = neighbour_of(roads, driving.lanelets[first])
-        if beside is None or not roads.is_for_cars(beside):
+        if beside is None or not roads.is_drivable(beside):
             continue
         along, aside = roads.line(beside).project(point)
         offset = -float(aside[0])
@@ -112,7 +112,7 @@ def _widths(roads: RoadNetwork, lanelet: int, s: float, reach: Reach) -> Iterato
     yield roads.width_at(lanelet, s)
     for neighbour, same_way in ((own.adj_right, own.adj_right_same_direction),
                                 (own.adj_left, own.adj_left_same_direction)):
-        usable = (neighbour in roads.lanelet_ids and roads.is_for_cars(neighbour)
+        usable = (neighbour in roads.lanelet_ids and roads.is_drivable(neighbour)
                   and reach != 'lane' and (same_way or reach == 'carriageway'))
         place = s if same_way or not usable else roads.line(neighbour).length - s
         yield roads.width_at(neighbour, place) if usable else 0.0

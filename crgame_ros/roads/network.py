@@ -27,7 +27,9 @@ _NO_ROAD = {LaneletType.SIDEWALK, LaneletType.CROSSWALK, LaneletType.BORDER,
 # Half the greatest width of slits between lanelets [m]; smaller holes are no islands [m^2].
 _SLIT, _ISLAND = 0.5, 20.0
 _SLOW_USERS = {RoadUser.PEDESTRIAN, RoadUser.BICYCLE, RoadUser.TRAIN}
-# A lane for cars is preferred, unless another one fits the heading much better.
+_MOTORWAYS = {LaneletType.INTERSTATE, LaneletType.HIGHWAY}
+_FOR_PEOPLE = {LaneletType.SIDEWALK, LaneletType.CROSSWALK}
+# A drivable lane is preferred, unless another one fits the heading much better.
 _NOT_FOR_CARS_PENALTY = 0.2
 _OFFSET_WEIGHT = 0.1
 # Published maps have successors that begin elsewhere (metres away, even the lanelet itself).
@@ -39,7 +41,12 @@ class RoadNetwork:
     """
     Lookups and geometry on the lanelets of a scenario.
 
+    On a map without any lane for cars, lanes for bicycles are the drivable ones, or without those,
+    ways for pedestrians.
+
     :param network: the CommonRoad lanelet network; its lanelets are not copied.
+
+    Attribute `vehicle_type`: of CommonRoad, whose lanes are the drivable ones: car or bicycle.
     """
 
     def __init__(self, network: LaneletNetwork) -> None:
@@ -50,7 +57,12 @@ class RoadNetwork:
         self._areas = lanelet_areas(self._lanelets)
         self._tree = shapely.STRtree(self._areas)
         self._lines: dict[int, Curve] = {}
-        self._drivable = np.array([_is_for_cars(x) for x in self._lanelets])
+        for_cars, for_bicycles, for_people = (
+            np.array([is_for(x) for x in self._lanelets], dtype=bool)
+            for is_for in (_is_for_cars, _is_for_bicycles, _is_for_people))
+        self._for_bicycles = for_bicycles if for_bicycles.any() else for_people
+        self.vehicle_type = 'bicycle' if not for_cars.any() and self._for_bicycles.any() else 'car'
+        self._drivable = self._for_bicycles if self.vehicle_type == 'bicycle' else for_cars
 
     def line(self, lanelet_id: int) -> Curve:
         """
@@ -69,7 +81,7 @@ class RoadNetwork:
         Find the lanelet that contains a point.
 
         Of several it is the one whose direction agrees best with yaw, or without yaw the one whose
-        centre line is nearest. Lanes for cars are preferred. None off the road.
+        centre line is nearest. Drivable ones are preferred. None off the road.
         """
         hits = self._tree.query(shapely.Point(x, y), predicate='intersects')
         return self._best(hits, x, y, yaw)
@@ -156,11 +168,11 @@ class RoadNetwork:
         return tuple(x for x in self._lanelet(lanelet_id).predecessor if x in self._index)
 
     def straightest_successor(self, lanelet_id: int) -> int | None:
-        """Return the successor that turns least up to its end; lanes for cars first."""
+        """Return the successor that turns least up to its end; drivable ones first."""
         return self._straightest(lanelet_id, self._lanelet(lanelet_id).successor, -1)
 
     def straightest_predecessor(self, lanelet_id: int) -> int | None:
-        """Return the predecessor that turns least from its start; lanes for cars first."""
+        """Return the predecessor that turns least from its start; drivable ones first."""
         return self._straightest(lanelet_id, self._lanelet(lanelet_id).predecessor, 0)
 
     def advance(self, lanelet_id: int, s: float, distance: float) -> tuple[int, float] | None:
@@ -226,10 +238,15 @@ class RoadNetwork:
                 limits += _positive_numbers(element.additional_values[:1])
         return min(limits, default=None)
 
-    def is_for_cars(self, lanelet_id: int) -> bool:
-        """Return whether cars drive here (no sidewalk, crossing, cycle lane, shoulder…)."""
+    def is_drivable(self, lanelet_id: int, vehicle_type: str | None = None) -> bool:
+        """
+        Return whether a vehicle drives here (cars: no sidewalk, crossing, cycle lane, shoulder…).
+
+        :param vehicle_type: of CommonRoad; None is the map's own `vehicle_type`.
+        """
         self._lanelet(lanelet_id)
-        return bool(self._drivable[self._index[lanelet_id]])
+        open_to = self._for_bicycles if vehicle_type == 'bicycle' else self._drivable
+        return bool(open_to[self._index[lanelet_id]])
 
     def covers(self, footprint: shapely.Polygon) -> bool:
         """Return whether a footprint lies on lanelets entirely (1 cm tolerance)."""
@@ -242,7 +259,7 @@ class RoadNetwork:
 
     def road_area(self) -> shapely.Geometry:
         """Return the road for vehicles as one area, with slits and small islands filled."""
-        on = [not x.lanelet_type & _NO_ROAD for x in self._lanelets]
+        on = self._drivable | [not x.lanelet_type & _NO_ROAD for x in self._lanelets]
         road = shapely.buffer(shapely.buffer(shapely.union_all(self._areas[on]), _SLIT), -_SLIT)
         return shapely.union_all([
             shapely.Polygon(part.exterior, [ring for ring in part.interiors
@@ -292,7 +309,7 @@ class RoadNetwork:
             gap = np.hypot(*(other.points[-1 - end] - line.points[end]))
             turn = round(abs(wrap_pi(float(other.heading[end] - line.heading[end]))), EQUAL_DIGITS)
             if gap <= _MAX_GAP and candidate != lanelet_id:
-                scored.append((not self.is_for_cars(candidate), turn, candidate))
+                scored.append((not self.is_drivable(candidate), turn, candidate))
         return min(scored)[2] if scored else None
 
 
@@ -301,6 +318,19 @@ def _is_for_cars(lanelet: Lanelet) -> bool:
         return False
     users = lanelet.user_one_way | lanelet.user_bidirectional
     return not users or bool(users - _SLOW_USERS)
+
+
+def _is_for_bicycles(lanelet: Lanelet) -> bool:
+    users = lanelet.user_one_way | lanelet.user_bidirectional
+    if RoadUser.BICYCLE in users or LaneletType.BICYCLE_LANE in lanelet.lanelet_type:
+        return True
+    return not lanelet.lanelet_type & (_NOT_FOR_CARS | _MOTORWAYS) and (
+        not users or bool(users & {RoadUser.VEHICLE, RoadUser.CAR}))
+
+
+def _is_for_people(lanelet: Lanelet) -> bool:
+    users = lanelet.user_one_way | lanelet.user_bidirectional
+    return RoadUser.PEDESTRIAN in users or bool(lanelet.lanelet_type & _FOR_PEOPLE)
 
 
 def _positive_numbers(texts: Sequence[str]) -> list[float]:

@@ -131,7 +131,7 @@ def _edges(roads: RoadNetwork, lanelet: int,
         yield successor, available, False
     squeeze = CHANGE_COST * (1.0 + max(0.0, CHANGE_LENGTH / available - 1.0))
     for neighbour in (roads.left_of(lanelet), roads.right_of(lanelet)):
-        if neighbour is not None and roads.is_for_cars(neighbour):
+        if neighbour is not None and roads.is_drivable(neighbour):
             yield neighbour, squeeze, True
 
 
@@ -154,7 +154,7 @@ def _onward(roads: RoadNetwork, lanelet: int) -> int | None:
         turn = abs(float(headings[-1] - headings[0]))
         turn += abs(wrap_pi(float(headings[0] - roads.line(lanelet).heading[-1])))
         ends = not network.find_lanelet_by_id(successor).successor
-        scored.append((not roads.is_for_cars(successor), turn + 0.5 * ends, successor))
+        scored.append((not roads.is_drivable(successor), turn + 0.5 * ends, successor))
     return min(scored)[2] if scored else None
 
 

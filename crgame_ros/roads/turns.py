@@ -128,7 +128,7 @@ class Turns:
         """Return the alternatives to a lanelet; lanes beside it belong to the same road."""
         return {other for each in origins for lane in self._roads.abreast(each)
                 for other in self._roads.successors(lane)
-                if self._roads.is_for_cars(other)} - self._roads.abreast(lanelet)
+                if self._roads.is_drivable(other)} - self._roads.abreast(lanelet)
 
     def _bend_at_fork(self, lanelet: int) -> float:
         return self.turned_at(lanelet)[1] - float(self._roads.line(lanelet).heading[0])

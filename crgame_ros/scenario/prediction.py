@@ -124,7 +124,7 @@ class LanePrediction:
         if len(obstacles.living):
             # Their future places are unknown, so that any lane may be needed.
             for lane, lanelet_id in enumerate(network.lanelet_ids):
-                if network.is_for_cars(lanelet_id):
+                if network.is_drivable(lanelet_id):
                     self._number(lane)
         self._ensure_reach(_MIN_REACH)
         if len(obstacles.living) and self._used:

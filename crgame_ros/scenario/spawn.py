@@ -198,7 +198,7 @@ def _near_av(network: RoadNetwork, parameters: VehicleParameters,
             yield place
     everywhere = [(math.dist((x, y), (av.x, av.y)), lanelet, s)
                   for lanelet in network.lanelet_ids
-                  for s, (x, y) in _grid(network, lanelet)]
+                  for s, (x, y) in _grid(network, parameters, lanelet)]
     near = sorted(place for place in everywhere if place[0] <= _NEAR)
     for _, lanelet, s in near[:_MAX_NEAR]:
         yield lanelet, s
@@ -206,23 +206,30 @@ def _near_av(network: RoadNetwork, parameters: VehicleParameters,
 
 def _road_starts(network: RoadNetwork,
                  parameters: VehicleParameters) -> Iterator[tuple[int, float]]:
-    """Yield places without an AV: starts of roads, the longest first, then everywhere."""
-    reach: list[tuple[float, int]] = []
+    """
+    Yield places without an AV: starts of roads, the longest first, then everywhere.
+
+    A bicycle starts on a lane that cars don't use, if there is one.
+    """
+    reach: list[tuple[bool, float, int]] = []
     for lanelet in network.lanelet_ids:
-        if network.is_for_cars(lanelet) and network.straightest_predecessor(lanelet) is None:
+        if network.is_drivable(lanelet, parameters.type) and \
+                network.straightest_predecessor(lanelet) is None:
             line = Curve.from_polyline(network.lane_path(lanelet, 1000.0))
-            reach.append((-line.length, lanelet))
-    for _, lanelet in sorted(reach):
+            shared = parameters.type != network.vehicle_type and network.is_drivable(lanelet)
+            reach.append((shared, -line.length, lanelet))
+    for _, _, lanelet in sorted(reach):
         yield from ((lanelet, s) for s in np.arange(0.5 * parameters.length + _MARGIN, min(
             50.0, network.line(lanelet).length), 5.0).tolist())
     longest = sorted(network.lanelet_ids, key=lambda x: -network.line(x).length)
     for lanelet in longest[:_MAX_NEAR]:
-        yield from ((lanelet, s) for s, _ in _grid(network, lanelet))
+        yield from ((lanelet, s) for s, _ in _grid(network, parameters, lanelet))
 
 
-def _grid(network: RoadNetwork, lanelet: int) -> list[tuple[float, NDArray[np.float64]]]:
+def _grid(network: RoadNetwork, parameters: VehicleParameters,
+          lanelet: int) -> list[tuple[float, NDArray[np.float64]]]:
     line = network.line(lanelet)
-    if not network.is_for_cars(lanelet):
+    if not network.is_drivable(lanelet, parameters.type):
         return []
     s = np.arange(0.0, line.length, 5.0)
     return list(zip(s.tolist(), line.pose_at(s)[:, :2], strict=True))
@@ -231,7 +238,7 @@ def _grid(network: RoadNetwork, lanelet: int) -> list[tuple[float, NDArray[np.fl
 def _try(network: RoadNetwork, parameters: VehicleParameters, scene: _Scene, lanelet: int,
          s: float) -> VehicleState | None:
     """Return the state on the centre line at s; None off the road or too close to a body."""
-    if not network.is_for_cars(lanelet):
+    if not network.is_drivable(lanelet, parameters.type):
         return None
     state = VehicleState(*network.pose_on(lanelet, s), 0.0)
     pose = (*state.center(parameters.rear_to_center), state.yaw)

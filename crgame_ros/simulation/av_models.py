@@ -71,7 +71,7 @@ def check_models(avs: Sequence[tuple[AvSpec, VehicleParameters]],
         make_vehicle_model(spec.dynamics, vehicle, f'{spec.id}: dynamics')
         make_execution(spec, vehicle, CHECKING_STEP_S)
         if spec.perception is not None:
-            me = ObjectDescription(spec.id, 'car', Role.AUTONOMOUS, vehicle.shape,
+            me = ObjectDescription(spec.id, vehicle.type, Role.AUTONOMOUS, vehicle.shape,
                                    vehicle.rear_to_center)
             make_perception(spec.id, spec.perception, [me], vehicle, RigidTransform(),
                             VehicleState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0,

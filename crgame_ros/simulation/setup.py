@@ -177,7 +177,7 @@ class Setup:
     def vehicle_descriptions(self) -> tuple[ObjectDescription, ...]:
         """Return the descriptions of the driven vehicles: humans, then AVs."""
         return tuple(
-            ObjectDescription(vehicle.id, 'car', role, vehicle.vehicle.shape,
+            ObjectDescription(vehicle.id, vehicle.vehicle.type, role, vehicle.vehicle.shape,
                               vehicle.vehicle.rear_to_center)
             for vehicle, role in zip(
                 self.vehicles, [Role.HUMAN] * len(self.humans)
@@ -213,9 +213,15 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
                *_discrepancies(avs), *(
         f'{loaded.source}: obstacle {number} is the recorded {av_id} itself and is left out'
         for number, av_id in doubles.items())]
+    notices += [f'{loaded.source}: {av.id} starts at {av.state.speed:.1f} m/s, above the '
+                f'{av.vehicle.max_speed:g} m/s of {av.vehicle.name}: its plans are refused until '
+                'it is slower' for av in avs if av.state.speed > av.vehicle.max_speed]
+    if network.vehicle_type == 'bicycle':
+        notices.append(f'{loaded.source}: no lane is for cars: those for bicycles or people '
+                       'count, and vehicles are bicycles unless the game names others')
     humans: list[HumanSetup] = []
     for spec in game.humans:
-        parameters = load_vehicle_parameters(spec.vehicle)
+        parameters = load_vehicle_parameters(spec.vehicle, network.vehicle_type)
         taken = [human.state for human in humans]
         state = place_human(
             network, spec, parameters, [av.state for av in avs], obstacles.descriptions,
@@ -310,7 +316,7 @@ def _discrepancies(avs: Iterable[AvSetup]) -> Iterable[str]:
 def _place_avs(parts: Sequence[Part], network: RoadNetwork) -> tuple[AvSetup, ...]:
     avs: list[AvSetup] = []
     for spec, problem in parts:
-        parameters = load_vehicle_parameters(spec.vehicle)
+        parameters = load_vehicle_parameters(spec.vehicle, network.vehicle_type)
         declared = problem_pose(problem, parameters.rear_to_center,
                                 parameters.wheelbase)
         state = declared

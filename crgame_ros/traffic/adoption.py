@@ -56,7 +56,7 @@ def adoptable(description: ObjectDescription, poses: FloatArray, network: RoadNe
 def fits(network: RoadNetwork, lane: int, pose: FloatArray) -> bool:
     """Return whether a pose is that of a vehicle that drives along a lane for cars."""
     lanelet = network.lanelet_ids[lane]
-    if not network.is_for_cars(lanelet):
+    if not network.is_drivable(lanelet):
         return False
     s, _ = network.locate(lanelet, float(pose[0]), float(pose[1]))
     yaw = network.pose_on(lanelet, s)[2]

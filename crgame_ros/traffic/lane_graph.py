@@ -84,7 +84,7 @@ LEAST_KINK, KINK_REACH = 0.03, 4.0
 
 class LaneGraph:
     """
-    The lanelets for cars, tabulated every half metre; a lane is a position in `ids`.
+    The drivable lanelets, tabulated every half metre; a lane is a position in `ids`.
 
     The tables of all lanes are concatenated: the rows of a lane are
     `first[lane]:first[lane] + count[lane]`, a distance `step[lane]` apart.
@@ -92,15 +92,16 @@ class LaneGraph:
     :param network: the road network.
     :param lateral_acceleration: comfortable in curves [m/s^2]
     :param default_speed: where there is no speed limit [m/s]
-    :raises InputError: if no lanelet is for cars, or there are too many kilometres of them.
+    :raises InputError: if no lanelet is for cars or bicycles, or there are too many kilometres
+        of them.
     """
 
     def __init__(self, network: RoadNetwork, lateral_acceleration: float = 2.0,
                  default_speed: float = 13.9) -> None:
         self.network = network
-        self.ids: tuple[int, ...] = tuple(i for i in network.lanelet_ids if network.is_for_cars(i))
+        self.ids: tuple[int, ...] = tuple(i for i in network.lanelet_ids if network.is_drivable(i))
         if not self.ids:
-            raise InputError('no lanelet is for cars', 'scenario',
+            raise InputError('no lanelet is for cars or bicycles', 'scenario',
                              'use a map with lanes, or run it without traffic')
         self.index: dict[int, int] = {lanelet: i for i, lanelet in enumerate(self.ids)}
         self._tabulate(network)

@@ -95,6 +95,7 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
 
 
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
+BICYCLE = Shape.rectangle(1.9, 0.7)
 # Recorded cars are larger now and then.
 LARGE_CAR = Shape.rectangle(5.0, 1.9)
 TRIES = 40
@@ -116,10 +117,17 @@ def is_long(length: float) -> bool:
     return length > LONG
 
 
-def slot_descriptions(count: int, truck_share: float,
+def slot_descriptions(count: int, vehicle_type: str, truck_share: float,
                       generator: np.random.Generator) -> list[ObjectDescription]:
-    """Return descriptions of agents t0, t1, … of no recording: cars, and a share of trucks."""
+    """
+    Return descriptions of agents t0, t1, … of no recording.
+
+    :param vehicle_type: of the map: bicycle, or car; then a share are trucks.
+    """
     trucks = generator.random(count) < truck_share
+    if vehicle_type == 'bicycle':
+        return [ObjectDescription(f't{i}', vehicle_type, Role.TRAFFIC, BICYCLE)
+                for i in range(count)]
     return [ObjectDescription(f't{i}', 'truck' if truck else 'car', Role.TRAFFIC,
                               TRUCK if truck else CAR) for i, truck in enumerate(trucks)]
 

@@ -42,7 +42,15 @@ from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import leaving, Routes
-from crgame_ros.traffic.spawning import CAR, is_long, LARGE_CAR, slot_descriptions, Spawner, TRUCK
+from crgame_ros.traffic.spawning import (
+    BICYCLE,
+    CAR,
+    is_long,
+    LARGE_CAR,
+    slot_descriptions,
+    Spawner,
+    TRUCK,
+)
 from crgame_ros.traffic.stop_lines import StopLines
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.tight_lanes import find_tight_lanes
@@ -101,7 +109,8 @@ class Traffic:
         side, movements = driving_side(scenario), Movements(self._graph)
         self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
-        for_cars, for_trucks = find_tight_lanes(self._graph, CAR, LARGE_CAR, TRUCK)
+        sizes = (BICYCLE,) * 3 if network.vehicle_type == 'bicycle' else (CAR, LARGE_CAR, TRUCK)
+        for_cars, for_trucks = find_tight_lanes(self._graph, *sizes)
         self._routes = Routes(
             self._graph, np.where(self._conflicts.tapers() | for_cars, TAPER_COST, 0.0),
             for_trucks, side.keeps_left)
@@ -124,7 +133,8 @@ class Traffic:
             self._lines, adopted, spec.flow, self._desired, time_step_s, self._random)
         self.descriptions: tuple[ObjectDescription, ...] = (
             *(replace(x.description, role=Role.TRAFFIC) for x in adopted),
-            *slot_descriptions(self._capacity(), spec.truck_share, self._random))
+            *slot_descriptions(self._capacity(), network.vehicle_type, spec.truck_share,
+                               self._random))
         self._agents = Agents(self.descriptions)
         self._drivers = Drivers(spec, self._agents, self._followers, time_step_s, self._random)
         self._changes = LaneChanges(self._graph, self._routes, self._conflicts, self._followers,

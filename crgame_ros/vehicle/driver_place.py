@@ -15,6 +15,7 @@ _TRUCK_HEIGHTS = (3.2, 2.45, 2.2, 1.2)
 # Distance of the seat behind the front axle in a car, and behind the bumper in a cab [m].
 _SEAT_BEHIND_AXLE, _SEAT_BEHIND_BUMPER = 1.33, 1.4
 _MIRROR_AHEAD_OF_EYE, _MIRROR_OUTSIDE = 0.53, 0.12
+_OPEN = frozenset({'bicycle', 'motorcycle'})
 _INNER_MIRROR_AHEAD_OF_EYE, _INNER_MIRROR_BELOW_ROOF = 0.5, 0.16
 
 
@@ -28,7 +29,7 @@ class DriverPlace:
     :param eye: the midpoint of the driver's eyes.
     :param left_mirror: its middle.
     :param right_mirror: its middle.
-    :param inner_mirror: its middle.
+    :param inner_mirror: its middle; None on bicycles and motorcycles, which have no cabin.
     """
 
     height: float
@@ -36,7 +37,7 @@ class DriverPlace:
     eye: Point
     left_mirror: Point
     right_mirror: Point
-    inner_mirror: Point
+    inner_mirror: Point | None
 
 
 def driver_place(vehicle: VehicleParameters) -> DriverPlace:
@@ -55,4 +56,5 @@ def driver_place(vehicle: VehicleParameters) -> DriverPlace:
     return DriverPlace(
         height, bonnet_height, (eye_ahead, vehicle.eye_left, eye_height),
         (mirror_ahead, aside, mirror_height), (mirror_ahead, -aside, mirror_height),
-        (eye_ahead + _INNER_MIRROR_AHEAD_OF_EYE, 0.0, height - _INNER_MIRROR_BELOW_ROOF))
+        None if vehicle.type in _OPEN else (
+            eye_ahead + _INNER_MIRROR_AHEAD_OF_EYE, 0.0, height - _INNER_MIRROR_BELOW_ROOF))

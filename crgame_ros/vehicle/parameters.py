@@ -15,7 +15,9 @@ from crgame_ros.schema.marks import Named, Within
 from crgame_ros.schema.reading import read
 from crgame_ros.yaml_text import read_yaml
 
-DEFAULT_VEHICLE = 'bmw_320i'
+# The usual vehicle of a map, by the type of vehicle that its lanes are for.
+AUTO = 'auto'
+USUAL_VEHICLES = {'car': 'bmw_320i', 'bicycle': 'bicycle'}
 # No road vehicle has larger values; beyond them arithmetic overflows.
 LARGEST, SMALLEST = 1e9, 1e-6
 Positive = Annotated[float, Within(SMALLEST, LARGEST)]
@@ -63,6 +65,7 @@ class VehicleParameters:
     :param air_density: [kg/m^3]
     :param gravity: [m/s^2]
     :param longitudinal_lag: tau_long of CRG 25: drivetrain and brakes [s]
+    :param type: of CommonRoad; decides its look, and where it starts.
     :param powertrain: its sound in the cockpit; it does not affect the motion.
     :param height: of the roof; 0 for a usual one of its length [m]
     :param eye_ahead: the driver's eyes ahead of the rear axle; 0 for a usual place [m]
@@ -102,7 +105,8 @@ class VehicleParameters:
     air_density: Share
     gravity: Positive
     longitudinal_lag: Positive
-    powertrain: Literal['combustion', 'electric'] = 'combustion'
+    type: Literal['car', 'truck', 'bus', 'motorcycle', 'bicycle'] = 'car'  # noqa: A003
+    powertrain: Literal['combustion', 'electric', 'muscle'] = 'combustion'
     height: Place = 0.0
     eye_ahead: Place = 0.0
     eye_left: Annotated[float, Within(-10.0, 10.0)] = 0.36
@@ -129,13 +133,15 @@ class VehicleParameters:
 
 
 @functools.cache
-def load_vehicle_parameters(name: str = DEFAULT_VEHICLE) -> VehicleParameters:
+def load_vehicle_parameters(name: str = AUTO, map_type: str = 'car') -> VehicleParameters:
     """
     Read the parameters of a vehicle type.
 
-    :param name: a name in `config/vehicles/`, or the path of a YAML file.
+    :param name: a name in `config/vehicles/`, the path of a YAML file, or `auto`: the usual one.
+    :param map_type: `RoadNetwork.vehicle_type` of the map.
     :raises InputError: if the file is missing or a value is missing, unknown or no number.
     """
+    name = USUAL_VEHICLES[map_type] if name == AUTO else name
     path = config_directory() / 'vehicles' / f'{name}.yaml'
     if name.endswith('.yaml'):
         path = Path(name)

@@ -105,9 +105,9 @@ def _to_table(values: argparse.Namespace) -> None:
     loaded = load_scenario(values.source)
     network = RoadNetwork(loaded.scenario.lanelet_network)
     roads = WaypointRoads.from_lanelets(network)
-    kept = [lane for lane in roads.lane_ids if values.all or network.is_for_cars(lane)]
+    kept = [lane for lane in roads.lane_ids if values.all or network.is_drivable(lane)]
     if not kept:
-        raise InputError('no lanelet is for cars', str(values.source), 'add --all')
+        raise InputError('no lanelet is for cars or bicycles', str(values.source), 'add --all')
     if len(kept) < len(roads.lane_ids):
         _note(f'{_count(len(roads.lane_ids) - len(kept), "lanelet")} not for cars left out; '
               'add --all to write them')

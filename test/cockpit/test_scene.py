@@ -94,7 +94,7 @@ def test_vehicles_and_times_are_those_of_the_game() -> None:
     # BMW 320i, CommonRoad vehicle 2.
     assert document['vehicles'][0] == {
         'id': 'hv0', 'role': 'human', 'max_steering_angle': 0.91, 'perception': None,
-        'powertrain': 'combustion',
+        'type': 'car', 'powertrain': 'combustion',
         'rear_to_center': pytest.approx(1.4227, abs=5e-5),
         'wheelbase': pytest.approx(2.5789, abs=5e-5),
         'shape': {'kind': 'rectangle', 'length': 4.508, 'width': 1.61, 'vertices': []},

@@ -92,7 +92,7 @@ def test_every_key(tmp_path: Path) -> None:
 def test_defaults(tmp_path: Path) -> None:
     """A scenario is enough: one human, an AV of each planning problem, 100 Hz, no end."""
     game = load_game(write(tmp_path, 'scenario: road.xml\n'))
-    assert game.humans == (HumanSpec('hv0', 'auto', 'bmw_320i', None),)
+    assert game.humans == (HumanSpec('hv0', 'auto', 'auto', None),)
     assert game.avs is None
     assert game.sound == 'on'
     assert (game.timing.rate, game.duration, game.seed) == (100.0, math.inf, 0)

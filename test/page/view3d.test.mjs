@@ -332,9 +332,12 @@ test('bodies fit their types and sizes, and few triangles make them', () => {
     shape: { kind: 'polygon', length: 2, width: 1,
       vertices: [-1, -0.5, 1, -0.5, 1, 0.5, -1, 0.5] } });
   assert.equal(skip.build().length, 2);
-  const own = ofVehicle({ id: 'hv0', role: 'human', shape: rectangle(4.508, 1.61),
+  const own = ofVehicle({ id: 'hv0', type: 'car', role: 'human', shape: rectangle(4.508, 1.61),
     wheelbase: 2.579, rear_to_center: 1.423, driver_place: PLACE });
   const { wheels, length } = own.build();
   near((wheels.front - wheels.rear) * own.length / length, 2.579, 1e-6);
   near(-wheels.rear * own.length / length, 1.423, 1e-6);
+  const ridden = ofVehicle({ id: 'hv0', type: 'bicycle', role: 'human',
+    shape: rectangle(1.9, 0.7), wheelbase: 1.05, rear_to_center: 0.525, driver_place: PLACE });
+  assert.deepEqual([ridden.key, ridden.build().lamps], ['bicycle', null]);
 });

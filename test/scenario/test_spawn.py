@@ -78,7 +78,7 @@ def test_human_is_placed_free_on_the_road_in_its_lane(name: str, with_av: bool) 
         footprint = placed_polygon(CAR.shape, *human.center(CAR.rear_to_center), human.yaw)
         assert surface.covers(footprint)
         lane = road.lanelet_at(human.x, human.y, human.yaw)
-        assert lane is not None and road.is_for_cars(lane)
+        assert lane is not None and road.is_drivable(lane)
         s, d = road.locate(lane, human.x, human.y)
         assert abs(d) < 1e-6
         assert human.yaw == pytest.approx(road.pose_on(lane, s)[2], abs=1e-9)

@@ -22,7 +22,8 @@ import yaml
 GAMES = sorted(path for path in scenarios_directory().glob('*.yaml') if path.suffixes == ['.yaml'])
 FILES = {
     'game': GAMES,
-    'vehicle': [config_directory() / 'vehicles' / 'bmw_320i.yaml'],
+    'vehicle': [config_directory() / 'vehicles' / f'{name}.yaml'
+                for name in ('bmw_320i', 'bicycle')],
     'steering': [config_directory() / 'vehicles' / 'steering_ratio.yaml'],
     'device': sorted((config_directory() / 'devices').glob('*.yaml')),
     'timeline': sorted(path for ending in ('keys', 'joy')

@@ -87,8 +87,8 @@ def test_a_tiny_lanelet_that_folds_back_is_passed_over(length: float) -> None:
     assert successors([(100.0, 0.0), (100.0 + 0.1 * length, 0.0)]) == [2]
 
 
-def test_refuses_a_map_without_lanes_for_cars() -> None:
+def test_refuses_a_map_without_lanes_for_vehicles() -> None:
     from commonroad.common.common_lanelet import LaneletType
-    path = support.straight_lane(1, 0.0, 0.0, 50.0, lanelet_type={LaneletType.SIDEWALK})
-    with pytest.raises(InputError, match='no lanelet is for cars'):
+    path = support.straight_lane(1, 0.0, 0.0, 50.0, lanelet_type={LaneletType.PARKING})
+    with pytest.raises(InputError, match='no lanelet is for cars or bicycles'):
         LaneGraph(RoadNetwork(support.roads(path).lanelet_network))

@@ -250,7 +250,7 @@ def test_the_file(kind: str) -> None:
     assert loaded.time_step_s == 0.1
     assert loaded.benchmark_id == exported.benchmark_id == 'ZAM_town-1_1_T-1'
     network = RoadNetwork(loaded.scenario.lanelet_network)
-    assert all(network.is_for_cars(x) for x in network.lanelet_ids)
+    assert all(network.is_drivable(x) for x in network.lanelet_ids)
     assert {item.value for x in network.lanelet_network.lanelets
             for item in x.lanelet_type} == {kind}
     problem, = loaded.planning_problems

@@ -115,7 +115,7 @@ class LaneVisits:
         turn = self._turn(lanelet, pose)
         found = self._roads.lanelet_network.find_lanelet_by_id(lanelet)
         # A boundary of a single point bounds no area.
-        return (self._roads.is_for_cars(lanelet) and min(turn, math.pi - turn) <= _ALONG
+        return (self._roads.is_drivable(lanelet) and min(turn, math.pi - turn) <= _ALONG
                 and all(np.ptp(side, axis=0).max() > 1e-3
                         for side in (found.left_vertices, found.right_vertices)))
 

@@ -91,7 +91,7 @@ def _roads(network: LaneletNetwork) -> Iterator[Marker]:
         marker = style.blank(style.map_header(), 'road', number, Marker.TRIANGLE_LIST,
                              style.colour(code))
         chosen = [_surface(lanelet) for lanelet in network.lanelets
-                  if roads.is_for_cars(lanelet.lanelet_id) == for_cars]
+                  if roads.is_drivable(lanelet.lanelet_id) == for_cars]
         if chosen:
             marker.points = style.points(np.concatenate(chosen).tolist(), z)
         yield marker

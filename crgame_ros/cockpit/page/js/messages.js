@@ -68,7 +68,8 @@ export {};
  *
  * @typedef {[x: number, y: number, z: number]} Mount [m]
  * @typedef {{height: number, bonnet_height: number, eye: Mount, left_mirror: Mount,
- *   right_mirror: Mount, inner_mirror: Mount}} DriverPlace [m]
+ *   right_mirror: Mount, inner_mirror: Mount|null}} DriverPlace [m]; a vehicle without an inner
+ *   mirror has no cabin
  */
 
 /**
@@ -79,7 +80,8 @@ export {};
  * @property {number} rear_to_center [m]
  * @property {number} wheelbase [m]
  * @property {number} max_steering_angle [rad]
- * @property {'combustion'|'electric'} powertrain
+ * @property {string} type CommonRoad obstacle type
+ * @property {'combustion'|'electric'|'muscle'} powertrain
  * @property {DriverPlace} driver_place
  * @property {{localisation: boolean, sensors: string[], range: number|null}|null} perception
  *   range [m], null for no limit

@@ -6,7 +6,7 @@
  * The drive train between engine and road.
  *
  * @typedef {object} DriveTrain
- * @property {'car'|'heavy'|'electric'} name
+ * @property {'car'|'heavy'|'electric'|'muscle'} name
  * @property {number[]} ratios of the gears, in order
  * @property {number} reverse_ratio
  * @property {number} final_drive
@@ -46,6 +46,16 @@ export const HEAVY = Object.freeze({
 export const ELECTRIC = Object.freeze({
   name: 'electric', ratios: [1], reverse_ratio: 1, final_drive: 9.0, wheel_radius_m: 0.31,
   idle_rpm: 0, limit_rpm: 14000, order: 8,
+});
+
+/**
+ * A rider: what a bicycle sounds like is its tyres.
+ *
+ * @type {DriveTrain}
+ */
+export const MUSCLE = Object.freeze({
+  name: 'muscle', ratios: [1], reverse_ratio: 1, final_drive: 1, wheel_radius_m: 0.34,
+  idle_rpm: 0, limit_rpm: 420, order: 1,
 });
 
 // Where gears change, as shares of the way from idling to the limit: at a released pedal, and

@@ -28,11 +28,12 @@ const CREEP = 2;
  * @param {DriveTrain} train
  * @param {number} rpm of the engine
  * @param {number} load 0 to 1
- * @returns {number} amplitude of an engine in its vehicle; of a motor 0 at standstill
+ * @returns {number} amplitude of an engine in its vehicle; of a motor 0 at standstill, of a rider
+ *   always
  */
 export function engineLevel(train, rpm, load) {
   const share = speedShare(train, rpm);
-  return train.name === 'electric'
+  return train.name === 'muscle' ? 0 : train.name === 'electric'
     ? 0.09 * Math.min(rpm / 400, 1) * (0.3 + 0.7 * load) * (0.5 + 0.5 * share)
     : 0.07 + 0.16 * share + 0.12 * load * (0.35 + 0.65 * share);
 }

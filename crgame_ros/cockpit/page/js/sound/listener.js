@@ -3,7 +3,9 @@
 /** The sounds that the driver of one vehicle hears, own and near. No sound is made here. */
 
 import { OBJECT_WIDTH, VEHICLE, VEHICLE_WIDTH } from '../frames.js';
-import { CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, REVERSE } from './drive_train.js';
+import {
+  CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, MUSCLE, REVERSE,
+} from './drive_train.js';
 import { arrival, RANGE_M } from './hearing.js';
 
 /** @import { Scene, SceneObject, SceneVehicle } from '../messages.js' */
@@ -175,8 +177,9 @@ export class Listener {
  * @returns {DriveTrain}
  */
 function trainOf(vehicle) {
-  return vehicle.powertrain === 'electric' ? ELECTRIC
-    : vehicle.shape.length > LONG_M ? HEAVY : CAR;
+  return vehicle.powertrain === 'muscle' ? MUSCLE
+    : vehicle.powertrain === 'electric' ? ELECTRIC
+      : vehicle.shape.length > LONG_M ? HEAVY : CAR;
 }
 
 /**

@@ -50,10 +50,13 @@ export const MIRRORS = Object.freeze([
  *
  * @param {Mirror} mirror
  * @param {DriverPlace} place eyes and mirrors of the vehicle
- * @returns {MirrorCamera}
+ * @returns {MirrorCamera|null} null without this mirror
  */
 export function mirrorCamera(mirror, place) {
   const glass = place[mirror.mount];
+  if (glass === null) {
+    return null;
+  }
   const distance = Math.hypot(...glass.map((value, axis) => value - place.eye[axis]));
   const behind = 1 / (1 / distance + 2 / mirror.radius);
   const aside = Math.PI + mirror.aside;

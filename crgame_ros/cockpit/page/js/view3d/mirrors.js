@@ -80,6 +80,10 @@ export class Mirrors {
   fit(place, far) {
     for (const glass of this.#glasses) {
       glass.optics = mirrorCamera(glass.mirror, place);
+      glass.pane.visible = glass.frame.visible = glass.optics !== null;
+      if (glass.optics === null) {
+        continue;
+      }
       Object.assign(glass.camera, {
         fov: glass.optics.height * 180 / Math.PI, aspect: glass.optics.aspect,
         near: glass.optics.near, far });

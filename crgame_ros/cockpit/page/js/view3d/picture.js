@@ -257,7 +257,7 @@ export class Picture {
     }
     if (this.#cabin !== null) {
       const { mesh } = this.#cabin;
-      mesh.visible = inside;
+      mesh.visible = inside && vehicle.driver_place.inner_mirror !== null;
       mesh.position.set(stand.x - this.#origin.x, stand.y - this.#origin.y, stand.z);
       mesh.rotation.set(0, -stand.slope, stand.yaw, 'ZYX');
     }

@@ -106,7 +106,7 @@ export class Traffic {
       const vehicle = scene.vehicles[i];
       const object = scene.objects[i - scene.vehicles.length];
       return this.#thing(look, /** @type {Body} */ (bodies.get(look.key)),
-        vehicle?.id ?? object.id, vehicle ? colorOf(vehicle.role, 'car')
+        vehicle?.id ?? object.id, vehicle ? colorOf(vehicle.role, vehicle.type)
           : colorOf(object.role, object.type));
     });
     this.#vehicles = things.slice(0, scene.vehicles.length);

@@ -50,7 +50,7 @@ export class VehicleLayer {
   /** @param {Scene} scene the scene document */
   load(scene) {
     this.vehicles = scene.vehicles.map((vehicle) => ({
-      ...vehicle, look: vehicleLook('car', vehicle.shape, true),
+      ...vehicle, look: vehicleLook(vehicle.type, vehicle.shape, true),
       color: vehicle.role === 'human' ? 'human' : 'av',
     }));
     this.objects = scene.objects.map((object) => ({

@@ -35,12 +35,16 @@ const CIRCLE_CORNERS = 16;
 const CARS = new Set(['car', 'parkedVehicle', 'taxi', 'priorityVehicle', 'unknown']);
 
 /**
- * Choose the body of a driven vehicle: its wheels are where its model has them.
+ * Choose the body of a driven vehicle: the wheels of cars and trucks are where its model has them.
  *
  * @param {SceneVehicle} vehicle
  * @returns {Appearance}
  */
-export function ofVehicle({ id, shape, wheelbase, rear_to_center: rear, driver_place: place }) {
+export function ofVehicle(vehicle) {
+  const { id, type, shape, wheelbase, rear_to_center: rear, driver_place: place } = vehicle;
+  if (type !== 'car' && type !== 'truck') {
+    return ofObject({ id, type, role: 'traffic', shape });
+  }
   const { length, width } = shape;
   const [name, build] = motorVehicle(length);
   return {
