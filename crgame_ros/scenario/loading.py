@@ -21,6 +21,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.state import InitialState
+from commonroad.scenario.traffic_sign import SupportedTrafficSignCountry
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.roads.surface import lanelet_ring
 from crgame_ros.scenario import guard
@@ -36,6 +37,8 @@ import shapely
 
 # Lanes are sampled along their length: one of a million kilometres would fill the memory [m].
 _MAX_LANELET_LENGTH = 1e5
+# Whose signs commonroad-io knows; those of its own country ZAM are Germany's.
+_COUNTRIES = frozenset(country.value for country in SupportedTrafficSignCountry)
 # Size of the cache of loaded texts: batches of runs, and tables of a run, load them many times.
 _KEPT = 8
 # Repairing the surface of a lanelet with crossing bounds takes cubic time: 500 points took 4 s.
@@ -120,6 +123,9 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
         sign.virtual = sign.traffic_sign_id in virtual
     exact = tuple(_exact_problem(problem, notices) for problem in problems)
     notices += simplifications(scenario)
+    country = str(scenario.scenario_id.country_id)
+    if country not in _COUNTRIES and scenario.lanelet_network.traffic_signs:
+        notices.append(f"the signs of {country} are not known and count as Germany's")
     for lanelet in scenario.lanelet_network.lanelets:
         if not 1e-3 < lanelet.distance[-1] < _MAX_LANELET_LENGTH:
             raise InputError(f'the centre line is {lanelet.distance[-1]:g} m long',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacles of which a scenario says more than the simulation uses, for the user."""
+"""What a scenario says beyond what the simulation uses, for the user."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -9,11 +9,14 @@ from commonroad.common.util import Interval
 from commonroad.geometry.shape import Circle, Polygon, Rectangle, Shape, ShapeGroup
 from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
-from commonroad.scenario.scenario import Scenario
+from commonroad.scenario.scenario import Scenario, Underground, Weather
 from commonroad.scenario.state import State
 import numpy as np
 
 _LISTED = 6
+_FALLING = frozenset({Weather.LIGHT_RAIN, Weather.MID_RAIN, Weather.HEAVY_RAIN, Weather.SNOW,
+                      Weather.HAIL})
+_SLIPPERY = frozenset({Underground.WET, Underground.SNOW, Underground.ICE})
 # Occupancies whose extents differ by less have one shape [m].
 _SAME = 1e-3
 
@@ -25,13 +28,24 @@ def uncertain_values(state: State) -> list[str]:
 
 
 def simplifications(scenario: Scenario) -> list[str]:
-    """Return a notice for each way in which obstacles count as less than the file says."""
+    """Return a notice for each way in which a scenario counts as less than the file says."""
     found: defaultdict[str, list[int]] = defaultdict(list)
     for obstacle in scenario.obstacles:
         for text in _of(obstacle):
             found[text].append(int(obstacle.obstacle_id))
-    return [f'obstacle{"s" * (len(ids) > 1)} {_listed(sorted(ids))}: {text}'
-            for text, ids in found.items()]
+    return [*_of_environment(scenario),
+            *(f'obstacle{"s" * (len(ids) > 1)} {_listed(sorted(ids))}: {text}'
+              for text, ids in found.items())]
+
+
+def _of_environment(scenario: Scenario) -> Iterator[str]:
+    environment = None if scenario.location is None else scenario.location.environment
+    if environment is None:
+        return
+    if environment.weather in _FALLING:
+        yield f'the weather {environment.weather.value} is not shown and does not change friction'
+    if environment.underground in _SLIPPERY:
+        yield f'the underground {environment.underground.value} does not change friction'
 
 
 def _of(obstacle: Obstacle) -> Iterator[str]:
@@ -42,7 +56,11 @@ def _of(obstacle: Obstacle) -> Iterator[str]:
     uncertain = sorted({name for state in states for name in uncertain_values(state)})
     if uncertain:
         yield f'the uncertain {", ".join(uncertain)} is reduced to its centre'
+    if isinstance(obstacle, PhantomObstacle):
+        yield 'it might be hidden there, and counts as if it were'
     if isinstance(prediction, SetBasedPrediction):
+        if any(isinstance(each.time_step, Interval) for each in prediction.occupancy_set):
+            yield 'the times of its occupancies are intervals: each counts at its middle alone'
         sizes = [_size(occupancy.shape) for occupancy in prediction.occupancy_set]
         if isinstance(obstacle, DynamicObstacle):
             sizes.insert(0, _size(obstacle.obstacle_shape))

@@ -216,6 +216,9 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     notices += [f'{loaded.source}: {av.id} starts at {av.state.speed:.1f} m/s, above the '
                 f'{av.vehicle.max_speed:g} m/s of {av.vehicle.name}: its plans are refused until '
                 'it is slower' for av in avs if av.state.speed > av.vehicle.max_speed]
+    notices += [f'{loaded.source}: {av.id} starts at time step {k0}, before the {step} of its '
+                'planning problem' for av in avs
+                if (step := av.planning_problem.initial_state.time_step) > k0]
     if network.vehicle_type == 'bicycle':
         notices.append(f'{loaded.source}: no lane is for cars: those for bicycles or people '
                        'count, and vehicles are bicycles unless the game names others')

@@ -145,10 +145,10 @@ def occupancies(*radii: int) -> str:
         '</occupancy>' for step, radius in enumerate(radii, 1)) + '</occupancySet>'
 
 
-def environment(time_of_day: str, weather: str) -> str:
+def environment(time_of_day: str, weather: str, underground: str = 'clean') -> str:
     """Write a location with an environment."""
     return location('48', f'<environment><time>12:00:00</time><timeOfDay>{time_of_day}</timeOfDay>'
-                    f'<weather>{weather}</weather><underground>wet</underground></environment>')
+                    f'<weather>{weather}</weather><underground>{underground}</underground></environment>')
 
 
 def location(latitude: str, rest: str = '') -> str:
@@ -195,6 +195,16 @@ NOTES = {
     "the timeOfDay 'tea' is not known and is ignored": scenario(head=environment('tea', 'fog')),
     "the weather 'frogs' is not known and is ignored":
         scenario(head=environment('day', 'frogs')),
+    "the signs of … are not known and count as Germany's": scenario(
+        SIGN.format(206, ''), '<trafficSignRef ref="5"/>').replace('ZAM_', 'POL_'),
+    'the weather … is not shown and does not change friction':
+        scenario(head=environment('day', 'heavy_rain')),
+    'the underground … does not change friction':
+        scenario(head=environment('day', 'cloudy', 'ice')),
+    'the times of its occupancies are intervals: each counts at its middle alone':
+        scenario(dynamic(occupancies(1).replace(EXACT.format(1), SPREAD))),
+    'it might be hidden there, and counts as if it were':
+        scenario(f'<phantomObstacle id="7">{occupancies(1, 1)}</phantomObstacle>'),
     'the times of … states are intervals and count as their middle': scenario(drive(time=SPREAD)),
     'its stop line has one point and counts as at the end of the lanelet':
         scenario(inside=f'<stopLine>{POINT}<lineMarking>solid</lineMarking></stopLine>'),
