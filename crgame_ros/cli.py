@@ -5,6 +5,7 @@
 import argparse
 from collections.abc import Callable, Sequence
 from functools import partial
+import gc
 import importlib
 import json
 import os
@@ -89,6 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         values = _build_parser(words[0] if words else '').parse_args(words)
         command: Callable[[argparse.Namespace], int] = values.command
         code = command(values)
+        # Objects of the drivability checker that are left at the end make it print what leaked.
+        gc.collect()
         sys.stdout.flush()
         return code
     except BrokenPipeError:
