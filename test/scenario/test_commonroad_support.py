@@ -148,7 +148,8 @@ def occupancies(*radii: int) -> str:
 def environment(time_of_day: str, weather: str, underground: str = 'clean') -> str:
     """Write a location with an environment."""
     return location('48', f'<environment><time>12:00:00</time><timeOfDay>{time_of_day}</timeOfDay>'
-                    f'<weather>{weather}</weather><underground>{underground}</underground></environment>')
+                    f'<weather>{weather}</weather><underground>{underground}</underground>'
+                    '</environment>')
 
 
 def location(latitude: str, rest: str = '') -> str:
