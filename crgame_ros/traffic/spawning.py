@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 import math
 
+from crgame_ros.game.object_spec import MOVER_TYPES
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.traffic.adoption import Adopted, fits
@@ -95,7 +96,7 @@ def is_free(pose: FloatArray, speed: float, length: float, width: float, agents:
 
 
 CAR, TRUCK = Shape.rectangle(4.5, 1.8), Shape.rectangle(8.0, 2.4)
-BICYCLE = Shape.rectangle(1.9, 0.7)
+BICYCLE = MOVER_TYPES['bicycle'].shape
 # Recorded cars are larger now and then.
 LARGE_CAR = Shape.rectangle(5.0, 1.9)
 TRIES = 40
