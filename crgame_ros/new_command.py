@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.errors import InputError
 
 if TYPE_CHECKING:
-    from commonroad.planning.planning_problem import PlanningProblem
-    from crgame_ros.game.game import Game, HumanSpec, PoseSpawn
+    from crgame_ros.game.game import Game, PoseSpawn
     from crgame_ros.vehicle.state import VehicleState
 
 DESCRIPTION = """\
@@ -70,25 +69,24 @@ def _new(values: argparse.Namespace) -> int:
 def _game(values: argparse.Namespace) -> 'Game':
     """Return the game, with humans placed only where planning problems place them."""
     from crgame_ros.game.game import AvSpec, DEFAULT_PLANNER, Game, HumanSpec
+    from crgame_ros.roads.network import RoadNetwork
     from crgame_ros.scenario.loading import load_scenario
+    from crgame_ros.scenario.spawn import problem_pose
+    from crgame_ros.vehicle.parameters import load_vehicle_parameters
     loaded = load_scenario(values.scenario)
+    map_type = RoadNetwork(loaded.scenario.lanelet_network).vehicle_type
     problems = sorted(loaded.planning_problems, key=lambda item: item.planning_problem_id)
     taken = problems[:values.humans] if values.at == 'problems' else []
     planner = values.planner or DEFAULT_PLANNER
     avs = tuple(AvSpec(f'av{index}', planner, planning_problem=problem.planning_problem_id)
                 for index, problem in enumerate(problems[len(taken):]))
     humans = tuple(HumanSpec(f'hv{index}', values.driver) for index in range(values.humans))
-    humans = tuple(replace(human, spawn=_problem_pose(human, problem))
-                   for human, problem in zip(humans, taken, strict=False)) + humans[len(taken):]
+    placed = tuple(replace(human, spawn=_pose(problem_pose(
+        problem, load_vehicle_parameters(human.vehicle, map_type).rear_to_center)))
+        for human, problem in zip(humans, taken, strict=False))
+    humans = placed + humans[len(taken):]
     more = {} if values.duration is None else {'duration': values.duration}
     return Game(values.scenario.resolve(), values.title, humans, avs, **more)
-
-
-def _problem_pose(human: 'HumanSpec', problem: 'PlanningProblem') -> 'PoseSpawn':
-    from crgame_ros.scenario.spawn import problem_pose
-    from crgame_ros.vehicle.parameters import load_vehicle_parameters
-    vehicle = load_vehicle_parameters(human.vehicle)
-    return _pose(problem_pose(problem, vehicle.rear_to_center))
 
 
 def _pose(state: 'VehicleState') -> 'PoseSpawn':

@@ -5,6 +5,7 @@
 import math
 from pathlib import Path
 
+from crgame_ros.cli import main
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import HumanSpec
 from crgame_ros.game.objects import ObjectStates
@@ -105,6 +106,17 @@ def test_a_game_on_a_cycle_path(tmp_path: Path) -> None:
     travelled = [item.prediction.trajectory.state_list[-1].position[0]
                  - item.initial_state.position[0] for item in ridden]
     assert max(travelled) > 40.0
+
+
+def test_a_new_game_puts_the_bicycle_itself_where_the_problem_begins(tmp_path: Path) -> None:
+    """The problem's position is the centre of whatever starts there; a car's is 0.9 m further."""
+    path, game = tmp_path / 'path.xml', tmp_path / 'path.yaml'
+    path.write_text(scenario(lane(1, 0, 'bicycleLane')), encoding='utf-8')
+    assert main(['new', str(path), '--at', 'problems', '--driver', 'idle', '--out',
+                 str(game)]) == 0
+    human, = build_setup(load_game(game)).humans
+    assert human.vehicle.type == 'bicycle'
+    assert human.state.center(human.vehicle.rear_to_center) == pytest.approx((60.0, 0.0), abs=0.01)
 
 
 def test_a_start_above_the_top_speed_is_told(tmp_path: Path) -> None:
