@@ -4,7 +4,7 @@
 """
 Run the commands of README.md and docs/ as a reader would: in order, in a clean shell.
 
-    python3 scripts/try_documents.py [--without PATTERN] [FILE.md …]
+    python3 scripts/try_documents.py [--without PATTERN] [FILE.md …] [--then COMMAND …]
 
 A command that runs until it is ended (a game, a page) gets Ctrl-C once it is up, and has to end
 well. Every command must exit with 0, without a traceback or an error; those that need what this
@@ -13,6 +13,7 @@ machine lacks (ros2, rviz2, a wheel) are named as not run.
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
@@ -62,6 +63,7 @@ class Shell:
     places: dict[str, str]
     preamble: list[str] = field(default_factory=list)
     companions: list[tuple[str, subprocess.Popen[bytes]]] = field(default_factory=list)
+    running: list[subprocess.Popen[bytes]] = field(default_factory=list)
     failures: int = 0
 
     def run(self, command: str) -> None:
@@ -98,10 +100,12 @@ class Shell:
     def _started(self, script: str, number: int) -> subprocess.Popen[bytes]:
         environment = {key: value for key, value in os.environ.items() if KEPT.match(key)}
         with self._log(number).open('wb') as output:
-            return subprocess.Popen(
+            process = subprocess.Popen(
                 ['bash', '--noprofile', '--norc', '-c', script], cwd=ROOT, env=environment,
                 stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                 start_new_session=True)
+        self.running.append(process)
+        return process
 
     def _interrupt_when_up(self, process: subprocess.Popen[bytes]) -> None:
         until_s = time.monotonic() + MADE_S
@@ -125,6 +129,7 @@ class Shell:
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             code = process.wait()
+        self.running.remove(process)
         output = self._log(number).read_text(errors='replace')
         # There is no person to press Drive.
         awaited = code == 1 and '--driver cockpit' in command and NOBODY_DROVE in output
@@ -135,6 +140,16 @@ class Shell:
             self.failures += 1
             print(f'    exit code {code}:\n' + '\n'.join(
                 f'    {line}' for line in output.splitlines()[-30:]), flush=True)
+
+    def close(self) -> None:
+        """End what still runs because the trial itself was ended: a run ends its nodes."""
+        for process in self.running:
+            os.killpg(process.pid, signal.SIGINT)
+        for process in self.running:
+            try:
+                process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
 
     def _remember_run(self) -> None:
         """Make `runs/NAME` stand for the last run that has a scenario."""
@@ -183,11 +198,16 @@ def main(arguments: Sequence[str]) -> int:
         ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))],
         help='default: README.md and docs/')
     parser.add_argument('--without', metavar='PATTERN', help='leave out commands that match')
+    parser.add_argument('--then', nargs=argparse.REMAINDER, metavar='COMMAND', default=[],
+                        help='become this command if every command works')
     values = parser.parse_args(arguments)
     if values.without:
         NOT_RUN[values.without] = lambda: 'left out'
-    with tempfile.TemporaryDirectory() as name:
-        shell = Shell(Path(name), _places(Path(name)))
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(ending) != signal.SIG_IGN:  # as under nohup
+            signal.signal(ending, lambda number, _: sys.exit(128 + number))
+    with tempfile.TemporaryDirectory() as name, \
+            closing(Shell(Path(name), _places(Path(name)))) as shell:
         for document in values.documents:
             for block in blocks(document.read_text(), 'bash'):
                 print(document.name, flush=True)
@@ -195,6 +215,9 @@ def main(arguments: Sequence[str]) -> int:
                 for command in commands(block):
                     shell.run(command)
     print(f'{shell.failures} commands failed' if shell.failures else 'every command works')
+    if values.then and not shell.failures:
+        sys.stdout.flush()
+        os.execvp(values.then[0], values.then)
     return 1 if shell.failures else 0
 
 
