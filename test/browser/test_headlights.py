@@ -73,12 +73,11 @@ def pictures(cockpit: Served, module_browser: Browser) -> dict[str, Any]:
     seen = {}
     for name, light, visibility in (('day', 'day', 30000.0), ('dusk', 'dusk', 30000.0),
                                     ('fog', 'day', 120.0)):
-        # The scene before may have the same light.
-        page.run('crgame.store.scene.is_old = true')
+        # A key that the page does not know tells it from the scene before, which may be the same.
         cockpit.publish('scene', cockpit.backend.run.scene | {
-            'environment': {'light': light, 'visibility': visibility}})
+            'picture': name, 'environment': {'light': light, 'visibility': visibility}})
         cockpit.call(cockpit.backend.send_now)
-        page.wait('!crgame.store.scene.is_old && crgame.store.latest')
+        page.wait(f"crgame.store.scene.picture === '{name}' && crgame.store.latest")
         seen[name] = page.run_async(PICTURE, [NEAR, FAR])
     return seen
 
