@@ -119,7 +119,7 @@ def _detect(angles: FloatArray, radius: float) -> tuple[float, float]:
     return float(np.mean(flows)), float(1.0 / np.mean(1.0 / speed))
 
 
-def equilibrium_density(model: str, speed: FloatArray, limit: float, time_gap: float = 1.5,
+def equilibrium_density(model: str, speed: FloatArray, limit: float, time_gap: float = 1.3,
                         standstill_gap: float = 2.0) -> FloatArray:
     """
     Return the density at which vehicles follow each other steadily, in closed form.

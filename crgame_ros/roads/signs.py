@@ -43,8 +43,12 @@ def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
     if STOP not in sign_names(lanelet, roads):
         return False
     following = [roads.find_lanelet_by_id(number) for number in lanelet.successor]
+    common = lanelet.traffic_signs & set[int]().union(
+        *(after.traffic_signs for after in following if after is not None))
+    signs = filter(None, map(roads.find_traffic_sign_by_id, common))
     return lanelet.stop_line is not None or not any(
-        after.traffic_signs & lanelet.traffic_signs for after in following if after is not None)
+        element.traffic_sign_element_id.name == STOP
+        for sign in signs for element in sign.traffic_sign_elements)
 
 
 def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:

@@ -38,6 +38,8 @@ JOINING = 1.2
 # Lanes that merge count as one from where their centres are this near; the merge before that is at
 # least as long as a car [m].
 JOINED, SHORTEST_MERGE = 0.8, 5.0
+# Lanes that merge do so without a turn if the cosine between their beginnings is greater.
+SAME_WAY = 0.9
 _YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
 _PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
 
@@ -55,6 +57,7 @@ class ConflictTable(NamedTuple):
         come, first served; 2 and -2: the same at the entry of a roundabout, even while the vehicle
         with the right of way stands.
     :param merges: (C) whether the lanes join for good.
+    :param tapers: (C) whether they do so without a turn: their vehicles alternate.
     :param entry, leave: (2, L) arc length at which the first conflict of a lane begins, and at
         which a vehicle is clear of the last one, for narrow and for wide vehicles; inf and 0
         without one [m]
@@ -70,20 +73,28 @@ class ConflictTable(NamedTuple):
     margin: FloatArray
     priority: IntArray
     merges: NDArray[np.bool_]
+    tapers: NDArray[np.bool_]
     entry: FloatArray
     leave: FloatArray
 
 
 @compiled
-def spare_room(width: float) -> float:
-    """
-    Return how far a front may stand in a conflict so that a vehicle passes it there [m].
+def extent(width: float, other_width: float) -> int:
+    """Return the extent of a conflict that counts for two vehicles: 0 if both are cars, or 1."""
+    return 1 if max(width, other_width) > NARROW else 0
 
-    A conflict begins where the widest vehicle on the other lane has its whole margin.
+
+@compiled
+def spare_room(width: float, other_width: float) -> float:
+    """
+    Return how far a front may stand in a conflict so that another vehicle passes it there [m].
+
+    Half the greatest width remains between them.
 
     :param width: of the vehicle that passes [m]
     """
-    return CROSSING_MARGIN + 0.5 * (WIDEST - width)
+    reach = WIDEST + CROSSING_MARGIN if extent(width, other_width) == 1 else WIDTH
+    return reach - 0.5 * (width + WIDEST)
 
 
 @compiled
@@ -136,6 +147,9 @@ class Conflicts:
         # The lanes join for good: their vehicles continue one behind the other.
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
+        begins = graph.yaw[graph.first[self.lane]]
+        self._tapers: NDArray[np.bool_] = self.merges & (
+            np.cos(begins - begins[self.other]) > SAME_WAY)
         # A vehicle that has got this far is clear of the conflict.
         clear = end.copy()
         joined = np.array([r[2].joined for r in rows], dtype=np.float64)[self.merges]
@@ -150,17 +164,15 @@ class Conflicts:
             np.maximum.at(leave[wide], self.lane[counts], clear[1][counts])
         self.table = ConflictTable(
             self.first, self.count, self.lane, self.other, start, end, distance, margin,
-            self.priority, self.merges, entry, leave)
+            self.priority, self.merges, self._tapers, entry, leave)
 
     def __len__(self) -> int:
         return len(self.lane)
 
     def tapers(self) -> NDArray[np.bool_]:
         """Return which lanes (L) end in a merge without a turn in which they have to yield."""
-        graph = self._graph
-        start = graph.yaw[graph.first[self.lane]] - graph.yaw[graph.first[self.lane[self.other]]]
-        result = np.zeros(len(graph), dtype=bool)
-        result[self.lane[self.merges & (self.priority < 0) & (np.cos(start) > 0.9)]] = True
+        result = np.zeros(len(self._graph), dtype=bool)
+        result[self.lane[self._tapers & (self.priority < 0)]] = True
         return result
 
 

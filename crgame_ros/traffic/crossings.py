@@ -7,8 +7,15 @@ import math
 from crgame_ros.traffic.agents import Agents, AgentTable, FREE, NONE
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.conflicts import Conflicts, ConflictTable
-from crgame_ros.traffic.exit_room import is_full, promise, Promises
-from crgame_ros.traffic.junctions import Arrivals, Passages
+from crgame_ros.traffic.exit_room import is_full, promise, Promises, QUEUE_GAP
+from crgame_ros.traffic.junctions import (
+    Arrivals,
+    BEFORE,
+    ENTERED,
+    Passages,
+    STARTED,
+    waits_inside,
+)
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.meetings import (
@@ -26,8 +33,6 @@ import numpy as np
 AT_LINE = 3.0
 # An agent that can halt with this braking lets another go that has waited very long [m/s^2].
 MERCY = 1.5
-# An agent whose front is farther than this behind its waiting place is inside the junction [m].
-STARTED = -1.0
 # A grant ends this far behind its junction [m].
 PASSED = 1.0
 
@@ -42,6 +47,9 @@ class Crossings:
     junction. Agents are let in one after the other. Among agents that were let in, the one let in
     first goes first, unless it waits for the other itself. `waiting` finds agents that wait for
     each other in a circle.
+
+    Where lights hold the cross traffic, an agent that yields to oncoming vehicles waits for them
+    in the middle, so that it leaves the junction when the light changes at the latest.
 
     :param conflicts: of the lanes.
     :param rules: of passing.
@@ -79,7 +87,9 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     promised = Promises(np.zeros(len(conflicts.first)), np.zeros(len(conflicts.first)))
     for i, slot in enumerate(slots):
         if agents.grant[slot] >= 0:
-            promise(promised, agents, slot, way, passage, i)
+            promise(promised, agents, slot, way, passage.granted[i], i)
+        elif waits_inside(passage, i):
+            promise(promised, agents, slot, way, passage.last[i], i)
     stopped, full = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     halt = np.full(count, math.inf)
     for i, slot in enumerate(slots):
@@ -103,16 +113,18 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
             continue
         # Agents let in before it take room as well.
         full[i] = full[i] or is_full(rules, promised, agents, slot, way, passage, at, i)
-        if passage.hold[i] < STARTED and not stopped[i] or _may_enter(
+        if passage.inside[i] < STARTED and not stopped[i] or _may_enter(
                 rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
+            if not waits_inside(passage, i):
+                promise(promised, agents, slot, way, passage.last[i], i)
             _grant(k, agents, slot, way, passage, i)
-            promise(promised, agents, slot, way, passage, i)
     for i, slot in enumerate(slots):
         if agents.grant[slot] >= 0:
             halt[i] = min(halt[i], _inside_halt(k, agents, passage, meeting, at, i))
         if passage.first[i] >= 0 and _is_near(agents.speed[slot], passage.hold[i]) and (
                 stopped[i] or full[i] or _heeds(agents, slot)):
-            halt[i] = min(halt[i], passage.hold[i])
+            halt[i] = min(halt[i], _waiting_place(ticks, k, agents, passage, meeting, at,
+                                                  stopped[i] or full[i], i))
     return halt, full & ~stopped & (passage.first >= 0) & (passage.hold < AT_LINE)
 
 
@@ -232,6 +244,27 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
 
 
 @compiled
+def _waiting_place(ticks: IntArray, k: int, agents: AgentTable, passage: Passages,
+                   meeting: Meetings, at: Situation, stays: bool, i: int) -> float:
+    """
+    Return the distance at which an agent that is not let in halts: before or in a junction [m].
+
+    :param stays: whether a light, a queue or a full junction keeps it from entering.
+    """
+    hold, place = passage.hold[i], passage.inside[i]
+    enters = hold >= STARTED
+    if place <= hold or (enters and stays):
+        return float(hold)
+    for n in range(meeting.begin[i], meeting.begin[i + 1]):
+        if meeting.step[n] > passage.granted[i] and meeting.into[n] - BEFORE < place and _yields(
+                ticks, k, agents, passage, meeting, at, i, n):
+            place = meeting.into[n] - BEFORE
+    if enters and min(place, at.queued[i] - QUEUE_GAP) < hold + ENTERED:
+        return float(hold)
+    return float(place)
+
+
+@compiled
 def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, at: Situation,
                i: int, n: int) -> bool:
     """Return whether an agent lets another go first that has waited very long."""
@@ -262,7 +295,7 @@ def _yields(ticks: IntArray, k: int, agents: AgentTable, passage: Passages, meet
     # Of two standing agents the one that has stood longer goes first.
     longer = waits > theirs or (waits == theirs and i < other)
     patient = meeting.priority[n] > -2 and waits > ticks[0] and theirs > 0 and longer
-    patient |= meeting.courteous[n] and waits > (ticks[1] if meeting.joins[n] else ticks[3])
+    patient |= meeting.courteous[n] and waits > (ticks[1] if meeting.tapers[n] else ticks[3])
     return bool(meeting.priority[n] < 0 and not patient)
 
 

@@ -63,10 +63,9 @@ class Promises(NamedTuple):
 
 
 @compiled
-def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, passage: Passages,
+def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, step: int,
             i: int) -> None:
-    """Reserve room behind its junction for an agent that was let in."""
-    step = passage.granted[i]
+    """Reserve room for an agent behind the junction that ends at a step of its way."""
     if 0 <= step < way.depth[i] - 1:
         room = agents.length[slot] + QUEUE_GAP
         promised.behind[way.lane[i, step + 1]] += room

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.conflicts import ConflictTable, NARROW
+from crgame_ros.traffic.conflicts import ConflictTable, extent, NARROW
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
-from crgame_ros.traffic.lane_table import LaneTable
+from crgame_ros.traffic.lane_table import LaneTable, time_at
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.traffic.placement import Entries
+from crgame_ros.traffic.stop_lines import HELD, NO_LIGHT, OPENED
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +20,13 @@ from numpy.typing import NDArray
 WAITING_ROOM = 15.0
 # In a junction longer than an agent sees it waits with more room than this beyond its length [m].
 BETWEEN = 3.0
+# An agent whose front is farther than this behind its waiting place is inside the junction [m].
+STARTED = -1.0
+# An agent enters a junction to wait there if its front gets at least as far as this beyond its
+# waiting place, and halts some way before the conflict [m]; it does not brake harder than this to
+# stop at the waiting place instead [m/s^2].
+ENTERED, BEFORE = 3.0, 0.3
+FIRM = 3.0
 # How far ahead others are predicted, at their present speed [s], plus this distance [m].
 OTHERS_TIME = 8.0
 OTHERS_REACH = 15.0
@@ -32,21 +40,27 @@ class Arrivals(NamedTuple):
     :param begin: (C + 1) rows at which those of each conflict begin.
     :param owner: (R) row of the agent, or -1 - n for the n-th of the others.
     :param conflict: (R) row of `Conflicts`.
-    :param into: (R) distance of its front from the conflict [m], negative inside.
-    :param out: (R) distance of its rear from the conflict's end [m]
+    :param offset: (R) distance of its centre from the start of the conflict's lane [m]
+    :param half: (R) of its length [m]
     :param speed: (R) [m/s]
     :param width: (R) [m]
     :param step: (R) of the agent's way; 0 for others.
+    :param soonest: (R) time until its front is in the conflict, as fast as limits and bends allow;
+        0 for others [s]
+    :param pace: (R) mean speed that they allow until its rear is out of the conflict; inf for
+        others [m/s]
     """
 
     begin: IntArray
     owner: IntArray
     conflict: IntArray
-    into: FloatArray
-    out: FloatArray
+    offset: FloatArray
+    half: FloatArray
     speed: FloatArray
     width: FloatArray
     step: IntArray
+    soonest: FloatArray
+    pace: FloatArray
 
 
 class Passages(NamedTuple):
@@ -58,6 +72,8 @@ class Passages(NamedTuple):
     :param first: (A) step of the way at which the next junction begins, -1 without one.
     :param last: (A) step at which it ends.
     :param hold: (A) distance of the agent's front from where it waits [m]
+    :param inside: (A) the same where it waits in the middle for oncoming vehicles; `hold` where
+        there is no such place [m]
     :param end: (A) distance of its centre from the end of the last conflict [m]
     """
 
@@ -66,21 +82,24 @@ class Passages(NamedTuple):
     first: IntArray
     last: IntArray
     hold: FloatArray
+    inside: FloatArray
     end: FloatArray
 
 
 @compiled
-def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: AgentTable,
-             slots: IntArray) -> Passages:
+def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way: Ways,
+             agents: AgentTable, slots: IntArray) -> Passages:
     """
     Find the next junction of each agent: lanes with conflicts and no room to wait in between.
 
     :param lines: (L) arc length of each lane's stop line [m], infinite without one.
+    :param lights: (L) `StopLines.inside`
     """
     count = len(slots)
     result = Passages(
         np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64),
-        np.full(count, -1, np.int64), np.full(count, math.inf), np.full(count, -math.inf))
+        np.full(count, -1, np.int64), np.full(count, math.inf), np.full(count, math.inf),
+        np.full(count, -math.inf))
     for i, slot in enumerate(slots):
         wide = 1 if agents.width[slot] > NARROW else 0
         entry, leave = conflicts.entry[wide], conflicts.leave[wide]
@@ -114,7 +133,41 @@ def passages(conflicts: ConflictTable, lines: FloatArray, way: Ways, agents: Age
             # The junction may go on beyond the horizon: the agent plans to wait where there is
             # most room.
             result.last[i], result.end[i] = last, end
+        if result.first[i] >= 0:
+            result.inside[i] = _place_inside(conflicts, lights, way, agents, slot, result, i)
     return result
+
+
+@compiled
+def _place_inside(conflicts: ConflictTable, lights: IntArray, way: Ways, agents: AgentTable,
+                  slot: int, passage: Passages, i: int) -> float:
+    """Return `Passages.inside`: before the first conflict with a lane not held at red."""
+    hold, speed = passage.hold[i], agents.speed[slot]
+    own = NO_LIGHT
+    for step in range(passage.first[i], passage.last[i] + 1):
+        if own == NO_LIGHT:
+            own = lights[way.lane[i, step]]
+    # An agent that could only stop hard goes on to the place inside, although the light changes.
+    comes = own == OPENED or hold < speed**2 / (2.0 * FIRM)
+    if own == NO_LIGHT or not (hold < STARTED or comes):
+        return float(hold)
+    half, place, yields = 0.5 * agents.length[slot], math.inf, False
+    wide = extent(agents.width[slot], 0.0)
+    for step in range(passage.first[i], passage.last[i] + 1):
+        lane = way.lane[i, step]
+        for row in range(conflicts.first[lane], conflicts.first[lane] + conflicts.rows[lane]):
+            if lights[conflicts.lane[conflicts.other[row]]] == HELD or (
+                    way.offset[i, step] + conflicts.end[1, row] + half < 0.0):
+                continue
+            place = min(place, way.offset[i, step] + conflicts.start[wide, row] - half - BEFORE)
+            yields |= conflicts.priority[row] < 0
+    return float(place if yields and (hold < STARTED or place > hold + ENTERED) else hold)
+
+
+@compiled
+def waits_inside(passage: Passages, i: int) -> bool:
+    """Return whether an agent is in a junction and waits there without having been let in."""
+    return bool(passage.first[i] >= 0 and passage.hold[i] < STARTED < passage.inside[i])
 
 
 @compiled
@@ -153,20 +206,28 @@ def arrivals(lanes: LaneTable, conflicts: ConflictTable, way: Ways, agents: Agen
     found = _empty(0, room + 64)
     used = 0
     for i, slot in enumerate(slots):
-        half = 0.5 * agents.length[slot]
+        half, factor = 0.5 * agents.length[slot], max(agents.factor[slot], 1.0)
+        # Of the start of the lane, from the agent's centre [s].
+        begins = -time_at(lanes, way.lane[i, 0], -way.offset[i, 0])
         for step in range(-1, way.depth[i]):
             if step < 0:
                 lane = agents.previous[slot]
                 offset = way.offset[i, 0] - lanes.length[lane] if lane >= 0 else 0.0
+                lane_begins = begins - time_at(lanes, max(lane, 0), lanes.length[lane])
             else:
                 lane, offset = way.lane[i, step], way.offset[i, step]
+                lane_begins = begins
+                begins += time_at(lanes, lane, lanes.length[lane])
             if lane >= 0:
                 for row in range(conflicts.first[lane], conflicts.first[lane]
                                  + conflicts.rows[lane]):
                     if offset + conflicts.end[1, row] + half > 0.0:
-                        _note(found, used, i, row, offset + conflicts.start[1, row] - half,
-                              offset + conflicts.end[1, row] + half, agents.speed[slot],
-                              agents.width[slot], step)
+                        soonest = lane_begins + time_at(
+                            lanes, lane, max(conflicts.start[1, row] - half, 0.0))
+                        leaves = lane_begins + time_at(lanes, lane, conflicts.end[1, row] + half)
+                        pace = (offset + conflicts.end[1, row] + half) / max(leaves, 1e-3)
+                        _note(found, used, i, row, offset, half, agents.speed[slot],
+                              agents.width[slot], step, soonest / factor, pace * factor)
                         used += 1
     for n in range(len(entries.owner)):
         other = -1 - entries.owner[n]
@@ -190,14 +251,15 @@ def _room(conflicts: ConflictTable, way: Ways, agents: AgentTable, slots: IntArr
 def _empty(conflicts: int, room: int) -> Arrivals:
     return Arrivals(np.zeros(conflicts + 1, np.int64), np.empty(room, np.int64),
                     np.empty(room, np.int64), np.empty(room), np.empty(room), np.empty(room),
-                    np.empty(room), np.empty(room, np.int64))
+                    np.empty(room), np.empty(room, np.int64), np.empty(room), np.empty(room))
 
 
 @compiled
-def _note(found: Arrivals, n: int, owner: int, conflict: int, into: float, out: float,
-          speed: float, width: float, step: int) -> None:
+def _note(found: Arrivals, n: int, owner: int, conflict: int, offset: float, half: float,
+          speed: float, width: float, step: int, soonest: float, pace: float) -> None:
     found.owner[n], found.conflict[n], found.step[n] = owner, conflict, step
-    found.into[n], found.out[n], found.speed[n], found.width[n] = into, out, speed, width
+    found.offset[n], found.half[n], found.speed[n], found.width[n] = offset, half, speed, width
+    found.soonest[n], found.pace[n] = soonest, pace
 
 
 @compiled
@@ -207,27 +269,26 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
     speed = max(entries.speed[n], 0.0)
     reach = OTHERS_REACH + OTHERS_TIME * speed
     lane = np.full(MAX_BRANCHES**2, -1, np.int64)
-    front = np.zeros(MAX_BRANCHES**2)
-    lane[0], front[0] = entries.lane[n], -entries.front[n]
+    start = np.zeros(MAX_BRANCHES**2)
+    half = 0.5 * (entries.front[n] - entries.rear[n])
+    lane[0], start[0] = entries.lane[n], half - entries.front[n]
     pending, done = 1, 0
-    size = entries.front[n] - entries.rear[n]
     while done < pending:
-        current, offset = lane[done], front[done]
+        current, offset = lane[done], start[done]
         done += 1
         for row in range(conflicts.first[current],
                          conflicts.first[current] + conflicts.rows[current]):
-            out = offset + size + conflicts.end[1, row]
-            if out > 0.0:
+            if offset + conflicts.end[1, row] + half > 0.0:
                 if used == len(found.owner):
                     found = _grown(found)
-                _note(found, used, entries.owner[n], row, offset + conflicts.start[1, row], out,
-                      speed, width, 0)
+                _note(found, used, entries.owner[n], row, offset, half, speed, width, 0, 0.0,
+                      math.inf)
                 used += 1
         offset += lanes.length[current]
-        if offset < reach:
+        if offset - half < reach:
             for onward in lanes.successors[current]:
                 if onward >= 0 and pending < len(lane):
-                    lane[pending], front[pending] = onward, offset
+                    lane[pending], start[pending] = onward, offset
                     pending += 1
     return found, used
 
@@ -236,8 +297,8 @@ def _others(lanes: LaneTable, conflicts: ConflictTable, entries: Entries, n: int
 def _grown(found: Arrivals) -> Arrivals:
     more = _empty(0, 2 * len(found.owner))
     for n in range(len(found.owner)):
-        _note(more, n, found.owner[n], found.conflict[n], found.into[n], found.out[n],
-              found.speed[n], found.width[n], found.step[n])
+        _note(more, n, found.owner[n], found.conflict[n], found.offset[n], found.half[n],
+              found.speed[n], found.width[n], found.step[n], found.soonest[n], found.pace[n])
     return more
 
 
@@ -252,8 +313,8 @@ def _by_conflict(found: Arrivals, used: int, conflicts: int) -> Arrivals:
     fill = result.begin.copy()
     for n in range(used):
         row = found.conflict[n]
-        _note(result, fill[row], found.owner[n], row, found.into[n], found.out[n], found.speed[n],
-              found.width[n], found.step[n])
+        _note(result, fill[row], found.owner[n], row, found.offset[n], found.half[n],
+              found.speed[n], found.width[n], found.step[n], found.soonest[n], found.pace[n])
         fill[row] += 1
     return result
 

@@ -108,16 +108,17 @@ class LaneGraph:
         self._connect(network)
         self._default_speed = default_speed
         self.limit: FloatArray = np.zeros(len(self.ids))
-        self.read_speed_limits(network)
+        self.time: FloatArray = np.zeros(len(self.x))
         self.lateral_acceleration = lateral_acceleration
         curve = np.sqrt(lateral_acceleration / np.maximum(np.abs(self.curvature), 1e-4))
         # The speed that the curve alone allows; a driver's factor scales only the speed limit.
         self.curve_speed: FloatArray = np.maximum(curve, 2.0)
         self._slow_at_kinks(lateral_acceleration)
+        self.read_speed_limits(network)
         self.table = LaneTable(
             self.first, self.count, self.length, self.step, self.limit, self.left, self.right,
             self.successors, self.predecessors, point_records(
-                self.x, self.y, self.yaw, self.curvature, self.half_width))
+                self.x, self.y, self.yaw, self.curvature, self.half_width), self.time)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -126,6 +127,10 @@ class LaneGraph:
         """Read the speed limits of a network with the same lanelets [m/s]."""
         limits = [network.speed_limit(i) for i in self.ids]
         self.limit[:] = [self._default_speed if limit is None else limit for limit in limits]
+        for lane, (first, count) in enumerate(zip(self.first, self.count, strict=True)):
+            pace = 1.0 / np.minimum(self.curve_speed[first:first + count], self.limit[lane])
+            self.time[first + 1:first + count] = np.cumsum(
+                0.5 * self.step[lane] * (pace[1:] + pace[:-1]))
 
     def _tabulate(self, network: RoadNetwork) -> None:
         lines = [network.line(i) for i in self.ids]

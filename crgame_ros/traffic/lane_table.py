@@ -76,6 +76,7 @@ class LaneTable(NamedTuple):
     :param left, right: (L) neighbours of the same direction, or -1.
     :param successors, predecessors: (L, S) padded with -1.
     :param line: the points, a record each.
+    :param time: from the start of the lane to each point, as fast as limits and bends allow [s]
     """
 
     first: IntArray
@@ -88,6 +89,7 @@ class LaneTable(NamedTuple):
     successors: IntArray
     predecessors: IntArray
     line: Points
+    time: FloatArray
 
 
 @inlined
@@ -165,6 +167,13 @@ def angle_between(a: float, b: float) -> float:
     """Return the angle from b to a in [-pi, pi] [rad]."""
     turn = a - b
     return turn - 2.0 * math.pi * float(np.rint(turn / (2.0 * math.pi)))
+
+
+@compiled
+def time_at(lanes: LaneTable, lane: int, s: float) -> float:
+    """Return `LaneTable.time` at an arc length; beyond the lane's ends as fast as there."""
+    row, share = segment(lanes, lane, s)
+    return float(lanes.time[row] + share * (lanes.time[row + 1] - lanes.time[row]))
 
 
 @compiled

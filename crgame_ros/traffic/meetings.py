@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from crgame_ros.traffic.agents import AgentTable
 from crgame_ros.traffic.compiled import compiled
-from crgame_ros.traffic.conflicts import ConflictTable, spare_room, touch
-from crgame_ros.traffic.junctions import Arrivals, Passages, time_to
+from crgame_ros.traffic.conflicts import ConflictTable, extent, spare_room, touch
+from crgame_ros.traffic.junctions import Arrivals, Passages, time_to, waits_inside
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.leaders import Ways
 from crgame_ros.vehicle.state import QUEUEING
@@ -27,18 +27,21 @@ class CrossingRules(NamedTuple):
 
     :param gap_after: time between another leaving a conflict and the agent getting there [s];
         own choice.
-    :param gap_before: time between the agent leaving it and another getting there [s]; the
-        agent's own time included, a crossing of 6 s accepts the 7 s to 8 s that the Highway
-        Capacity Manual 2010 (table 19-11) gives as critical gaps.
+    :param gap_before: time between the agent leaving it and another getting there [s]
+    :param merging: the same where a turn joins the lane of another agent, from when the agent's
+        rear is past the start of the conflict [s]; benchmarks/capacity.py compares what minor
+        roads carry with the Highway Capacity Manual.
     :param patience: standing time after which, among standing agents, the one that has stood
         longest goes first, whatever the right of way [s]; own choice.
     :param acceleration: with which agents expect to cross [m/s^2]
+    :param gentle: braking that an agent with the right of way is expected to use, at most, behind
+        one that merges before it [m/s^2]
     :param deceleration: hardest braking that others are expected to use to stop for the agent
         [m/s^2]
     :param withdrawal: hardest braking that agents use when they give up a grant [m/s^2]
-    :param zipper: standing time after which agents on the road let one merge, if they can slow
-        down gently [s]; own choice.
-    :param mercy: the same for an agent that crosses [s]; own choice.
+    :param zipper: standing time at the end of a lane after which agents on the road let one merge,
+        if they can slow down gently [s]; own choice.
+    :param mercy: the same for an agent that turns or crosses [s]; own choice.
     :param room: behind the junction, besides the agent's own length [m]
     :param late: braking needed to halt before the junction at which a late driver notices that it
         has to yield; more than twice the comfortable one, little more than half of the hardest;
@@ -46,9 +49,11 @@ class CrossingRules(NamedTuple):
     """
 
     gap_after: float = 0.7
-    gap_before: float = 1.5
+    gap_before: float = 2.0
+    merging: float = 0.8
     patience: float = 3.0
     acceleration: float = 1.3
+    gentle: float = 2.0
     deceleration: float = 3.0
     withdrawal: float = 2.2
     zipper: float = 6.0
@@ -91,7 +96,7 @@ class Meetings(NamedTuple):
     :param inside: (M) whether the other is in the conflict.
     :param committed: (M) whether the other can no longer stop before it.
     :param courteous: (M) whether the other can let the agent go by slowing down gently.
-    :param joins: (M) whether the lanes merge.
+    :param tapers: (M) as in `ConflictTable`.
     """
 
     begin: IntArray
@@ -104,7 +109,7 @@ class Meetings(NamedTuple):
     inside: BoolArray
     committed: BoolArray
     courteous: BoolArray
-    joins: BoolArray
+    tapers: BoolArray
 
 
 @compiled
@@ -114,8 +119,9 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
     """
     Pair agents with all others that come to the same conflicts, and compare their times.
 
-    :param stays: (A) whether an agent waits before a red light or a full junction: it comes to no
-        conflict, and others pass if its front is in their spare room alone.
+    :param stays: (A) whether an agent waits before a red light or a full junction: like one that
+        waits inside, it comes to no conflict, and others pass if its front is in their spare room
+        alone.
     :param first: (A) whether it is the first before a full junction: in a roundabout, agents that
         enter still yield to it.
     :param next_in: (A) whether the next free room behind a full junction is its own: no other
@@ -128,8 +134,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
     for i, slot in enumerate(at.slots):
         for n in range(rows.begin[i], rows.begin[i + 1]):
             mine = rows.row[n]
-            if arrivals.step[mine] > max(passage.last[i], passage.granted[i]) \
-                    or arrivals.into[mine] <= 0.0:
+            if arrivals.step[mine] > max(passage.last[i], passage.granted[i]):
                 continue
             conflict = arrivals.conflict[mine]
             counterpart = conflicts.other[conflict]
@@ -138,8 +143,13 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                 if owner == i or not touch(
                         conflicts, conflict, agents.width[slot], arrivals.width[theirs]):
                     continue
-                if owner >= 0 and stays[owner] and arrivals.into[theirs] > -spare_room(
-                        agents.width[slot]) \
+                # Others may drive beside the middle of their lane.
+                pair = extent(agents.width[slot], arrivals.width[theirs]) if owner >= 0 else 1
+                if _into(conflicts, arrivals, mine, pair) <= 0.0:
+                    continue
+                if owner >= 0 and (stays[owner] or waits_inside(passage, owner)) \
+                        and _into(conflicts, arrivals, theirs, pair) > -spare_room(
+                            agents.width[slot], arrivals.width[theirs]) \
                         and not is_let_in(agents, at.slots[owner], passage, owner,
                                           arrivals.step[theirs]) \
                         and not (conflicts.merges[conflict] and (next_in[owner] or (
@@ -147,7 +157,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     continue
                 if used == len(found.other):
                     found = _grown(found)
-                _compare(conflicts, rules, arrivals, mine, theirs, at.desired, found, used)
+                _compare(conflicts, rules, arrivals, mine, theirs, pair, at.desired, found, used)
                 used += 1
         found.begin[i + 1] = used
     return found
@@ -198,31 +208,60 @@ def _grown(found: Meetings) -> Meetings:
     more.step[:size], more.theirs[:size] = found.step, found.theirs
     more.priority[:size], more.apart[:size] = found.priority, found.apart
     more.inside[:size], more.committed[:size] = found.inside, found.committed
-    more.courteous[:size], more.joins[:size] = found.courteous, found.joins
+    more.courteous[:size], more.tapers[:size] = found.courteous, found.tapers
     return more
 
 
 @compiled
+def _into(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> float:
+    """Return the distance of a front from its conflict [m], negative inside."""
+    return float(arrivals.offset[n] - arrivals.half[n]
+                 + conflicts.start[pair, arrivals.conflict[n]])
+
+
+@compiled
+def _out(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> float:
+    """Return the distance of a rear from the end of its conflict [m]."""
+    return float(arrivals.offset[n] + arrivals.half[n] + conflicts.end[pair, arrivals.conflict[n]])
+
+
+@compiled
 def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
-             theirs: int, desired: FloatArray, found: Meetings, n: int) -> None:
-    """Write the meeting of two arrivals into row n."""
+             theirs: int, pair: int, desired: FloatArray, found: Meetings, n: int) -> None:
+    """Write the meeting of two arrivals, with the conflict's extent for both, into row n."""
     owner, conflict = arrivals.owner[theirs], arrivals.conflict[mine]
-    into, out, speed = arrivals.into[theirs], arrivals.out[theirs], arrivals.speed[theirs]
+    into, out = (_into(conflicts, arrivals, theirs, pair), _out(conflicts, arrivals, theirs, pair))
+    speed, here = arrivals.speed[theirs], _into(conflicts, arrivals, mine, pair)
+    clear, leave, slower = out, _out(conflicts, arrivals, mine, pair), 0.0
+    i = arrivals.owner[mine]
+    # In a roundabout, and where a lane ends beside another, agents leave the whole conflict free.
+    joins = owner >= 0 and conflicts.merges[conflict] and not conflicts.tapers[conflict] \
+        and abs(conflicts.priority[conflict]) < 2
+    if joins:
+        # The agent that is behind where the lanes come together follows the other from there on.
+        clear, leave = into + 2.0 * arrivals.half[theirs], here + 2.0 * arrivals.half[mine]
+        top = min(math.sqrt(speed**2 + 2.0 * rules.acceleration * max(into, 0.0)),
+                  desired[owner], arrivals.pace[theirs])
+        own = min(math.sqrt(arrivals.speed[mine]**2 + 2.0 * rules.acceleration * max(leave, 0.0)),
+                  desired[i], arrivals.pace[mine])
+        slower = max(top - own, 0.0)**2 / (2.0 * rules.gentle * max(top, 1.0))
     if owner < 0:
         early = math.inf if speed < QUEUEING and into > 0.0 else time_to(
             into, speed, rules.acceleration, speed)
-        late = max(out, 0.0) / max(speed, 0.1)
+        late = max(clear, 0.0) / max(speed, 0.1)
     else:
-        early = time_to(into, speed, rules.acceleration, desired[owner])
-        late = time_to(out, speed, TIMID, max(0.8 * desired[owner], 2.0))
-    i = arrivals.owner[mine]
-    there = time_to(arrivals.into[mine], arrivals.speed[mine], HURRY, desired[i])
-    gone = time_to(arrivals.out[mine], arrivals.speed[mine], rules.acceleration, desired[i])
-    found.other[n], found.into[n] = owner, arrivals.into[mine]
+        early = max(time_to(into, speed, rules.acceleration, desired[owner]),
+                    arrivals.soonest[theirs])
+        late = time_to(clear, speed, TIMID, max(0.8 * desired[owner], 2.0))
+    there = time_to(here, arrivals.speed[mine], HURRY, desired[i])
+    gone = slower + time_to(leave, arrivals.speed[mine], rules.acceleration,
+                            min(desired[i], arrivals.pace[mine]))
+    found.other[n], found.into[n] = owner, here
     found.step[n], found.theirs[n] = arrivals.step[mine], arrivals.step[theirs]
     found.priority[n] = conflicts.priority[conflict]
-    found.apart[n] = there > late + rules.gap_after or gone + rules.gap_before < early
+    ahead = rules.merging if joins else rules.gap_before
+    found.apart[n] = there > late + rules.gap_after or gone + ahead < early
     found.inside[n] = into <= 0.0 and out > 0.0
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
     found.courteous[n] = owner >= 0 and into > 2.0 * speed + speed**2 / 3.0
-    found.joins[n] = conflicts.merges[conflict]
+    found.tapers[n] = conflicts.tapers[conflict]

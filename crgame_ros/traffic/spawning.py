@@ -29,6 +29,8 @@ START_GAP = 3.0
 START_TIME = 1.2
 SIDE_GAP = 0.6
 LANE = 3.5
+# Shares of its wanted speed at which an arrival enters if there is no room for more.
+ENTERS = (0.6, 0.3)
 # Deceleration with which a newcomer could stop for anything ahead [m/s^2].
 EASY = 1.5
 # Deceleration of a recorded newcomer behind its leader [m/s^2], and the gap that it leaves [m].
@@ -208,14 +210,8 @@ class Spawner:
             self._character(agents, slot)
             s = 0.5 * float(agents.length[slot])
             self._choose_destination(agents, slot, lane)
-            wanted = self._speed(lane, s, agents, slot)
-            for share in (1.0, 0.6, 0.3):
-                if self._try(agents, slot, lane, s, share * wanted, others):
-                    if not self._has_room(agents, slot, others):
-                        agents.active[slot] = False
-                        continue
-                    self._due[number] += self._random.exponential(self._mean_s)
-                    break
+            if self._enter(agents, slot, lane, s, others):
+                self._due[number] += self._random.exponential(self._mean_s)
 
     def calm(self, agents: Agents, others: Bodies) -> None:
         """Lower the speeds of agents to those from which firm braking suffices behind leaders."""
@@ -375,12 +371,21 @@ class Spawner:
         agents.put(slot, lane, s, 0.0, (float(x), float(y), float(yaw)), speed)
         return True
 
-    def _has_room(self, agents: Agents, slot: int, others: Bodies) -> bool:
-        """Return whether a newcomer has the usual gap on its way, which may bend."""
-        gap, speed = self._ahead(agents, np.array([slot]), others)
-        own = float(agents.speed[slot])
-        return bool(gap[0] >= START_GAP + START_TIME * own + max(
-            own**2 - max(float(speed[0]), 0.0)**2, 0.0) / (2.0 * EASY))
+    def _enter(self, agents: Agents, slot: int, lane: int, s: float, others: Bodies) -> bool:
+        """Place an arrival as soon as it has the usual gap on its way, which may bend."""
+        wanted = self._speed(lane, s, agents, slot)
+        if not self._try(agents, slot, lane, s, ENTERS[-1] * wanted, others):
+            return False
+        gaps, speeds = self._ahead(agents, np.array([slot]), others)
+        gap, lead = float(gaps[0]), max(float(speeds[0]), 0.0)
+        agents.active[slot] = False
+        # Behind a leader it is as fast as that one rather than late.
+        for speed in (wanted, *(lead,) * (ENTERS[-1] * wanted < lead < wanted),
+                      *(share * wanted for share in ENTERS)):
+            room = START_GAP + START_TIME * speed + max(speed**2 - lead**2, 0.0) / (2.0 * EASY)
+            if gap >= room and self._try(agents, slot, lane, s, speed, others):
+                return True
+        return False
 
     def _choose_destination(self, agents: Agents, slot: int, lane: int) -> None:
         agents.destination[slot] = self._routes.draw(

@@ -24,6 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 YELLOW, RED = 1, 2
+# Lanes inside junctions by the lights before them: those who come from there wait, may drive, or
+# the light changes; lanes without lights are NO_LIGHT.
+NO_LIGHT, HELD, OPENED, CHANGES = 0, 1, 2, 3
 LEVELS = {'yellow': YELLOW, 'red': RED, 'redYellow': RED}
 RED_STATES = [state for state, level in LEVELS.items() if level == RED]
 ARROWS = {STRAIGHT: 'straight', LEFT: 'left', RIGHT: 'right'}
@@ -37,6 +40,8 @@ YELLOW_BRAKING = 3.4
 STILL_BRAKING, STILL_FOR_RED = 4.0, 7.0
 # Time until braking has set in [s].
 REACTION = 0.1
+# Drivers start this long after a light has left red; red with yellow announces green [s].
+START_UP = 1.2
 
 
 class LightTable(NamedTuple):
@@ -59,20 +64,21 @@ class StopLines:
 
     :param graph: the lanes.
     :param roads: with the traffic lights and signs.
-    :param movements: of the lanes; computed if not given.
+    :param movements: of the lanes.
+    :param time_step_s: Delta t_c [s]
 
     Attributes of each lane (L): `line` (arc length of its stop line [m], infinite without one),
     `stop_sign`, `at` (arc length of its lights' line [m]), `number` (row of its lights in
     `movement`, -1 without lights) and `shown` (L, 4): 2 for red, 1 for yellow, 0 for any other, by
     movement; column 0 is for ways whose movement is undecided as far as an agent looks, and shows
     the strictest light of all movements there. `movement` (R, L): the movements of ways from the
-    lane of row R, see `Movements.after`.
+    lane of row R, see `Movements.after`. `inside` (L): NO_LIGHT, HELD, OPENED or CHANGES.
     """
 
-    def __init__(self, graph: LaneGraph, roads: LaneletNetwork,
-                 movements: Movements | None = None) -> None:
+    def __init__(self, graph: LaneGraph, roads: LaneletNetwork, movements: Movements,
+                 time_step_s: float) -> None:
         self._graph = graph
-        movements = Movements(graph) if movements is None else movements
+        self._start_up = round(START_UP / time_step_s)
         count = len(graph)
         self.line: FloatArray = np.full(count, np.inf)
         self.stop_sign: NDArray[np.bool_] = np.zeros(count, dtype=bool)
@@ -97,7 +103,10 @@ class StopLines:
                     # No agent halts at the far side of the junction.
                     self.at[lane] = 0.0
         self.movement: IntArray = np.array(rows, dtype=np.int64).reshape(-1, count)
-        self._states: Mapping[int, str] | None = None
+        self.inside: IntArray = np.full(count, NO_LIGHT)
+        # Until when a light counts as red [k].
+        self._red_until: dict[int, int] = {}
+        self._levels: dict[int, int] = {}
         self._any_shown = False
 
     def _position(self, lane: int, lanelet: Lanelet) -> float:
@@ -107,19 +116,33 @@ class StopLines:
         s, _ = self._graph.nearest(lane, middle[:1], middle[1:])
         return float(np.clip(s[0], 0.0, length))
 
-    def show(self, signals: Mapping[int, str]) -> None:
-        """Update the states of the traffic lights."""
-        if signals == self._states:
+    def show(self, k: int, signals: Mapping[int, str]) -> None:
+        """Update the states of the traffic lights at k, as drivers heed them."""
+        self._red_until |= {light: k + self._start_up for light, state in signals.items()
+                            if state == 'red'}
+        levels = {light: RED if k < self._red_until.get(light, k) else LEVELS.get(state, 0)
+                  for light, state in signals.items()}
+        if levels == self._levels:
             return
-        self._states = dict(signals)
+        self._levels = levels
         for lane, lights in self._lights.items():
             for movement, ids in lights.items():
-                self.shown[lane, movement] = max(LEVELS.get(signals.get(i, ''), 0) for i in ids)
+                self.shown[lane, movement] = max(levels.get(i, 0) for i in ids)
             possible = np.unique(self.movement[self.number[lane]])
             possible = possible[possible != UNDECIDED]
             self.shown[lane, UNDECIDED] = self.shown[
                 lane, possible if len(possible) else STRAIGHT].max()
         self._any_shown = bool(self.shown.any())
+        self._note_inside()
+
+    def _note_inside(self) -> None:
+        governed = self.movement != UNDECIDED
+        shown = self.shown[np.flatnonzero(self.number >= 0)[:, None], self.movement]
+        strictest = np.where(governed, shown, 0).max(axis=0, initial=0)
+        mildest = np.where(governed, shown, RED).min(axis=0, initial=RED)
+        self.inside[:] = np.where(
+            ~governed.any(axis=0), NO_LIGHT,
+            np.where(mildest == RED, HELD, np.where(strictest == 0, OPENED, CHANGES)))
 
     def halts(self, way: Ways, speed: FloatArray, length: FloatArray,
               stops: NDArray[np.bool_]) -> FloatArray:

@@ -114,7 +114,7 @@ class Traffic:
         self._routes = Routes(
             self._graph, np.where(self._conflicts.tapers() | for_cars, TAPER_COST, 0.0),
             for_trucks, side.keeps_left)
-        self._lines = StopLines(self._graph, scenario.lanelet_network, movements)
+        self._lines = StopLines(self._graph, scenario.lanelet_network, movements, time_step_s)
         self._followers = Followers(spec.model, spec.options, len(adopted) + self._capacity())
         self._longitudinal = Longitudinal(self._graph, self._routes, self._followers)
         self._crossings = Crossings(self._conflicts, CrossingRules(), time_step_s)
@@ -144,7 +144,7 @@ class Traffic:
             nowhere = np.full((len(others), 3), np.nan)
             world = WorldView(k0, nowhere, nowhere)
         bodies = self._others.bodies(world)
-        self._lines.show(world.signals)
+        self._lines.show(k0, world.signals)
         self._adopt(k0, bodies)
         self._spawner.place_at_random(self._agents, spec.agents, bodies)
         self._spawner.calm(self._agents, bodies)
@@ -191,7 +191,7 @@ class Traffic:
         bodies = self._others.bodies(others)
         slots = np.flatnonzero(agents.active)
         if len(slots):
-            self._lines.show(others.signals)
+            self._lines.show(others.k, others.signals)
             entries = place(self._graph.table, self._cells.table, with_agents(
                 bodies, agents.table))
             standing = self._swerve_around(entries, others)
@@ -294,7 +294,8 @@ class Traffic:
         before_light = before_lines(agents.speed[slots], light)
         if not len(conflicts):
             return before_light
-        passage = passages(conflicts.table, self._lines.line, way, agents.table, slots)
+        passage = passages(conflicts.table, self._lines.line, self._lines.inside, way,
+                           agents.table, slots)
         number = np.arange(len(slots))
         first = way.lane[number, np.maximum(passage.first, 0)]
         before = way.lane[number, np.maximum(passage.first - 1, 0)]

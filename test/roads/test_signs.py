@@ -66,6 +66,9 @@ def test_without_a_stop_line_the_last_lanelet_with_the_stop_sign_counts() -> Non
     network.add_lanelet(behind)
     lanelet.successor = [99]
     assert has_stop_sign(behind, network) and not has_stop_sign(lanelet, network)
+    # The limit is that of both, the stop sign is not.
+    behind.traffic_signs = {21}
+    assert has_stop_sign(lanelet, network) and not has_stop_sign(behind, network)
     assert [light.traffic_light_id for light in lights_of(lanelet, network)] == [2, 4]
 
 

@@ -164,11 +164,11 @@ def _behind_a_slow_one(seconds: float, **spec: Any) -> Drive:
 
 
 def test_m2_car_following_keeps_the_gap_that_is_driven_into_without(tmp_path: Path) -> None:
-    """With FS 3 the gap ends at s0 + T v = 2 + 1.5 * 11.1 m; with a blind model it ends at 0."""
+    """With FS 3 the gap ends at s0 + T v = 2 + 1.3 * 11.1 m; with a blind model it ends at 0."""
     run = _behind_a_slow_one(30.0, lane_changes=False)
     gaps = run.distances(0, 1)
     assert gaps.min() > 10.0
-    assert gaps[-1] == pytest.approx(2.0 + 1.5 * SLOW, abs=0.3)
+    assert gaps[-1] == pytest.approx(2.0 + 1.3 * SLOW, abs=0.3)
     assert run.speeds[-1, 1] == pytest.approx(SLOW, abs=0.05)
     model = tmp_path / 'free_model.py'
     model.write_text(MODEL_WITHOUT_LEADERS)

@@ -121,11 +121,11 @@ def test_a_short_gap_survives_the_hardest_braking_ahead(model: CarFollowing,
 
 
 def test_relief_spares_the_braking_for_a_short_gap() -> None:
-    """At 15 m/s and 8 m: lambda 16.5 / 1.5 = 4.4 m/s^2 without relief, 0 relieved of 16.5 m."""
+    """At 15 m/s and 8 m: lambda 13.5 / 1.3 = 4.15 m/s^2 without relief, 0 relieved of 13.5 m."""
     model = AdaptiveCruise()
     v, gap = np.array([15.0, 15.0]), np.array([8.0, 8.0])
-    got = model.acceleration(v, v + 20.0, gap, v, np.array([0.0, 16.5]))
-    np.testing.assert_allclose(got, [-0.4 * 16.5 / 1.5, 0.0], atol=1e-12)
+    got = model.acceleration(v, v + 20.0, gap, v, np.array([0.0, 13.5]))
+    np.testing.assert_allclose(got, [-0.4 * 13.5 / 1.3, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize('model', MODELS, ids=NAMES)
@@ -160,7 +160,7 @@ def test_the_steady_gap_is_the_desired_gap(model: CarFollowing) -> None:
     """At equal speeds and that gap the interaction only demands the leader's speed."""
     speed = np.array([3.0, 12.0, 25.0])
     gap = model.desired_gap(speed)
-    np.testing.assert_allclose(gap, 2.0 + 1.5 * speed)
+    np.testing.assert_allclose(gap, 2.0 + 1.3 * speed)
     _, speeds, _ = drive(model, speed, np.full(3, 1000.0), gap, speed, 0.0, 60.0)
     np.testing.assert_allclose(speeds, np.broadcast_to(speed, speeds.shape), atol=1e-6)
 

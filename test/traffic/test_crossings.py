@@ -168,6 +168,73 @@ def test_at_a_light_that_turns_yellow_an_agent_stops_unless_it_has_to_brake_hard
     assert taken == {False, True}
 
 
+def test_an_agent_sets_off_a_moment_after_green() -> None:
+    """Highway Capacity Manual: the first of a queue loses about 2 s."""
+    scenario = lane_with_a_light(((TrafficLightState.RED, 250), (TrafficLightState.GREEN, 1000)))
+    poses, speeds = support.Run(scenario, TrafficSpec(), 0, (), one()).ticks(300).series(0)
+    assert not speeds[220:250 + 11].any()
+    over = int(np.argmax(poses[:, 0] + 2.25 > 100.0))
+    assert 250 + 14 <= over <= 250 + 22
+
+
+def lit_crossing(green: int) -> Scenario:
+    """Make a crossing: the lights of east and west are green first, those of the others red."""
+    edge, lane = 12.0, 1.75
+    turn = np.linspace(0.0, 0.5 * np.pi, 20)
+    radius = edge + lane
+    lines = {
+        1: [(-120.0, -lane), (-edge, -lane)],
+        2: list(zip(radius * np.sin(turn) - edge, edge - radius * np.cos(turn), strict=True)),
+        4: [(lane, edge), (lane, 120.0)], 5: [(150.0, lane), (edge, lane)],
+        6: [(edge, lane), (-edge, lane)], 7: [(-edge, lane), (-120.0, lane)],
+        8: [(lane, -120.0), (lane, -edge)], 9: [(lane, -edge), (lane, edge)],
+        10: [(-lane, 120.0), (-lane, edge)], 11: [(-lane, edge), (-lane, -edge)],
+        12: [(-lane, -edge), (-lane, -120.0)]}
+    links = [(1, 2), (2, 4), (5, 6), (6, 7), (8, 9), (9, 4), (10, 11), (11, 12)]
+    scenario = support.roads(*(support.lane_strip(
+        number, [line[0] + (np.array(line[1]) - line[0]) * share for share in
+                 np.linspace(0.0, 1.0, 20)] if len(line) == 2 else line,
+        successor=[after for before, after in links if before == number],
+        predecessor=[before for before, after in links if after == number])
+        for number, line in lines.items()))
+    for lanelet, open_first in ((1, True), (5, True), (8, False), (10, False)):
+        end = scenario.lanelet_network.find_lanelet_by_id(lanelet)
+        end.stop_line = StopLine(end.left_vertices[-1], end.right_vertices[-1], LineMarking.SOLID,
+                                 set(), {50 + lanelet})
+        first, then = TrafficLightState.GREEN, TrafficLightState.RED
+        phases = ((first, green), (TrafficLightState.YELLOW, 30), (then, 1000)) if open_first \
+            else ((then, green + 60), (first, 1000))
+        scenario.add_objects(TrafficLight(
+            50 + lanelet, end.center_vertices[-1], TrafficLightCycle(
+                [TrafficLightCycleElement(*phase) for phase in phases])), {lanelet})
+    return scenario
+
+
+def test_a_left_turn_waits_in_the_middle_and_leaves_with_the_change() -> None:
+    """Against a stream without a gap, its front is beyond its line and the held cross traffic."""
+    green = 300
+    # Every 22 m; those that begin beyond the road come to its start later, with 1 m a tick.
+    oncoming = [support.driving(number, [(min(away, 140.0), 1.75, np.pi), (-100.0, 1.75, np.pi)],
+                                10.0, first_k=max(round(away - 140.0), 0))
+                for number, away in enumerate(np.arange(20.0, 380.0, 22.0).tolist(), 2)]
+    agent = support.driving(1, [(-80.0, -1.75, 0.0), (1.75, 100.0, 0.5 * np.pi)], 10.0,
+                            first_k=10)
+    held = support.driving(50, [(1.75, -40.0, 0.5 * np.pi), (1.75, 100.0, 0.5 * np.pi)], 8.0)
+    run = support.Run(lit_crossing(green), TrafficSpec(), 0, (),
+                      [agent, *oncoming, held]).ticks(500)
+    assert run.overlaps() == []
+    poses, speeds = run.series(0)
+    stood = np.flatnonzero(speeds[:green] < 0.05)
+    assert len(stood) > 50
+    place = poses[stood[-1]]
+    front = place[:2] + 2.25 * np.array((np.cos(place[2]), np.sin(place[2])))
+    assert front[0] > -12.0 + 3.0 and front[1] < 0.0
+    # It leaves as soon as the last oncoming vehicle stops, and the cross traffic lets it.
+    assert np.nanmax(poses[:green + 110, 1]) > 12.0
+    others = np.array(run.poses)[:, -1]
+    assert others[green + 60, 1] < -12.0 and np.nanmax(others[:, 1]) > 20.0
+
+
 def test_a_green_light_holds_no_agent() -> None:
     run = support.Run(lane_with_a_light(((TrafficLightState.GREEN, 1000),)), TrafficSpec(), 0,
                       (), one()).ticks(120)

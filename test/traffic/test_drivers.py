@@ -105,11 +105,11 @@ def test_a_change_of_all_is_as_if_the_game_said_so(given: dict[str, Any],
 
 
 def test_a_change_of_one_leaves_those_ahead_alone() -> None:
-    """One follower keeps a headway of 4 s instead of 1.5 s, and goes back to 1.5 s later."""
+    """One follower keeps a headway of 4 s instead of 1.3 s, and goes back to 1.3 s later."""
     alone = TrafficSpec(lane_changes=False)
     free = chase(alone, ticks=500)
     timid = TrafficChange('o2', options={'time_gap': 4.0})
-    told = chase(alone, (150, timid), (350, TrafficChange('o2', options={'time_gap': 1.5})),
+    told = chase(alone, (150, timid), (350, TrafficChange('o2', options={'time_gap': 1.3})),
                  ticks=500)
     assert bits(told, 0, 1) == bits(free, 0, 1)
     assert np.array(told.poses)[:151].tobytes() == np.array(free.poses)[:151].tobytes()
@@ -117,8 +117,8 @@ def test_a_change_of_one_leaves_those_ahead_alone() -> None:
     gaps = [[run.poses[k][1, 0] - run.poses[k][2, 0] - 4.5 for k in (340, 499)]
             for run in (free, told)]
     # s0 + T v
-    assert gaps[0] == pytest.approx([2.0 + 1.5 * speed] * 2, abs=0.3)
-    assert gaps[1] == pytest.approx([2.0 + 4.0 * speed, 2.0 + 1.5 * speed], abs=1.0)
+    assert gaps[0] == pytest.approx([2.0 + 1.3 * speed] * 2, abs=0.3)
+    assert gaps[1] == pytest.approx([2.0 + 4.0 * speed, 2.0 + 1.3 * speed], abs=1.0)
 
 
 def test_desired_speeds_of_one_and_of_all() -> None:

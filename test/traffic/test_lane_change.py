@@ -108,13 +108,13 @@ def accepted(lead_gap: float, follow_gap: float, hurry: float = 0.0, follow_spee
 
 
 def test_changes_are_made_into_gaps_that_are_wide_enough() -> None:
-    """At 20 m/s the ACC brakes with 2 m/s^2 for a gap 7.5 m below its 32 m, with 4 below 15 m."""
+    """At 20 m/s the ACC brakes with 2 m/s^2 for a gap 6.5 m below its 28 m, with 4 for 13 m."""
     nobody = math.inf
     assert accepted(nobody, nobody)
     assert accepted(40.0, 40.0)
-    assert accepted(25.0, 25.0) and not accepted(24.0, 40.0) and not accepted(40.0, 24.0)
+    assert accepted(22.0, 22.0) and not accepted(21.0, 40.0) and not accepted(40.0, 21.0)
     assert not accepted(-3.0, nobody) and not accepted(nobody, -3.0)
-    assert accepted(18.0, 18.0, hurry=1.0) and not accepted(16.0, 40.0, hurry=1.0)
+    assert accepted(16.0, 16.0, hurry=1.0) and not accepted(14.0, 40.0, hurry=1.0)
     # The agent waits for a follower that is much faster.
     assert accepted(nobody, 40.0) and not accepted(nobody, 40.0, follow_speed=30.0)
     assert not accepted(35.0, nobody, lead_speed=10.0)

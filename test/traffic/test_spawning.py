@@ -64,6 +64,17 @@ def test_arrivals_come_at_the_given_flow() -> None:
     assert run.overlaps() == []
 
 
+@pytest.mark.slow
+def test_a_lane_carries_what_the_manual_says() -> None:
+    """Highway Capacity Manual: 1,900 cars an hour and lane and more where all wait to come."""
+    lane = support.roads(support.straight_lane(1, 0.0, 0.0, 600.0))
+    run = support.Run(lane, TrafficSpec(flow=3600.0, truck_share=0.0), 3).ticks(2400)
+    present = np.isfinite(np.array(run.poses)[:, :, 0])
+    left = (present[600:-1] & ~present[601:]).sum()
+    assert 1800.0 <= left * 20.0 <= 2400.0
+    assert run.overlaps() == []
+
+
 def test_an_agent_at_the_end_of_the_map_is_absent_for_a_tick_at_least() -> None:
     run = support.Run(one_lane(), TrafficSpec(flow=1800.0, capacity=6, truck_share=0.0),
                       1).ticks(700)

@@ -20,6 +20,7 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.traffic.lane_graph import LaneGraph
 from crgame_ros.traffic.leaders import Ways
+from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.stop_lines import StopLines
 import numpy as np
 import pytest
@@ -142,8 +143,8 @@ def light(number: int, direction: TrafficLightDirection | None = None) -> Traffi
 def halt(graph: LaneGraph, scenario: Scenario, shown: dict[int, str], ids: list[int],
          speed: float = 8.0, stops: bool = False) -> float:
     """Return where an agent of 4 m, with its centre at x = 50 on lanelets by id, has to halt."""
-    lines = StopLines(graph, scenario.lanelet_network)
-    lines.show(shown)
+    lines = StopLines(graph, scenario.lanelet_network, Movements(graph), 0.1)
+    lines.show(0, shown)
     lanes = np.array([[graph.index[i] for i in ids]])
     offset = np.cumsum(np.concatenate(([[-50.0]], graph.length[lanes[:, :-1]]), axis=1), axis=1)
     way = Ways(lanes, offset, (lanes >= 0).sum(axis=1), np.array([200.0]))
@@ -235,7 +236,7 @@ def test_a_light_far_before_a_junction_is_not_of_it() -> None:
     roads.find_lanelet_by_id(1).predecessor = [9]
     scenario.add_objects(light(51, TrafficLightDirection.LEFT), {9})
     graph = LaneGraph(RoadNetwork(roads))
-    lines = StopLines(graph, roads)
+    lines = StopLines(graph, roads, Movements(graph), 0.1)
     decided = lines.movement[lines.number[[graph.index[9], graph.index[1]]]]
     assert not decided[0].any()
     assert sorted(decided[1].tolist()) == [0, 0, 0, 1, 1, 2, 2, 3, 3]

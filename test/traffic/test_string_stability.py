@@ -45,8 +45,8 @@ def test_braking_fades_along_the_platoon() -> None:
     peaks = np.abs(accelerations).max(axis=0)
     assert peaks[0] == 3.0
     assert (np.diff(peaks) < 0.0).all()
-    # 3 (1 - exp(-2 / 1.5)) = 2.21 m/s^2 at the end of the pulse.
-    assert peaks[1] == pytest.approx(2.21, abs=0.06)
+    # 3 (1 - exp(-2 / 1.3)) = 2.36 m/s^2 at the end of the pulse.
+    assert peaks[1] == pytest.approx(2.36, abs=0.06)
     assert peaks[20] < 0.15 * peaks[0]
     assert (np.diff(SPEED - speeds.min(axis=0)) < 0.0).all()
     # No vehicle undershoots or overshoots: the answer is an average of what was ahead.
@@ -61,7 +61,7 @@ def test_the_answer_of_one_follower_is_a_first_order_lag() -> None:
     for i in (1, 2, 3):
         expected, state = [], 0.0
         for value in accelerations[:, i - 1]:
-            state += (1.0 - np.exp(-dt / 1.5)) * (value - state)
+            state += (1.0 - np.exp(-dt / 1.3)) * (value - state)
             expected.append(state)
         lag[i] = np.abs(accelerations[1:, i] - np.array(expected)[:-1]).max()
     assert lag.max() < 0.05 * 3.0
@@ -90,7 +90,7 @@ def slopes(model: AdaptiveCruise) -> tuple[float, float, float]:
 def test_the_law_has_the_slopes_of_fs_3() -> None:
     """The law is a = (dv + lambda (gap - T v - s0)) / h."""
     assert slopes(AdaptiveCruise(h=2.0)) == pytest.approx(
-        (-(1.0 + 0.4 * 1.5) / 2.0, 0.4 / 2.0, 1.0 / 2.0))
+        (-(1.0 + 0.4 * 1.3) / 2.0, 0.4 / 2.0, 1.0 / 2.0))
 
 
 @pytest.mark.parametrize('gain', [0.1, 0.4, 1.0])

@@ -85,8 +85,8 @@ def test_an_agent_follows_a_human_at_the_constant_time_gap() -> None:
     poses, speeds = run.series(0)
     ahead = human.at(500, 0.1)[0][0]
     assert speeds[-1] == pytest.approx(10.0, abs=0.05)
-    # FS 3 between bumpers: s0 + T v = 2 + 1.5 * 10.
-    assert ahead - poses[-1, 0] - 4.5 == pytest.approx(17.0, abs=0.5)
+    # FS 3 between bumpers: s0 + T v = 2 + 1.3 * 10.
+    assert ahead - poses[-1, 0] - 4.5 == pytest.approx(15.0, abs=0.5)
 
 
 def test_an_agent_brakes_for_a_human_that_cuts_in() -> None:
