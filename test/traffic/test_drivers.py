@@ -60,7 +60,7 @@ def test_only_a_driver_that_ignores_lights_runs_a_red_one() -> None:
     assert crossed == [False, True]
 
 
-def chase(spec: TrafficSpec, *changes: tuple[int, TrafficChange], ticks: int = 120,
+def chase(spec: TrafficSpec, *changes: tuple[int, TrafficChange], ticks: int = 240,
           seed: int = 3) -> support.Run:
     """Run five cars behind a slow one on two lanes; changes come before the decision at a tick."""
     two = support.roads(
