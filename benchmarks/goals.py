@@ -60,8 +60,7 @@ def time_for(problems: list[PlanningProblem], dt_s: float) -> float:
     return min(LONGEST_S, max(latest) * dt_s) if latest else USUAL_S
 
 
-def is_on_route(network: RoadNetwork, problem: PlanningProblem, number: int,
-                pose: np.ndarray) -> bool:
+def is_on_route(network: RoadNetwork, problem: PlanningProblem, pose: np.ndarray) -> bool:
     """Return whether a way leads from a pose to the lanes of a goal; True if it names none."""
     named = problem.goal.lanelets_of_goal_position or {}
     goals = {lanelet for lanelets in named.values() for lanelet in lanelets}
@@ -98,7 +97,7 @@ def reason_of(result: OfflineResult, number: int) -> str:
         return 'state'
     own = log.vehicle_states[:, column]
     network = RoadNetwork(setup.loaded.scenario.lanelet_network)
-    if not is_on_route(network, av.planning_problem, number, own[-1, :3]):
+    if not is_on_route(network, av.planning_problem, own[-1, :3]):
         return 'off route'
     last = own[-math.ceil(STOOD_S / setup.scheduler.time_step_s):, StateColumn.SPEED]
     return 'blocked' if (last < QUEUEING).all() else 'time'

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The signs and lights of a lanelet: its own, and those of its stop line."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
@@ -16,13 +16,17 @@ STOP, MAX_SPEED = 'STOP', 'MAX_SPEED'
 def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,
                   at_line: bool = True) -> Iterator[TrafficSignElement]:
     """
-    Yield the elements of a lanelet's signs, in the order of the signs' ids.
+    Return the elements of a lanelet's signs, in the order of the signs' ids.
 
     :param at_line: whether the signs of its stop line count.
     """
     ids = set(lanelet.traffic_signs)
     if at_line and lanelet.stop_line is not None:
         ids |= lanelet.stop_line.traffic_sign_ref or set()
+    return _elements_of(ids, roads)
+
+
+def _elements_of(ids: Iterable[int], roads: LaneletNetwork) -> Iterator[TrafficSignElement]:
     for sign_id in sorted(ids):
         sign = roads.find_traffic_sign_by_id(sign_id)
         if sign is not None:
@@ -31,7 +35,11 @@ def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,
 
 def sign_names(lanelet: Lanelet, roads: LaneletNetwork) -> set[str]:
     """Return the kinds of a lanelet's signs, like `STOP` and `YIELD`."""
-    return {element.traffic_sign_element_id.name for element in sign_elements(lanelet, roads)}
+    return _names(sign_elements(lanelet, roads))
+
+
+def _names(elements: Iterable[TrafficSignElement]) -> set[str]:
+    return {element.traffic_sign_element_id.name for element in elements}
 
 
 def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
@@ -43,12 +51,9 @@ def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:
     if STOP not in sign_names(lanelet, roads):
         return False
     following = [roads.find_lanelet_by_id(number) for number in lanelet.successor]
-    common = lanelet.traffic_signs & set[int]().union(
-        *(after.traffic_signs for after in following if after is not None))
-    signs = filter(None, map(roads.find_traffic_sign_by_id, common))
     return lanelet.stop_line is not None or not any(
-        element.traffic_sign_element_id.name == STOP
-        for sign in signs for element in sign.traffic_sign_elements)
+        STOP in _names(_elements_of(after.traffic_signs & lanelet.traffic_signs, roads))
+        for after in following if after is not None)
 
 
 def lights_of(lanelet: Lanelet, roads: LaneletNetwork) -> list[TrafficLight]:

@@ -148,8 +148,7 @@ class Conflicts:
         last = self.end > graph.length[self.lane] - 1.0
         self.merges: NDArray[np.bool_] = last & last[self.other] if rows else last
         begins = graph.yaw[graph.first[self.lane]]
-        self._tapers: NDArray[np.bool_] = self.merges & (
-            np.cos(begins - begins[self.other]) > SAME_WAY)
+        tapers = self.merges & (np.cos(begins - begins[self.other]) > SAME_WAY)
         # A vehicle that has got this far is clear of the conflict.
         clear = end.copy()
         joined = np.array([r[2].joined for r in rows], dtype=np.float64)[self.merges]
@@ -164,7 +163,7 @@ class Conflicts:
             np.maximum.at(leave[wide], self.lane[counts], clear[1][counts])
         self.table = ConflictTable(
             self.first, self.count, self.lane, self.other, start, end, distance, margin,
-            self.priority, self.merges, self._tapers, entry, leave)
+            self.priority, self.merges, tapers, entry, leave)
 
     def __len__(self) -> int:
         return len(self.lane)
@@ -172,7 +171,7 @@ class Conflicts:
     def tapers(self) -> NDArray[np.bool_]:
         """Return which lanes (L) end in a merge without a turn in which they have to yield."""
         result = np.zeros(len(self._graph), dtype=bool)
-        result[self.lane[self._tapers & (self.priority < 0)]] = True
+        result[self.lane[self.table.tapers & (self.priority < 0)]] = True
         return result
 
 
