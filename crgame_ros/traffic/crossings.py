@@ -12,6 +12,7 @@ from crgame_ros.traffic.junctions import (
     Arrivals,
     BEFORE,
     ENTERED,
+    FIRM,
     Passages,
     STARTED,
     waits_inside,
@@ -322,7 +323,8 @@ def _inside_halt(k: int, agents: AgentTable, passage: Passages, meeting: Meeting
         if stops:
             result = meeting.into[n]
             agents.blocker[slot] = at.slots[other] if other >= 0 else other
-    return result
+    # The room before the conflict gets smaller rather than that the agent brakes hard for it.
+    return max(result - BEFORE, min(result, agents.speed[slot]**2 / (2.0 * FIRM)))
 
 
 @compiled
@@ -333,9 +335,6 @@ def _is_senior(k: int, agents: AgentTable, passage: Passages, meeting: Meetings,
     slot, them = at.slots[i], at.slots[other]
     grant = _admission_tick(agents, slot, passage, i, meeting.step[n])
     theirs = _admission_tick(agents, them, passage, other, meeting.theirs[n])
-    # An agent whose leader is this one lets it go.
-    if agents.leader[them] == slot:
-        return False
     if agents.insists_until[slot] > k and agents.speed[them] < 1.0:
         return False
     return bool(theirs < grant or (theirs == grant and them < slot))

@@ -111,6 +111,10 @@ def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way:
                 if way.lane[i, step] == agents.until[slot]:
                     result.granted[i] = step
                     break
+        behind = -math.inf
+        for step in range(result.granted[i] + 1):
+            if math.isfinite(entry[way.lane[i, step]]):
+                behind = way.offset[i, step] + leave[way.lane[i, step]]
         widest, last, end = agents.length[slot] + BETWEEN, -1, 0.0
         for step in range(result.granted[i] + 1, way.depth[i]):
             lane = way.lane[i, step]
@@ -120,7 +124,8 @@ def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way:
             if result.first[i] < 0:
                 if way.offset[i, step] + leave[lane] + half > 0.0:
                     result.first[i] = result.last[i] = step
-                    result.hold[i] = _hold(entry[lane], lines, way, i, step) - half
+                    result.hold[i] = _hold(
+                        entry[lane], lines, way, i, step, behind + agents.length[slot]) - half
                     result.end[i] = way.offset[i, step] + leave[lane]
             elif room < WAITING_ROOM:
                 if room > widest:
@@ -177,12 +182,17 @@ def hold_before(entry: float) -> float:
 
 
 @compiled
-def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int) -> float:
-    """Return the distance of an agent's centre to where its front waits before a junction [m]."""
+def _hold(entry: float, lines: FloatArray, way: Ways, i: int, step: int, clear: float) -> float:
+    """
+    Return the distance of an agent's centre to where its front waits before a junction [m].
+
+    :param clear: the same to where its front has to be for its rear to leave the junction before.
+    """
     own = lines[way.lane[i, step]]
     if own <= entry - 0.5:
         return float(way.offset[i, step] + own)
-    hold = hold_before(entry) + way.offset[i, step]
+    hold = max(hold_before(entry), min(clear - way.offset[i, step], entry - 1.0))
+    hold += way.offset[i, step]
     if step > 0:
         line = lines[way.lane[i, step - 1]]
         if math.isfinite(line):

@@ -224,9 +224,10 @@ def obstacles(pairs: Pairs, standing: NDArray[np.bool_], count: int) -> FloatArr
 
 
 @compiled
-def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntArray, IntArray]:
+def nearest(pairs: Pairs, entries: Entries,
+            count: int) -> tuple[FloatArray, IntArray, IntArray]:
     """
-    Find the leader of each agent.
+    Find the leader of each agent: none that crosses its lane where its front has passed already.
 
     :return: the gap (count), the leader as in `AgentTable.leader` (count) and its row of `Entries`
         (count); inf, `FREE` and -1 without one.
@@ -234,10 +235,9 @@ def nearest(pairs: Pairs, owner: IntArray, count: int) -> tuple[FloatArray, IntA
     gap, leader = np.full(count, np.inf), np.full(count, FREE, np.int64)
     entry = np.full(count, -1, np.int64)
     for p in range(len(pairs.agent)):
-        i = pairs.agent[p]
-        if pairs.gap[p] < gap[i]:
-            gap[i], entry[i] = pairs.gap[p], pairs.entry[p]
-            leader[i] = owner[entry[i]]
+        i, n = pairs.agent[p], pairs.entry[p]
+        if pairs.gap[p] < gap[i] and not (entries.crosses[n] and pairs.gap[p] < 0.0):
+            gap[i], entry[i], leader[i] = pairs.gap[p], n, entries.owner[n]
     return gap, leader, entry
 
 

@@ -230,7 +230,7 @@ class Spawner:
         way = own_ways(lanes, self._routes.next, agents.table, slots)
         pairs = ahead(lanes, entries, way, corridors(agents.table, slots, middle, middle),
                       np.empty(0))
-        gap, _, entry = nearest(pairs, entries.owner, len(slots))
+        gap, _, entry = nearest(pairs, entries, len(slots))
         speed = np.zeros(len(slots))
         speed[entry >= 0] = entries.speed[entry[entry >= 0]]
         return gap, speed

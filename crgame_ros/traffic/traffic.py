@@ -76,6 +76,8 @@ TAPER_COST = 250.0
 CLOSE = 1.3
 # An agent with a smaller gap than this to its leader waits for it [m].
 QUEUE = 12.0
+# No agent is removed nearer than this to a driven vehicle [m].
+SIGHT = 150.0
 NO_REFERENCE = np.empty(0)
 
 
@@ -199,7 +201,7 @@ class Traffic:
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
             self._changes.finish(others.k, agents)
-            self._leave(others.k, slots)
+            self._leave(others, slots)
         self._adopt(others.k + 1, bodies)
         self._spawner.arrive(others.k + 1, agents, bodies)
 
@@ -221,7 +223,7 @@ class Traffic:
         agents, long, lanes = self._agents, self._longitudinal, self._graph.table
         way, corridor, pairs = self._find_leaders(slots, entries)
         desired, limit = long.speeds(way, agents, slots)
-        gap, leader, _ = nearest(pairs, entries.owner, len(slots))
+        gap, leader, _ = nearest(pairs, entries, len(slots))
         followers = self._followers.for_agents(slots)
         wanted = np.asarray(followers.desired_gap(agents.speed[slots]), float)
         note_leaders(agents.table, slots, gap, leader, wanted, self._fading,
@@ -252,7 +254,7 @@ class Traffic:
         entries = place(self._graph.table, self._cells.table, with_agents(bodies, agents.table))
         way, _, pairs = self._find_leaders(slots, entries)
         desired, _ = self._longitudinal.speeds(way, agents, slots)
-        gap, _, _ = nearest(pairs, entries.owner, len(slots))
+        gap, _, _ = nearest(pairs, entries, len(slots))
         halts = self._junctions(k, slots, way, entries, pairs, desired, gap, 0.0)
         self._spawner.slow_down(agents, slots, desired, halts, newcomers)
 
@@ -327,14 +329,17 @@ class Traffic:
                 int(agents.lane[slot]), int(agents.destination[slot]), self._random,
                 is_long(float(agents.length[slot])))
 
-    def _leave(self, k: int, slots: IntArray) -> None:
+    def _leave(self, others: WorldView, slots: IntArray) -> None:
         """Remove agents that have left the map, and draw new destinations where needed."""
         agents, routes = self._agents, self._routes
         gone, lost = leaving(self._graph.table, routes.next, routes.cost, routes.is_exit,
                              agents.table, slots)
-        agents.remove(gone, k)
+        agents.remove(gone, others.k)
         stuck = hopeless(agents.table, slots, self._last_resort)
-        agents.remove(stuck, k)
+        away = np.hypot(agents.x[stuck, None] - others.poses[self._others.driven, 0],
+                        agents.y[stuck, None] - others.poses[self._others.driven, 1])
+        stuck = stuck[~(away < SIGHT).any(axis=1)]
+        agents.remove(stuck, others.k)
         self.taken_off += len(stuck)
         for slot in lost.tolist():
             agents.destination[slot] = routes.draw(

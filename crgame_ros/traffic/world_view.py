@@ -56,13 +56,16 @@ class Others:
     :param descriptions: type and shape of each, in the order of every `WorldView`.
     :param time_step_s: Delta t_c [s]
 
-    Attributes `drives` (O): whether it is a vehicle that follows lanes; `widths` (O) [m].
+    Attributes `drives` (O): whether it is a vehicle that follows lanes; `driven` (O): whether a
+    human or a planner drives it; `widths` (O) [m].
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
         self._descriptions = tuple(descriptions)
         self.drives: NDArray[np.bool_] = np.array(
             [x.role is not Role.STATIC and x.type in VEHICLES for x in descriptions], dtype=bool)
+        self.driven: NDArray[np.bool_] = np.array(
+            [x.role.is_ego for x in descriptions], dtype=bool)
         self.widths: FloatArray = np.array([x.shape.width for x in descriptions], dtype=float)
         self._parked = np.array([x.role is Role.STATIC or x.type in PARKED
                                  for x in descriptions], dtype=bool)

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Agents that wait for each other in a circle."""
+
+import math
+
+from commonroad.scenario.scenario import Scenario
+from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.traffic import SIGHT
+from crgame_ros.traffic.waiting import LAST_RESORT
+import numpy as np
+from traffic_support import CAR, driving, human, lane_strip, roads, Run
+
+RADIUS, PARTS = 14.0, 4
+# Near enough that no agent sets off, and far enough apart to be placed [m].
+STANDSTILL_GAP = 4.0
+SPACING = CAR.length + 3.2
+
+
+def ring() -> Scenario:
+    """Return a ring with one way in, and none out."""
+    turn = 2.0 * math.pi / PARTS
+    way_in = lane_strip(9, [(RADIUS, y) for y in np.linspace(-40.0, 0.0, 30)], successor=[1])
+    return roads(way_in, *(lane_strip(
+        1 + i, [(RADIUS * math.cos(a), RADIUS * math.sin(a))
+                for a in np.linspace(i * turn, (i + 1) * turn, 40)],
+        successor=[1 + (i + 1) % PARTS],
+        predecessor=[1 + (i - 1) % PARTS, *([9] if i == 0 else [])]) for i in range(PARTS)))
+
+
+def full_ring() -> list[Adopted]:
+    count = int(2.0 * math.pi * RADIUS / SPACING)
+    angles = np.arange(count) * 2.0 * math.pi / count
+    return [driving(10 + i, [(RADIUS * math.cos(a), RADIUS * math.sin(a), a + 0.5 * math.pi)
+                             for a in (angle, angle + 0.3)], 0.0)
+            for i, angle in enumerate(angles)]
+
+
+def test_a_circle_that_no_agent_can_open_loses_one_only_out_of_a_drivers_sight() -> None:
+    """The driver is in sight at first, then too far away."""
+    ticks = round(LAST_RESORT / 0.1) + 50
+    near = human(SIGHT - RADIUS - 5.0, 0.0, 0.0, until=ticks)
+    far = human(SIGHT + RADIUS + 5.0, 0.0, 0.0)
+    spec = TrafficSpec(options={'standstill_gap': STANDSTILL_GAP})
+    run = Run(ring(), spec, 0, [near, far], full_ring())
+    count = np.isfinite(run.poses[0][:, 0]).sum()
+    assert count > 10
+    run.ticks(ticks)
+    assert np.isfinite(run.poses[-1][:, 0]).sum() == count and run.traffic.taken_off == 0
+    run.ticks(1)
+    assert np.isfinite(run.poses[-1][:, 0]).sum() == count - 1 and run.traffic.taken_off == 1
+    run.ticks(100)
+    moved = np.hypot(*(run.poses[-1] - run.poses[ticks])[:, :2].T)
+    assert np.nanmax(moved) > 1.0 and run.traffic.taken_off == 1
