@@ -13,7 +13,7 @@ machine lacks (ros2, rviz2, a wheel) are named as not run.
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
@@ -49,6 +49,8 @@ NOT_RUN: dict[str, Callable[[], str | bool]] = {
     r'evdev:G29|--driver auto': lambda: not any(Path('/dev/input').glob('event*'))
     and 'no device here',
 }
+
+ENDINGS = (signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass
@@ -99,12 +101,12 @@ class Shell:
 
     def _started(self, script: str, number: int) -> subprocess.Popen[bytes]:
         environment = {key: value for key, value in os.environ.items() if KEPT.match(key)}
-        with self._log(number).open('wb') as output:
+        with self._log(number).open('wb') as output, _whole():
             process = subprocess.Popen(
                 ['bash', '--noprofile', '--norc', '-c', script], cwd=ROOT, env=environment,
                 stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                 start_new_session=True)
-        self.running.append(process)
+            self.running.append(process)
         return process
 
     def _interrupt_when_up(self, process: subprocess.Popen[bytes]) -> None:
@@ -146,9 +148,10 @@ class Shell:
         for process in self.running:
             os.killpg(process.pid, signal.SIGINT)
         for process in self.running:
-            try:
+            with suppress(subprocess.TimeoutExpired):
                 process.wait(PATIENCE_S)
-            except subprocess.TimeoutExpired:
+            # A shell that waits for a command may outlive the interrupt, and its parent.
+            with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
 
     def _remember_run(self) -> None:
@@ -159,6 +162,21 @@ class Shell:
             self.places['runs/NAME'] = self.places['runs/<run>'] = f'runs/{newest.name}'
             self.places['my_bag'] = f'runs/{newest.name}/bag'
             self.places['other_planners.yaml'] = f'runs/{newest.name}/game.yaml'
+
+
+@contextmanager
+def _whole() -> Iterator[None]:
+    """Do all of a block before a signal ends the trial: no process is forgotten as it starts."""
+    came: list[int] = []
+    before = {ending: signal.getsignal(ending) for ending in ENDINGS}
+    for ending in ENDINGS:
+        if before[ending] != signal.SIG_IGN:
+            signal.signal(ending, lambda number, _: came.append(number))
+    yield
+    for ending in ENDINGS:
+        signal.signal(ending, before[ending])
+    if came:
+        sys.exit(128 + came[0])
 
 
 def blocks(text: str, language: str) -> Iterator[str]:
@@ -203,7 +221,7 @@ def main(arguments: Sequence[str]) -> int:
     values = parser.parse_args(arguments)
     if values.without:
         NOT_RUN[values.without] = lambda: 'left out'
-    for ending in (signal.SIGTERM, signal.SIGHUP):
+    for ending in ENDINGS:
         if signal.getsignal(ending) != signal.SIG_IGN:  # as under nohup
             signal.signal(ending, lambda number, _: sys.exit(128 + number))
     with tempfile.TemporaryDirectory() as name, \
