@@ -7,14 +7,16 @@ Drives CommonRoad files with traffic alone, recorded vehicles as agents, and loo
 not happen, in nothing but states at each scenario time step and the file (package `judge` beside
 this file; it uses no code of crgame_ros): overlaps, lines crossed at red, lateral acceleration,
 vehicles off the road, stands that no light, queue or human explains, braking beyond 4 m/s^2,
-jerk, lane changes undone within 12 s. The exit code is 1 where a demand is not met.
+jerk, rights of way that were taken, lane changes undone within 12 s. The exit code is 1 where a
+demand is not met.
 
 Columns: overlaps (there when placed / recorded so / struck while standing), red (could not stop:
 more than 3 m/s^2 from when the light left green, in the first 3 s), lateral p99 and max [m/s^2],
 off the road: events (placed there) and furthest [m], stands beyond 90 s unexplained (behind what
 is no agent and stands), braking beyond 4 m/s^2: events and share of driven time [per mille],
-jerk p99 and max [m/s^3], lane changes and those undone, agents spawned and left,
-mean number and speed [m/s].
+jerk p99 and max [m/s^3], forced to brake hard by one that had to yield (drove over a crossing
+before a person), lane changes and those undone, agents spawned and left, mean number and speed
+[m/s].
 """
 
 import argparse
@@ -35,7 +37,7 @@ from traffic_drive import drive
 ROOT = Path(__file__).resolve().parents[1]
 HEADER = (f'{"map":34}{"seed":>5}{"overlaps":>14}{"red":>8}{"lat p99":>9}{"max":>6}'
           f'{"off road":>12}{"stands":>8}{"brakes":>7}{"‰":>7}{"jerk":>6}{"max":>7}'
-          f'{"changes":>12}{"spawned":>9}{"left":>6}{"agents":>8}'
+          f'{"forced":>8}{"changes":>12}{"spawned":>9}{"left":>6}{"agents":>8}'
           f'{"m/s":>6}{"drive s":>9}{"judge s":>8}')
 
 
@@ -73,11 +75,12 @@ def row(name: str, seed: str, found: Verdict) -> str:
     red = f'{n["red"]} ({n["red unavoidable"]})'
     off = f'{n["off road"]} ({n["off road placed"]})'
     stands = f'{n["unexplained"]} ({n["blocked"]})'
+    forced = f'{n["forced"]} ({n["zebra"]})'
     changes = f'{found.changes} ({n["undone"]})'
     return (f'{name:34}{seed:>5}{overlaps:>14}{red:>8}{found.lateral_p99:9.2f}'
             f'{found.lateral_max:6.1f}{off:>7}{found.off_road_max:5.2f}{stands:>8}'
             f'{n["braking"]:7}{1e3 * found.hard_share:7.2f}{found.jerk_p99:6.1f}'
-            f'{found.jerk_max:7.1f}{changes:>12}{found.spawned:9}{found.left:6}'
+            f'{found.jerk_max:7.1f}{forced:>8}{changes:>12}{found.spawned:9}{found.left:6}'
             f'{found.mean_agents:8.1f}{found.mean_speed:6.1f}')
 
 

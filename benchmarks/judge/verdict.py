@@ -11,12 +11,13 @@ from judge.history import Event, History
 from judge.lights import red_lines
 from judge.motion import accelerations, HARD, jerks, jumps, lateral, MOVES, off_road, peaks
 from judge.overlaps import overlaps
+from judge.right_of_way import taken_priority, zebra
 from judge.roads import JudgedRoads
 from judge.standing import stands
 import numpy as np
 
 # Events that must not happen at all.
-FORBIDDEN = ('overlap', 'red', 'off road', 'unexplained', 'jump', 'vanished')
+FORBIDDEN = ('overlap', 'red', 'off road', 'unexplained', 'jump', 'vanished', 'forced', 'zebra')
 LATERAL_P99 = 2.5
 HARD_SHARE = 1e-4
 # An agent that leaves does so this near to an end of the map [m].
@@ -82,10 +83,12 @@ def judge(history: History, roads: JudgedRoads, recording: History | None = None
     """
     agents = history.agents
     away_events, away = off_road(history, roads)
-    count, undone = changes(history, roads, lanes_of(history, roads))
+    lanes = lanes_of(history, roads)
+    count, undone = changes(history, roads, lanes)
     events = [*overlaps(history, recording), *red_lines(history, roads), *away_events, *undone,
               *peaks(history), *jumps(history), *stands(history, roads),
-              *hard_brakings(history, roads), *vanished(history, roads)]
+              *hard_brakings(history, roads), *vanished(history, roads),
+              *taken_priority(history, roads, lanes), *zebra(history, roads)]
     here, speed = history.present[:, :agents], history.speed[:, :agents]
     aside, jerk, change = lateral(history), np.abs(jerks(history)), accelerations(history)
     drives = here[:-1] & (np.abs(speed[:-1]) > MOVES)

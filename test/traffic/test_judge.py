@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 from commonroad.scenario.intersection import Intersection, IntersectionIncomingElement
+from commonroad.scenario.lanelet import LaneletType
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.traffic_light import (
     TrafficLight,
@@ -17,10 +18,13 @@ from commonroad.scenario.traffic_light import (
     TrafficLightDirection,
     TrafficLightState,
 )
+from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, TrafficSignIDGermany
+from judge.changes import lanes_of
 from judge.history import FloatArray, History
 from judge.lights import red_lines
 from judge.motion import lateral, off_road
 from judge.overlaps import overlaps, touching
+from judge.right_of_way import taken_priority, zebra
 from judge.roads import JudgedRoads
 from judge.standing import stands
 from judge.verdict import judge
@@ -50,8 +54,12 @@ def seen(*tracks: FloatArray, sizes: Sequence[tuple[float, float]] = (), others:
 def along(points: Sequence[tuple[float, float]], speed: float, seconds: float,
           start: float = 0.0) -> FloatArray:
     """Drive along a polyline at a speed; vehicles that reach its end disappear."""
+    return placed(points, start + speed * DT * np.arange(round(seconds / DT) + 1))
+
+
+def placed(points: Sequence[tuple[float, float]], s: FloatArray) -> FloatArray:
+    """Return the poses at arc lengths of a polyline, absent from its end on."""
     line = shapely.LineString(points)
-    s = start + speed * DT * np.arange(round(seconds / DT) + 1)
     place = shapely.get_coordinates(shapely.line_interpolate_point(line, s))
     ahead = shapely.get_coordinates(shapely.line_interpolate_point(line, s + 0.1))
     behind = shapely.get_coordinates(shapely.line_interpolate_point(line, s - 0.1))
@@ -294,3 +302,116 @@ def test_clean_traffic_breaks_nothing(straight: JudgedRoads) -> None:
     assert (found.spawned, found.left) == (0, 3)
     gone = judge(seen(np.concatenate((first[:50], np.full((100, 3), np.nan)))), straight)
     assert gone.broken == ['1 vanished']
+
+
+EASTWARD, NORTHWARD = [(-70.0, 0.0), (70.0, 0.0)], [(0.0, -70.0), (0.0, 70.0)]
+WESTWARD, SOUTHWARD = [(70.0, 3.5), (-70.0, 3.5)], [(-3.5, 70.0), (-3.5, -70.0)]
+LEFT_TURN = [(-70.0, 0.0), (-4.0, 0.0), (1.0, 2.0), (3.0, 7.0), (3.0, 70.0)]
+
+
+def crossing(**signs: TrafficSignIDGermany) -> JudgedRoads:
+    """
+    Make two roads that cross, and a left turn from the west.
+
+    :param signs: at the ends of the ways in, by where they come from.
+    """
+    lanes, ways_in = [], {}
+    for number, (name, line) in enumerate((
+            ('west', EASTWARD), ('south', NORTHWARD), ('east', WESTWARD), ('north', SOUTHWARD))):
+        first = 10 * (number + 1)
+        ways_in[name] = first
+        points = shapely.LineString(line)
+        pieces = [shapely.get_coordinates(shapely.line_interpolate_point(
+            points, np.linspace(*ends, 20))) for ends in ((0, 62), (62, 80), (80, 140))]
+        lanes += [lane_strip(first + i, piece.tolist(), 3.5,
+                             successor=[first + i + 1] if i < 2 else [],
+                             predecessor=[first + i - 1] if i else [])
+                  for i, piece in enumerate(pieces)]
+    lanes[0].successor.append(50)
+    lanes.append(lane_strip(50, [(-8.0, 0.0), *LEFT_TURN[1:4]], 3.0, predecessor=[10],
+                            successor=[51]))
+    lanes.append(lane_strip(51, LEFT_TURN[3:], 3.0, predecessor=[50]))
+    network = roads(*lanes).lanelet_network
+    for number, (name, kind) in enumerate(signs.items()):
+        network.add_traffic_sign(TrafficSign(
+            90 + number, [TrafficSignElement(kind)], {ways_in[name]}, np.zeros(2)),
+            {ways_in[name]})
+    return JudgedRoads(network)
+
+
+def drives_in(points: Sequence[tuple[float, float]], braking: float) -> FloatArray:
+    """Drive at 10 m/s for 3 s, to 10 m before the middle of a line, and brake from then on."""
+    t = DT * np.arange(61)
+    late = np.clip(t - 3.0, 0.0, 10.0 / max(braking, 1e-9))
+    return placed(points, 30.0 + 10.0 * np.minimum(t, 3.0) + 10.0 * late - 0.5 * braking * late**2)
+
+
+FIRST, YIELD = TrafficSignIDGermany.PRIORITY, TrafficSignIDGermany.YIELD
+STOP = TrafficSignIDGermany.STOP
+
+
+@pytest.mark.parametrize(('other', 'signs', 'rule'), [
+    (NORTHWARD, {}, 'from the right'), (SOUTHWARD, {}, ''),
+    (NORTHWARD, {'west': YIELD}, 'sign'), (SOUTHWARD, {'west': YIELD, 'north': FIRST}, 'sign'),
+    (NORTHWARD, {'west': FIRST, 'south': YIELD}, ''), (NORTHWARD, {'south': STOP}, ''),
+    (NORTHWARD, {'west': STOP, 'south': STOP}, '')])
+@pytest.mark.parametrize('braking', [0.0, 7.0])
+def test_who_takes_the_right_of_way_is_told_by_signs_or_sides(
+        other: Sequence[tuple[float, float]], signs: dict[str, TrafficSignIDGermany], rule: str,
+        braking: float) -> None:
+    """The first is in the crossing as the other is a second from it; only braking tells."""
+    one = along(EASTWARD, 8.0, 6.0, 40.0 if other is SOUTHWARD else 43.0)
+    found, ways_in = seen(one, drives_in(other, braking)), crossing(**signs)
+    events = taken_priority(found, ways_in, lanes_of(found, ways_in))
+    assert [(x.what, x.ids, x.note.split(':')[0]) for x in events] == (
+        [('forced', ('t1', 't0'), rule)] if rule and braking else [])
+
+
+@pytest.mark.parametrize(('turns', 'count'), [(LEFT_TURN, 1), (EASTWARD, 0)])
+def test_a_left_turn_takes_the_right_of_way_of_oncoming_traffic(
+        turns: Sequence[tuple[float, float]], count: int) -> None:
+    found, ways_in = seen(along(turns, 8.0, 6.0, 44.0), drives_in(WESTWARD, 7.0)), crossing()
+    events = taken_priority(found, ways_in, lanes_of(found, ways_in))
+    assert [x.note.split(':')[0] for x in events] == count * ['oncoming']
+
+
+def test_the_needed_braking_is_that_of_a_body_that_arrives_as_the_other_leaves() -> None:
+    """The first is on the other's 3.5 m for 1 s; the other has 6 m left at 10 m/s."""
+    found, ways_in = seen(along(EASTWARD, 8.0, 6.0, 42.0), drives_in(NORTHWARD, 7.0)), crossing()
+    event, = taken_priority(found, ways_in, lanes_of(found, ways_in))
+    # 10 m/s * 1 s - a / 2 * (1 s)^2 = 6 m.
+    assert event.at_s == pytest.approx(3.0, abs=DT) and event.value == pytest.approx(8.0, rel=0.2)
+
+
+def test_a_roundabout_is_found_and_goes_first() -> None:
+    angles = np.linspace(0.0, 0.5 * np.pi, 20)
+    ring = [lane_strip(1 + i, [(20.0 * np.cos(a), 20.0 * np.sin(a)) for a in
+                               angles + 0.5 * np.pi * i], 4.0, successor=[1 + (i + 1) % 4],
+                       predecessor=[1 + (i - 1) % 4]) for i in range(4)]
+    ring[0].predecessor.append(9)
+    entry = [(40.0, -40.0), (26.0, -26.0), (21.0, -12.0), (20.0, 0.0)]
+    inside = lane_strip(9, entry[1:], 3.5, predecessor=[8], successor=[1])
+    ways_in = JudgedRoads(roads(lane_strip(8, entry[:2], 3.5, successor=[9]), inside,
+                                *ring).lanelet_network)
+    circle = [(20.0 * np.cos(a), 20.0 * np.sin(a)) for a in np.linspace(-3.0, 3.0, 200)]
+    t = DT * np.arange(61)
+    late = np.clip(t - 3.0, 0.0, 10.0 / 6.0)
+    rounds = placed(circle, 15.5 + 10.0 * np.minimum(t, 3.0) + 10.0 * late - 3.0 * late**2)
+    found = seen(along(entry, 5.0, 6.0, 19.0), rounds)
+    event, = taken_priority(found, ways_in, lanes_of(found, ways_in))
+    assert event.ids == ('t1', 't0') and event.note.startswith('roundabout')
+
+
+@pytest.mark.parametrize(('walker_y', 'speed', 'count'), [
+    (0.5, 8.0, 1), (-2.2, 8.0, 1), (-4.0, 8.0, 0), (0.5, 0.5, 0)])
+def test_driving_over_a_crossing_before_a_person_is_found(
+        walker_y: float, speed: float, count: int) -> None:
+    """The person walks to the left at 1.4 m/s, from the right of the agent that drives along x."""
+    scenario = roads(straight_lane(1, 0.0, -60.0, 60.0), lane_strip(
+        2, [(0.0, -8.0), (0.0, 8.0)], 3.0, lanelet_type={LaneletType.CROSSWALK}))
+    drives = along([(-60.0, 0.0), (60.0, 0.0)], speed, 2.0, 60.0 - speed)
+    t = DT * np.arange(21) - 1.0
+    walks = np.column_stack((0.0 * t, walker_y + 1.4 * t, 0.0 * t + 0.5 * np.pi))
+    walks[np.abs(t) > 0.25] = np.nan
+    found = seen(drives, walks, kinds=['car', 'pedestrian'], others=1)
+    assert len(zebra(found, JudgedRoads(scenario.lanelet_network))) == count
