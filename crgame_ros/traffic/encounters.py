@@ -126,7 +126,7 @@ def _brushed(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: in
     if (goes_first and agents.speed[other] > CREEP) or mine < 0.0 or _touch(
             lanes, following, agents, slot, speed, other, 0.0, BRUSH_TIME,
             BRUSH_BESIDE) == math.inf or _touch(
-            lanes, following, agents, slot, speed, other, 0.0, 0.0, BRUSH_BESIDE) < math.inf:
+            lanes, following, agents, slot, speed, other, 0.0, 0.0, 0.0) < math.inf:
         return math.inf
     agents.blocker[slot] = other
     if agents.speed[slot] < CREEP:
@@ -208,17 +208,17 @@ def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
     :param foreseen: time of the prediction [s]; 0 checks whether they touch now.
     :param beside: room around each [m]
     """
-    mine, theirs = _start(lanes, agents, slot), _start(lanes, agents, other)
+    mine, theirs = start_of(lanes, agents, slot), start_of(lanes, agents, other)
     onset = ONSET if braking <= SMOOTH else 0.0
     slows = max(-agents.acceleration[other], 0.0)
     before = BEFORE * beside
     for step in range(min(1, int(foreseen / STEP)), int(foreseen / STEP) + 1):
         t = step * STEP
         way = speed * min(t, onset) + _rolled(speed, braking, max(t - onset, 0.0))
-        x, y, yaw = _pose_after(lanes, following, agents, slot, mine, way)
-        other_x, other_y, other_yaw = _pose_after(
+        x, y, yaw = pose_after(lanes, following, agents, slot, mine, way)
+        other_x, other_y, other_yaw = pose_after(
             lanes, following, agents, other, theirs, _rolled(agents.speed[other], slows, t))
-        if _overlap(other_x - x, other_y - y, yaw, other_yaw,
+        if overlap(other_x - x, other_y - y, yaw, other_yaw,
                     0.5 * agents.length[slot] + before, 0.5 * agents.width[slot] + beside,
                     0.5 * agents.length[other] + before, 0.5 * agents.width[other] + beside):
             return t
@@ -234,7 +234,7 @@ def _rolled(speed: float, braking: float, time: float) -> float:
 
 
 @inlined
-def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
+def start_of(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
     """Return s of the rear axle, its offset from where it steers for, and its heading error."""
     lane = agents.lane[slot]
     s, d, yaw = project_on(lanes, lane, agents.x[slot], agents.y[slot],
@@ -251,7 +251,7 @@ def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float)
 
 
 @bare
-def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+def pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
                 start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
     """Predict x, y and heading of an agent's centre after a distance on its route [m, rad]."""
     lane, s = onward(lanes, following, agents.destination[slot], agents.lane[slot],
@@ -266,7 +266,7 @@ def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
 
 
 @bare
-def _overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
+def overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
              width: float, other_length: float, other_width: float) -> bool:
     """Return whether two rectangles, given by half their sizes, overlap (separating axes)."""
     cos, sin = abs(math.cos(other_yaw - yaw)), abs(math.sin(other_yaw - yaw))

@@ -52,6 +52,7 @@ from crgame_ros.traffic.spawning import (
     TRUCK,
 )
 from crgame_ros.traffic.stop_lines import StopLines
+from crgame_ros.traffic.swept_paths import SweptPaths
 from crgame_ros.traffic.swerving import Swerving
 from crgame_ros.traffic.tight_lanes import find_tight_lanes
 from crgame_ros.traffic.waiting import (
@@ -128,6 +129,7 @@ class Traffic:
         self._fading = fading(time_step_s)
         # Number of agents removed because they stood in a circle that no agent could open.
         self.taken_off = 0
+        self._swept_paths = SweptPaths(self._graph, self._routes)
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
         self._desired = DesiredSpeeds(spec.speed_factor, spec.speed_spread, self._random)
         self._spawner = Spawner(
@@ -197,7 +199,7 @@ class Traffic:
             entries = place(self._graph.table, self._cells.table, with_agents(
                 bodies, agents.table))
             standing = self._swerve_around(entries, others)
-            acceleration = self._decide(others.k, slots, entries, standing)
+            acceleration = self._decide(others.k, slots, bodies, entries, standing)
             self._motion.move(agents, slots, acceleration, self._swerving.reference,
                               self._substeps)
             self._changes.finish(others.k, agents)
@@ -217,7 +219,7 @@ class Traffic:
                 self._longitudinal.slow_for(self._swerving.speed)
         return standing
 
-    def _decide(self, k: int, slots: IntArray, entries: Entries,
+    def _decide(self, k: int, slots: IntArray, bodies: Bodies, entries: Entries,
                 standing: NDArray[np.bool_]) -> FloatArray:
         """Return the accelerations (A) of the agents; begin lane changes, enter junctions."""
         agents, long, lanes = self._agents, self._longitudinal, self._graph.table
@@ -232,6 +234,7 @@ class Traffic:
         self._mind_left_lanes(slots, desired, entries, standing, acceleration)
         blocked = obstacles(pairs, standing, len(slots))
         halts = self._junctions(k, slots, way, entries, pairs, desired, gap, self._time_step_s)
+        self._swept_paths.halt_before(bodies, agents.table, slots, self._swerving.reference, halts)
         brush(lanes, self._routes.next, agents.table, slots, entries, way, acceleration)
         halt(lanes, self._routes.drops, way, agents.table, slots, halts, blocked,
              self._drivers.change_lanes, acceleration)

@@ -87,7 +87,7 @@ def _compile(say: Callable[[str], None]) -> None:
 @cache
 def drive_everything() -> None:
     """
-    Run traffic with all features: a light, a crossing, a wreck, a parked car, people, a recording.
+    Run traffic with all features: a light, a crossing, a wreck, a parked car, people, recordings.
 
     Compiled code is loaded when it first runs, which takes a second, too long for a tick. This
     runs once in a process.
@@ -107,9 +107,12 @@ def drive_everything() -> None:
 
     recorded = ObjectDescription('o1', 'car', Role.RECORDED, Shape.rectangle(4.5, 1.8))
     track = np.array([[0.0, -60.0, 0.5 * np.pi], [0.0, 100.0, 0.5 * np.pi]])
-    adopted = Adopted(recorded, 5, track, np.array([[0.0, 9.0, 0.0]] * 2))
+    bus = ObjectDescription('o2', 'bus', Role.RECORDED, Shape.rectangle(12.0, 2.5))
+    bend = np.array([[300.0, 3.4, 0.34], [340.0, 60.0, 0.5 * np.pi]])
+    adopted = (Adopted(recorded, 5, track, np.array([[0.0, 9.0, 0.0]] * 2)),
+               Adopted(bus, 5, bend, np.array([[5.0, 0.0, 0.0]] * 2)))
     traffic = Traffic(TrafficSpec(agents=14, flow=1800.0, capacity=40),
-                      RoadNetwork(scenario.lanelet_network), scenario, others, (adopted,), 0.1,
+                      RoadNetwork(scenario.lanelet_network), scenario, others, adopted, 0.1,
                       10, 0, 0, world(0))
     for k in range(TICKS):
         traffic.advance(world(k))
@@ -134,7 +137,7 @@ def drive_where_a_lane_ends() -> None:
 
 
 def crossroads() -> Scenario:
-    """Return two parallel lanes to the east, the right one with a light, and one to the north."""
+    """Return two lanes to the east, the right one with a light, one to the north, and a bend."""
     result = Scenario(0.1)
     x = np.linspace(-200.0, 200.0, 81)
     level = np.zeros_like(x)
@@ -143,7 +146,9 @@ def crossroads() -> Scenario:
                                LineMarking.SOLID, set(), {LIGHT})
     right.add_traffic_light_to_lanelet(LIGHT)
     left = _lanelet(2, x, level, adjacent_right=1, adjacent_right_same_direction=True)
-    result.add_objects([right, left, _lanelet(3, level, x)])
+    turn = np.linspace(0.0, 0.5 * np.pi, 60)
+    bend = _lanelet(4, 280.0 + 60.0 * np.sin(turn), 60.0 - 60.0 * np.cos(turn))
+    result.add_objects([right, left, _lanelet(3, level, x), bend])
     cycle = TrafficLightCycle([TrafficLightCycleElement(TrafficLightState.GREEN, 10)], 0, True)
     result.add_objects(TrafficLight(LIGHT, np.array([-15.0, -6.0]), cycle), {1})
     return result
