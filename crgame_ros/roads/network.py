@@ -3,7 +3,6 @@
 """The road network: lookups and geometry of lanes, fast on maps of thousands of lanelets."""
 
 from collections.abc import Iterable, Sequence
-import math
 
 from commonroad.common.common_lanelet import LaneletType, RoadUser
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
@@ -11,7 +10,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.geometry.angles import wrap_pi, wrap_pi_array
 from crgame_ros.geometry.curve import Curve
 from crgame_ros.geometry.polyline import EQUAL_DIGITS
-from crgame_ros.roads.signs import MAX_SPEED, sign_elements
+from crgame_ros.roads.signs import LIMITS, sign_elements, speed_limit_of
 from crgame_ros.roads.surface import lanelet_areas
 import numpy as np
 from numpy.typing import NDArray
@@ -232,11 +231,10 @@ class RoadNetwork:
 
     def speed_limit(self, lanelet_id: int) -> float | None:
         """Return the lowest speed limit of the lanelet's traffic signs [m/s], None without one."""
-        limits = []
-        for element in sign_elements(self._lanelet(lanelet_id), self.lanelet_network, False):
-            if element.traffic_sign_element_id.name == MAX_SPEED:
-                limits += _positive_numbers(element.additional_values[:1])
-        return min(limits, default=None)
+        elements = sign_elements(self._lanelet(lanelet_id), self.lanelet_network, False)
+        limits = [speed_limit_of(element) for element in elements
+                  if element.traffic_sign_element_id.name in LIMITS]
+        return min((limit for limit in limits if limit is not None), default=None)
 
     def is_drivable(self, lanelet_id: int, vehicle_type: str | None = None) -> bool:
         """
@@ -331,15 +329,3 @@ def _is_for_bicycles(lanelet: Lanelet) -> bool:
 def _is_for_people(lanelet: Lanelet) -> bool:
     users = lanelet.user_one_way | lanelet.user_bidirectional
     return RoadUser.PEDESTRIAN in users or bool(lanelet.lanelet_type & _FOR_PEOPLE)
-
-
-def _positive_numbers(texts: Sequence[str]) -> list[float]:
-    numbers = []
-    for text in texts:
-        try:
-            value = float(text)
-        except (TypeError, ValueError):
-            continue
-        if math.isfinite(value) and value > 0.0:
-            numbers.append(value)
-    return numbers

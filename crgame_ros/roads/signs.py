@@ -3,6 +3,7 @@
 """The signs and lights of a lanelet: its own, and those of its stop line."""
 
 from collections.abc import Iterable, Iterator
+import math
 
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork
 from commonroad.scenario.traffic_light import TrafficLight, TrafficLightDirection
@@ -11,6 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 STOP, MAX_SPEED = 'STOP', 'MAX_SPEED'
+# The kinds of signs that have an effect: on the speed, and on the right of way.
+LIMITS = frozenset({MAX_SPEED, 'MAX_SPEED_ZONE_START'})
+YIELDING = frozenset({STOP, 'YIELD', 'ROUNDABOUT'})
+PRIORITY = frozenset({'PRIORITY', 'RIGHT_OF_WAY'})
+HEEDED = LIMITS | YIELDING | PRIORITY
 
 
 def sign_elements(lanelet: Lanelet, roads: LaneletNetwork,
@@ -40,6 +46,15 @@ def sign_names(lanelet: Lanelet, roads: LaneletNetwork) -> set[str]:
 
 def _names(elements: Iterable[TrafficSignElement]) -> set[str]:
     return {element.traffic_sign_element_id.name for element in elements}
+
+
+def speed_limit_of(element: TrafficSignElement) -> float | None:
+    """Return the speed limit that a sign of `LIMITS` sets [m/s], None if it names no number."""
+    try:
+        value = float(element.additional_values[0])
+    except (IndexError, TypeError, ValueError):
+        return None
+    return value if math.isfinite(value) and value > 0.0 else None
 
 
 def has_stop_sign(lanelet: Lanelet, roads: LaneletNetwork) -> bool:

@@ -14,7 +14,7 @@ from commonroad.scenario.traffic_sign import (
     TrafficSignIDZamunda,
 )
 from crgame_ros.errors import InputError
-from crgame_ros.roads.signs import MAX_SPEED
+from crgame_ros.roads.signs import LIMITS, MAX_SPEED
 
 
 def with_own_roads(scenario: Scenario) -> Scenario:
@@ -59,7 +59,7 @@ def _drop_limits(network: LaneletNetwork, lanelet: Lanelet) -> None:
         sign = network.find_traffic_sign_by_id(sign_id)
         others = [] if sign is None else [
             element for element in sign.traffic_sign_elements
-            if element.traffic_sign_element_id.name != MAX_SPEED]
+            if element.traffic_sign_element_id.name not in LIMITS]
         if sign is None or len(others) == len(sign.traffic_sign_elements):
             continue
         lanelet.traffic_signs = lanelet.traffic_signs - {sign_id}

@@ -3,20 +3,25 @@
 """What a scenario says beyond what the simulation uses, for the user."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from commonroad.common.util import Interval
 from commonroad.geometry.shape import Circle, Polygon, Rectangle, Shape, ShapeGroup
 from commonroad.prediction.prediction import SetBasedPrediction, TrajectoryPrediction
+from commonroad.scenario.lanelet import LaneletNetwork, LaneletType
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle, PhantomObstacle
 from commonroad.scenario.scenario import Scenario, Underground, Weather
 from commonroad.scenario.state import State
+from crgame_ros.roads.signs import HEEDED, LIMITS, speed_limit_of
 import numpy as np
 
 _LISTED = 6
 _FALLING = frozenset({Weather.LIGHT_RAIN, Weather.MID_RAIN, Weather.HEAVY_RAIN, Weather.SNOW,
                       Weather.HAIL})
 _SLIPPERY = frozenset({Underground.WET, Underground.SNOW, Underground.ICE})
+_LANELETS = {LaneletType.BUS_LANE: 'cars use the bus lane as well',
+             LaneletType.CROSSWALK: 'vehicles wait for people who walk there, but not for those '
+                                    'who stand before it'}
 # Occupancies whose extents differ by less have one shape [m].
 _SAME = 1e-3
 
@@ -33,9 +38,37 @@ def simplifications(scenario: Scenario) -> list[str]:
     for obstacle in scenario.obstacles:
         for text in _of(obstacle):
             found[text].append(int(obstacle.obstacle_id))
-    return [*_of_environment(scenario),
-            *(f'obstacle{"s" * (len(ids) > 1)} {_listed(sorted(ids))}: {text}'
-              for text, ids in found.items())]
+    return [*_of_environment(scenario), *_grouped('obstacle', found),
+            *_grouped('lanelet', _of_lanelets(scenario.lanelet_network)),
+            *_grouped('traffic sign', _of_signs(scenario.lanelet_network))]
+
+
+def _grouped(kind: str, found: Mapping[str, list[int]]) -> list[str]:
+    return [f'{kind}{"s" * (len(ids) > 1)} {_listed(sorted(ids))}: {text}'
+            for text, ids in found.items()]
+
+
+def _of_lanelets(roads: LaneletNetwork) -> dict[str, list[int]]:
+    found: defaultdict[str, list[int]] = defaultdict(list)
+    for lanelet in roads.lanelets:
+        for kind, text in _LANELETS.items():
+            if kind in lanelet.lanelet_type:
+                found[text].append(int(lanelet.lanelet_id))
+    return found
+
+
+def _of_signs(roads: LaneletNetwork) -> dict[str, list[int]]:
+    found: defaultdict[str, list[int]] = defaultdict(list)
+    for sign in roads.traffic_signs:
+        for element in sign.traffic_sign_elements:
+            kind, number = element.traffic_sign_element_id.name, int(sign.traffic_sign_id)
+            if kind not in HEEDED and kind != 'UNKNOWN':
+                found[f'{kind} has no effect'].append(number)
+            if kind in LIMITS and speed_limit_of(element) is None:
+                found['its speed limit is no positive number and is ignored'].append(number)
+            elif kind in LIMITS and len(element.additional_values) > 1:
+                found['only the first value of its speed limit counts'].append(number)
+    return found
 
 
 def _of_environment(scenario: Scenario) -> Iterator[str]:

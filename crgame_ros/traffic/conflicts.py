@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from commonroad.common.common_lanelet import LaneletType
 from crgame_ros.geometry.angles import wrap_pi
-from crgame_ros.roads.signs import sign_names
+from crgame_ros.roads.signs import PRIORITY, sign_names, YIELDING
 from crgame_ros.traffic.compiled import compiled
 from crgame_ros.traffic.lane_graph import DrivingSide, FloatArray, IntArray, LaneGraph, RIGHT_HAND
 from crgame_ros.traffic.movements import LEFT, Movements, RIGHT, UNDECIDED
@@ -40,8 +40,6 @@ JOINING = 1.2
 JOINED, SHORTEST_MERGE = 0.8, 5.0
 # Lanes that merge do so without a turn if the cosine between their beginnings is greater.
 SAME_WAY = 0.9
-_YIELDING = {'YIELD', 'STOP', 'ROUNDABOUT'}
-_PRIORITY = {'PRIORITY', 'RIGHT_OF_WAY'}
 
 
 class ConflictTable(NamedTuple):
@@ -253,9 +251,9 @@ def _rank(graph: LaneGraph, lane: int) -> int:
     while True:
         lanelet = roads.find_lanelet_by_id(graph.ids[current])
         found = sign_names(lanelet, roads)
-        if found & _YIELDING or LaneletType.ACCESS_RAMP in lanelet.lanelet_type:
+        if found & YIELDING or LaneletType.ACCESS_RAMP in lanelet.lanelet_type:
             return 0
-        if found & _PRIORITY:
+        if found & PRIORITY:
             return 2
         before = [int(i) for i in graph.predecessors[current] if i >= 0]
         if len(before) != 1 or distance > SIGN_REACH or before[0] in seen:

@@ -48,11 +48,13 @@ def test_lanelets_that_shared_a_sign_keep_it(street: Scenario) -> None:
     assert [found[lanelet] for lanelet in (11, 12, 22)] == pytest.approx([TOWN] * 3, abs=1e-4)
 
 
-def test_other_signs_on_the_same_post_stay(street: Scenario) -> None:
-    """A post with a limit and a stop sign keeps its stop sign."""
+@pytest.mark.parametrize('kind', [TrafficSignIDZamunda.MAX_SPEED,
+                                  TrafficSignIDZamunda.MAX_SPEED_ZONE_START])
+def test_other_signs_on_the_same_post_stay(kind: TrafficSignIDZamunda, street: Scenario) -> None:
+    """A post with a limit, of a road or a zone, and a stop sign keeps its stop sign."""
     network = street.lanelet_network
     stop, limit = (TrafficSignElement(kind, values) for kind, values in (
-        (TrafficSignIDZamunda.STOP, []), (TrafficSignIDZamunda.MAX_SPEED, ['3.0'])))
+        (TrafficSignIDZamunda.STOP, []), (kind, ['3.0'])))
     network.add_traffic_sign(TrafficSign(999, [stop, limit], {11}, np.zeros(2)), {11})
     assert limits(street)[11] == 3.0
     set_speed_limit(street, 20.0, (11,))

@@ -158,6 +158,12 @@ def location(latitude: str, rest: str = '') -> str:
             f'<gpsLongitude>11</gpsLongitude>{rest}</location>')
 
 
+def limit(*values: str) -> str:
+    """Write a sign for a speed limit."""
+    return SIGN.format(274, '').replace('</trafficSignID>', '</trafficSignID>' + ''.join(
+        f'<additionalValue>{value}</additionalValue>' for value in values))
+
+
 NOTES = {
     'it is of version 2017a and was read as 2018b': scenario().replace('2020a', '2017a'),
     'the malformed benchmark id … is replaced by …':
@@ -220,6 +226,15 @@ NOTES = {
     'incoming … has the id …: the schema wants positive ids':
         scenario('<intersection id="30"><incoming id="2"><incomingLanelet ref="1"/></incoming>'
                  '</intersection>'),
+    'traffic sign …: … has no effect':
+        scenario(SIGN.format(276, ''), '<trafficSignRef ref="5"/>'),
+    'only the first value of its speed limit counts': scenario(
+        limit('13.9', 'wet'), '<trafficSignRef ref="5"/>'),
+    'its speed limit is no positive number and is ignored': scenario(
+        limit('fast'), '<trafficSignRef ref="5"/>'),
+    'vehicles wait for people who walk there, but not for those who stand before it':
+        scenario(inside='<laneletType>crosswalk</laneletType>'),
+    'cars use the bus lane as well': scenario(inside='<laneletType>busLane</laneletType>'),
     'its empty trajectory is ignored': scenario(dynamic('<trajectory/>')),
     'its empty occupancySet is ignored': scenario(dynamic('<occupancySet/>')),
 }
