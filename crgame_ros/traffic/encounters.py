@@ -219,8 +219,8 @@ def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
         other_x, other_y, other_yaw = pose_after(
             lanes, following, agents, other, theirs, _rolled(agents.speed[other], slows, t))
         if overlap(other_x - x, other_y - y, yaw, other_yaw,
-                    0.5 * agents.length[slot] + before, 0.5 * agents.width[slot] + beside,
-                    0.5 * agents.length[other] + before, 0.5 * agents.width[other] + beside):
+                   0.5 * agents.length[slot] + before, 0.5 * agents.width[slot] + beside,
+                   0.5 * agents.length[other] + before, 0.5 * agents.width[other] + beside):
             return t
     return math.inf
 
@@ -252,7 +252,7 @@ def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float)
 
 @bare
 def pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
-                start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
+               start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
     """Predict x, y and heading of an agent's centre after a distance on its route [m, rad]."""
     lane, s = onward(lanes, following, agents.destination[slot], agents.lane[slot],
                      start[0] + way)
@@ -267,8 +267,8 @@ def pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: 
 
 @bare
 def overlap(east: float, north: float, yaw: float, other_yaw: float, length: float,
-             width: float, other_length: float, other_width: float) -> bool:
-    """Return whether two rectangles, given by half their sizes, overlap (separating axes)."""
+            width: float, other_length: float, other_width: float) -> bool:
+    """Return whether two rectangles, given by half their sizes, overlap, by separating axes."""
     cos, sin = abs(math.cos(other_yaw - yaw)), abs(math.sin(other_yaw - yaw))
     for turn, along, aside, their_along, their_aside in (
             (yaw, length, width, other_length, other_width),
