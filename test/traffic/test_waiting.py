@@ -3,6 +3,7 @@
 """Agents that wait for each other in a circle."""
 
 import math
+from pathlib import Path
 
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.traffic_spec import TrafficSpec
@@ -10,6 +11,7 @@ from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.traffic import SIGHT
 from crgame_ros.traffic.waiting import LAST_RESORT
 import numpy as np
+import pytest
 from traffic_support import CAR, driving, human, lane_strip, roads, Run
 
 RADIUS, PARTS = 14.0, 4
@@ -53,3 +55,14 @@ def test_a_circle_that_no_agent_can_open_loses_one_only_out_of_a_drivers_sight()
     run.ticks(100)
     moved = np.hypot(*(run.poses[-1] - run.poses[ticks])[:, :2].T)
     assert np.nanmax(moved) > 1.0 and run.traffic.taken_off == 1
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(('name', 'seed'), [
+    ('BEL_Putte-8_2_T-1', 5), ('ITA_CarpiCentro-9_6_T-1', 2), ('ITA_CarpiCentro-9_6_T-1', 5)])
+def test_no_two_agents_block_each_other_nose_to_nose(name: str, seed: int,
+                                                     shared_scenarios: Path) -> None:
+    """In these, fronts stood a centimetre inside a conflict, or rears in the one before."""
+    path = shared_scenarios / 'more' / f'{name}.xml'
+    drive = Run(path, TrafficSpec(agents=40, flow=400.0), seed).ticks(3000)
+    assert drive.traffic.taken_off == 0
