@@ -13,7 +13,7 @@ machine lacks (ros2, rviz2, a wheel) are named as not run.
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
@@ -148,10 +148,9 @@ class Shell:
         for process in self.running:
             os.killpg(process.pid, signal.SIGINT)
         for process in self.running:
-            with suppress(subprocess.TimeoutExpired):
+            try:
                 process.wait(PATIENCE_S)
-            # A shell that waits for a command may outlive the interrupt, and its parent.
-            with suppress(ProcessLookupError):
+            except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
 
     def _remember_run(self) -> None:
@@ -172,9 +171,11 @@ def _whole() -> Iterator[None]:
     for ending in ENDINGS:
         if before[ending] != signal.SIG_IGN:
             signal.signal(ending, lambda number, _: came.append(number))
-    yield
-    for ending in ENDINGS:
-        signal.signal(ending, before[ending])
+    try:
+        yield
+    finally:
+        for ending in ENDINGS:
+            signal.signal(ending, before[ending])
     if came:
         sys.exit(128 + came[0])
 

@@ -46,8 +46,7 @@ class Crossings:
     junction at once. This happens when all vehicles that have the right of way, and all already
     let in, pass the conflicts in sufficient time before or after it, and there is room behind the
     junction. Agents are let in one after the other. Among agents that were let in, the one let in
-    first goes first, unless it waits for the other itself. `waiting` finds agents that wait for
-    each other in a circle.
+    first goes first. `waiting` finds agents that wait for each other in a circle.
 
     Where lights hold the cross traffic, an agent that yields to oncoming vehicles waits for them
     in the middle, so that it leaves the junction when the light changes at the latest.

@@ -208,15 +208,15 @@ def _touch(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
     :param foreseen: time of the prediction [s]; 0 checks whether they touch now.
     :param beside: room around each [m]
     """
-    mine, theirs = start_of(lanes, agents, slot), start_of(lanes, agents, other)
+    mine, theirs = _start(lanes, agents, slot), _start(lanes, agents, other)
     onset = ONSET if braking <= SMOOTH else 0.0
     slows = max(-agents.acceleration[other], 0.0)
     before = BEFORE * beside
     for step in range(min(1, int(foreseen / STEP)), int(foreseen / STEP) + 1):
         t = step * STEP
         way = speed * min(t, onset) + _rolled(speed, braking, max(t - onset, 0.0))
-        x, y, yaw = pose_after(lanes, following, agents, slot, mine, way)
-        other_x, other_y, other_yaw = pose_after(
+        x, y, yaw = _pose_after(lanes, following, agents, slot, mine, way)
+        other_x, other_y, other_yaw = _pose_after(
             lanes, following, agents, other, theirs, _rolled(agents.speed[other], slows, t))
         if overlap(other_x - x, other_y - y, yaw, other_yaw,
                    0.5 * agents.length[slot] + before, 0.5 * agents.width[slot] + beside,
@@ -234,7 +234,7 @@ def _rolled(speed: float, braking: float, time: float) -> float:
 
 
 @inlined
-def start_of(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
+def _start(lanes: LaneTable, agents: AgentTable, slot: int) -> tuple[float, float, float]:
     """Return s of the rear axle, its offset from where it steers for, and its heading error."""
     lane = agents.lane[slot]
     s, d, yaw = project_on(lanes, lane, agents.x[slot], agents.y[slot],
@@ -251,8 +251,8 @@ def _shift(lanes: LaneTable, agents: AgentTable, slot: int, lane: int, s: float)
 
 
 @bare
-def pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
-               start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
+def _pose_after(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
+                start: tuple[float, float, float], way: float) -> tuple[float, float, float]:
     """Predict x, y and heading of an agent's centre after a distance on its route [m, rad]."""
     lane, s = onward(lanes, following, agents.destination[slot], agents.lane[slot],
                      start[0] + way)

@@ -4,8 +4,8 @@
 
 import math
 
-from crgame_ros.traffic.agents import AgentTable, empty_table
-from crgame_ros.traffic.compiled import bare, compiled, inlined
+from crgame_ros.traffic.agents import AgentTable, BoolArray, empty_table, write_centers
+from crgame_ros.traffic.compiled import bare, compiled
 from crgame_ros.traffic.encounters import overlap
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
 from crgame_ros.traffic.lane_table import angle_between, LaneTable, point_on
@@ -46,6 +46,8 @@ class SweptPaths:
         :param reference: offset of the reference at each row of the lanes' tables [m]
         :param halts: (A) of the fronts [m]
         """
+        if not len(bodies.owner):
+            return
         following = self._routes.next
         for i in np.flatnonzero(_turning(self._lanes, following, agents, slots)).tolist():
             slot = int(slots[i])
@@ -54,25 +56,21 @@ class SweptPaths:
             _halt_before(agents, slot, i, poses, bodies, halts)
 
 
-@inlined
-def _is_long(agents: AgentTable, slot: int) -> bool:
-    return agents.rear_to_center[slot] + 0.5 * agents.length[slot] >= LONG_FRONT
-
-
 @compiled
 def _turning(lanes: LaneTable, following: IntArray, agents: AgentTable,
-             slots: IntArray) -> IntArray:
+             slots: IntArray) -> BoolArray:
     """Return which agents (A) are long vehicles that turn now or soon."""
-    result = np.zeros(len(slots), np.int64)
+    result = np.zeros(len(slots), np.bool_)
     for i, slot in enumerate(slots):
-        if not _is_long(agents, slot):
+        if agents.rear_to_center[slot] + 0.5 * agents.length[slot] < LONG_FRONT:
             continue
         for ahead in range(0, AHEAD + 1, 3):
             lane, s = onward(lanes, following, agents.destination[slot], agents.lane[slot],
                              agents.s[slot] + ahead)
             _, _, yaw = point_on(lanes, lane, s)
             if abs(angle_between(yaw, agents.yaw[slot])) > TURNS:
-                result[i] = 1
+                result[i] = True
+                break
     return result
 
 
@@ -80,14 +78,11 @@ def _turning(lanes: LaneTable, following: IntArray, agents: AgentTable,
 def _roll_out(lanes: LaneTable, following: IntArray, ghost: AgentTable,
               reference: FloatArray) -> FloatArray:
     """Return the poses (N, 3) of a vehicle's centre, a metre apart, as it drives on [m, rad]."""
-    poses = np.empty((AHEAD + 1, 3))
+    poses, velocities = np.empty((AHEAD + 1, 3)), np.empty((1, 3))
     slots = np.zeros(1, np.int64)
     ghost.speed[0], ghost.acceleration[0] = CRAWL, 0.0
     for n in range(AHEAD + 1):
-        yaw, middle = ghost.yaw[0], ghost.rear_to_center[0]
-        poses[n, 0] = ghost.x[0] + middle * math.cos(yaw)
-        poses[n, 1] = ghost.y[0] + middle * math.sin(yaw)
-        poses[n, 2] = yaw
+        write_centers(ghost, slots, poses[n:n + 1], velocities)
         move(lanes, following, ghost, slots, reference, SUBSTEPS, 1.0 / (SUBSTEPS * CRAWL))
     return poses
 

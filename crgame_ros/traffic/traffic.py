@@ -339,9 +339,11 @@ class Traffic:
                              agents.table, slots)
         agents.remove(gone, others.k)
         stuck = hopeless(agents.table, slots, self._last_resort)
-        away = np.hypot(agents.x[stuck, None] - others.poses[self._others.driven, 0],
-                        agents.y[stuck, None] - others.poses[self._others.driven, 1])
-        stuck = stuck[~(away < SIGHT).any(axis=1)]
+        if len(stuck):
+            driven = others.poses[self._others.driven]
+            away = np.hypot(agents.x[stuck, None] - driven[:, 0],
+                            agents.y[stuck, None] - driven[:, 1])
+            stuck = stuck[~(away < SIGHT).any(axis=1)]
         agents.remove(stuck, others.k)
         self.taken_off += len(stuck)
         for slot in lost.tolist():
