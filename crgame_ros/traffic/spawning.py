@@ -102,8 +102,8 @@ BICYCLE = MOVER_TYPES['bicycle'].shape
 # Recorded cars are larger now and then.
 LARGE_CAR = Shape.rectangle(5.0, 1.9)
 TRIES = 40
-# Longer vehicles need wide ways [m].
-LONG = 6.5
+# Longer vehicles need wide ways [m]; those of this length are no vehicles.
+LONG, LIMIT = 6.5, 30.0
 # No agent arrives while more than this share of all has stood for this time [s]: more vehicles
 # would block the junctions for each other, and fewer would leave.
 JAM_SHARE, JAM_TIME = 0.25, 20.0
@@ -118,6 +118,16 @@ FARTHEST = 150.0
 def is_long(length: float) -> bool:
     """Return whether a vehicle of a length [m] needs wide ways."""
     return length > LONG
+
+
+def trial_shapes(vehicle_type: str, adopted: Sequence[Adopted],
+                 ) -> tuple[Sequence[Shape], Shape, Sequence[Shape]]:
+    """Return the shapes of cars, trucks and recorded long vehicles whose ways must be wide."""
+    if vehicle_type == 'bicycle':
+        return (BICYCLE,), BICYCLE, ()
+    recorded = sorted((x.description.shape for x in adopted
+                       if LONG < x.description.shape.length < LIMIT), key=lambda x: x.length)
+    return (CAR, LARGE_CAR), TRUCK, [recorded[i] for i in {0, len(recorded) - 1} if recorded]
 
 
 def slot_descriptions(count: int, vehicle_type: str, truck_share: float,
