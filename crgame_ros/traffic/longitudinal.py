@@ -57,7 +57,7 @@ def _allowed(lanes: LaneTable, envelope: FloatArray, way: Ways, i: int, factor: 
     for step in range(way.depth[i]):
         lane, begins = way.lane[i, step], way.offset[i, step] - ahead
         wanted = min(lanes.limit[lane] * factor, top)
-        if begins > 0.0:
+        if begins > 0.0 and step > 0:
             there = min(wanted, envelope[lanes.first[lane]])
             result = min(result, math.sqrt(there * there + 2.0 * COASTING * begins))
         elif begins + lanes.length[lane] > 0.0 or step == way.depth[i] - 1:

@@ -20,6 +20,10 @@ from crgame_ros.traffic.routes import Routes
 
 MAX_STEERING = 0.7
 MAX_STEERING_RATE = 1.0
+# An agent farther from the middle of its lane than this is astray [m]. It steers for a point this
+# many times as far ahead as it is astray, and farther, in wheelbases, while it points across or
+# against its lane: long vehicles cannot get to a point beside them.
+ASTRAY, LOOKS_AHEAD, TURNS_BACK = 5.0, 2.0, 2.0
 # A target point is at most this many lanes ahead.
 LANES_AHEAD = 12
 
@@ -64,7 +68,11 @@ def move(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntAr
             lane, there = onward(lanes, following, agents.destination[slot], agents.lane[slot],
                                  rear + 0.5 * n * reach)
             bend = max(bend, abs(lanes.line[nearest_row(lanes, lane, there)].curvature))
-        distance = pursuit_distance(agents.speed[slot], bend)
+        at = lanes.line[nearest_row(lanes, agents.lane[slot], agents.s[slot])]
+        along = at.cos * math.cos(agents.yaw[slot]) + at.sin * math.sin(agents.yaw[slot])
+        astray = math.hypot(max(abs(agents.d[slot]) - ASTRAY, 0.0), min(agents.s[slot], 0.0))
+        distance = pursuit_distance(agents.speed[slot], bend) + LOOKS_AHEAD * astray + (
+            TURNS_BACK * agents.wheelbase[slot] * max(0.5 - along, 0.0))
         _drive(lanes, following, agents, slot, reference, distance, substeps, dt_s)
 
 
@@ -81,7 +89,7 @@ def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, i: int,
     cos, sin, half_turn = math.cos(yaw), math.sin(yaw), 0.0
     for _ in range(substeps):
         target_x, target_y = _target(lanes, following, agents, i, reference, lane,
-                                     s - middle + distance, front)
+                                     max(s, 0.0) - middle + distance, front)
         dx, dy = target_x - x, target_y - y
         steering = steer_towards(dx * cos + dy * sin, dy * cos - dx * sin, wheelbase, steering,
                                  MAX_STEERING, MAX_STEERING_RATE, dt_s)

@@ -69,7 +69,8 @@ def steer_towards(ahead: float, aside: float, wheelbase: float, steering: float,
 
     The arc through the rear axle, tangent to the heading, and the point has the curvature
     2 y_t / (x_t^2 + y_t^2) with the point's coordinates in the vehicle's frame; the bicycle
-    drives it with tan(delta) = L curvature. Exact on circles.
+    drives it with tan(delta) = L curvature. Exact on circles. Towards a point behind it the
+    vehicle turns as sharply as it can.
 
     :param ahead, aside: the point, at `pursuit_distance`, in the frame of the rear axle [m]
     :param wheelbase: L [m]
@@ -80,6 +81,8 @@ def steer_towards(ahead: float, aside: float, wheelbase: float, steering: float,
     :return: steering angle for the step [rad]
     """
     wanted = math.atan(2.0 * wheelbase * aside / max(ahead * ahead + aside * aside, 1e-6))
+    if ahead < 0.0:
+        wanted = math.copysign(max_steering, aside)
     reach = max_rate * dt_s
     changed = min(max(wanted, steering - reach), steering + reach)
     return min(max(changed, -max_steering), max_steering)
