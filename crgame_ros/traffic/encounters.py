@@ -25,9 +25,10 @@ FIRMEST = 3.9
 THEIRS = 4.0
 # Room left when that happens [m].
 LAST_GAP = 0.3
-# For an agent that drives across no braking is considered until this much is needed to halt before
-# it: the right of way has usually settled the encounter [m/s^2].
-ALARM = 2.0
+# For an agent that drives across no braking is considered until `CONSIDERS` is needed to halt
+# before it: the right of way has usually settled the encounter. Until `ALARM` is needed, an agent
+# waits as long as braking with less than `FIRM` avoids contact [m/s^2].
+CONSIDERS, ALARM, FIRM = 0.5, 2.0, 3.0
 # Decelerations that are tried, the gentlest first; up to `SMOOTH` [m/s^2] they set in after
 # `ONSET` [s].
 TRIED = (2.0, 3.0, 3.9, 6.0, 8.0)
@@ -73,8 +74,9 @@ def moderate(lanes: LaneTable, following: IntArray, agents: AgentTable, entries:
         slot, behind = corridor.owner[i], wanted[p]
         if entries.crosses[n] and entries.owner[n] >= 0:
             needed = agents.speed[slot]**2 / (2.0 * max(pairs.gap[p] - 0.5, 0.05))
-            behind = -needed_braking(lanes, following, agents, slot, entries.owner[n]) \
-                if needed > ALARM else math.inf
+            braking = needed_braking(lanes, following, agents, slot, entries.owner[n]) \
+                if needed > CONSIDERS else -math.inf
+            behind = -braking if needed > ALARM or braking >= FIRM else math.inf
         elif entries.owner[n] < 0 and abs(entries.speed[n]) < ACROSS and _passes_before(
                 agents, slot, entries, n, pairs.gap[p], corridor.low[i], corridor.high[i]):
             behind = math.inf
@@ -181,6 +183,13 @@ def needed_braking(lanes: LaneTable, following: IntArray, agents: AgentTable, sl
     if soon == math.inf:
         return -math.inf
     braking = _gentlest(lanes, following, agents, slot, speed, other, FORESEEN, BESIDE)
+    if braking <= FIRMEST:
+        return braking
+    # An agent brakes harder only if the two would touch, not for the room between them.
+    soon = _touch(lanes, following, agents, slot, speed, other, 0.0, FORESEEN, 0.0)
+    if soon == math.inf:
+        return FIRMEST
+    braking = _gentlest(lanes, following, agents, slot, speed, other, FORESEEN, 0.0)
     if braking < math.inf:
         return braking
     # No braking of this agent helps now, but the other may react.
