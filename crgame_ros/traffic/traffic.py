@@ -16,6 +16,7 @@ from crgame_ros.traffic.changing import LaneChanges
 from crgame_ros.traffic.conflicts import Conflicts
 from crgame_ros.traffic.courtesy import fading, note_leaders
 from crgame_ros.traffic.crossings import AT_LINE, Crossings
+from crgame_ros.traffic.crosswalks import Crosswalks
 from crgame_ros.traffic.drivers import DesiredSpeeds, Drivers
 from crgame_ros.traffic.encounters import brush
 from crgame_ros.traffic.exit_room import queues
@@ -42,15 +43,7 @@ from crgame_ros.traffic.motion import Motion
 from crgame_ros.traffic.movements import Movements
 from crgame_ros.traffic.placement import Bodies, Entries, place
 from crgame_ros.traffic.routes import leaving, Routes
-from crgame_ros.traffic.spawning import (
-    BICYCLE,
-    CAR,
-    is_long,
-    LARGE_CAR,
-    slot_descriptions,
-    Spawner,
-    TRUCK,
-)
+from crgame_ros.traffic.spawning import is_long, slot_descriptions, Spawner, trial_shapes
 from crgame_ros.traffic.stop_lines import StopLines
 from crgame_ros.traffic.swept_paths import SweptPaths
 from crgame_ros.traffic.swerving import Swerving
@@ -112,8 +105,8 @@ class Traffic:
         side, movements = driving_side(scenario), Movements(self._graph)
         self._conflicts = Conflicts(self._graph, movements, side)
         self._cells = LaneCells(self._graph)
-        sizes = (BICYCLE,) * 3 if network.vehicle_type == 'bicycle' else (CAR, LARGE_CAR, TRUCK)
-        for_cars, for_trucks = find_tight_lanes(self._graph, *sizes)
+        for_cars, for_trucks = find_tight_lanes(
+            self._graph, *trial_shapes(network.vehicle_type, adopted))
         self._routes = Routes(
             self._graph, np.where(self._conflicts.tapers() | for_cars, TAPER_COST, 0.0),
             for_trucks, side.keeps_left)
@@ -129,6 +122,7 @@ class Traffic:
         self._fading = fading(time_step_s)
         # Number of agents removed because they stood in a circle that no agent could open.
         self.taken_off = 0
+        self._crosswalks = Crosswalks(self._graph, scenario.lanelet_network)
         self._swept_paths = SweptPaths(self._graph, self._routes)
         self._motion = Motion(self._graph, self._routes, time_step_s / substeps)
         self._desired = DesiredSpeeds(spec.speed_factor, spec.speed_spread, self._random)
@@ -234,6 +228,7 @@ class Traffic:
         self._mind_left_lanes(slots, desired, entries, standing, acceleration)
         blocked = obstacles(pairs, standing, len(slots))
         halts = self._junctions(k, slots, way, entries, pairs, desired, gap, self._time_step_s)
+        self._crosswalks.halt_before(bodies, self._others.stands, way, agents.table, slots, halts)
         self._swept_paths.halt_before(bodies, agents.table, slots, self._swerving.reference, halts)
         brush(lanes, self._routes.next, agents.table, slots, entries, way, acceleration)
         halt(lanes, self._routes.drops, way, agents.table, slots, halts, blocked,

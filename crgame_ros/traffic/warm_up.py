@@ -11,7 +11,7 @@ from pathlib import Path
 import sys
 import time
 
-from commonroad.common.common_lanelet import LineMarking
+from commonroad.common.common_lanelet import LaneletType, LineMarking
 from commonroad.scenario.lanelet import Lanelet, StopLine
 from commonroad.scenario.scenario import Scenario
 from commonroad.scenario.traffic_light import (
@@ -122,12 +122,13 @@ def drive_everything() -> None:
 def drive_where_a_lane_ends() -> None:
     """Run traffic where all agents have to change lanes, and some are let in."""
     x, scenario = np.linspace(-200.0, 0.0, 41), Scenario(0.1)
-    level = np.zeros_like(x)
+    level, turn = np.zeros_like(x), np.linspace(0.0, 0.5 * np.pi, 41)
     scenario.add_objects([
         _lanelet(1, x, level, adjacent_right=2, adjacent_right_same_direction=True,
                  successor=[3]),
         _lanelet(2, x, level - 3.5, adjacent_left=1, adjacent_left_same_direction=True),
-        _lanelet(3, x + 200.0, level, predecessor=[1])])
+        # So tight that trial drives try it.
+        _lanelet(3, 40.0 * np.sin(turn), 40.0 - 40.0 * np.cos(turn), predecessor=[1])])
     traffic = Traffic(TrafficSpec(agents=12, flow=1800.0, capacity=30),
                       RoadNetwork(scenario.lanelet_network), scenario, (), (), 0.1, 10, 0, 0)
     nowhere = np.zeros((0, 3))
@@ -137,7 +138,11 @@ def drive_where_a_lane_ends() -> None:
 
 
 def crossroads() -> Scenario:
-    """Return two lanes to the east, the right one with a light, one to the north, and a bend."""
+    """
+    Return two lanes to the east, the right one with a light, one to the north, and a bend.
+
+    People may cross the lanes to the east.
+    """
     result = Scenario(0.1)
     x = np.linspace(-200.0, 200.0, 81)
     level = np.zeros_like(x)
@@ -148,7 +153,9 @@ def crossroads() -> Scenario:
     left = _lanelet(2, x, level, adjacent_right=1, adjacent_right_same_direction=True)
     turn = np.linspace(0.0, 0.5 * np.pi, 60)
     bend = _lanelet(4, 280.0 + 60.0 * np.sin(turn), 60.0 - 60.0 * np.cos(turn))
-    result.add_objects([right, left, _lanelet(3, level, x), bend])
+    crosswalk = _lanelet(5, np.full(8, 20.0), np.linspace(-5.25, 1.75, 8),
+                         lanelet_type={LaneletType.CROSSWALK})
+    result.add_objects([right, left, _lanelet(3, level, x), bend, crosswalk])
     cycle = TrafficLightCycle([TrafficLightCycleElement(TrafficLightState.GREEN, 10)], 0, True)
     result.add_objects(TrafficLight(LIGHT, np.array([-15.0, -6.0]), cycle), {1})
     return result

@@ -57,7 +57,8 @@ class Others:
     :param time_step_s: Delta t_c [s]
 
     Attributes `drives` (O): whether it is a vehicle that follows lanes; `driven` (O): whether a
-    human or a planner drives it; `widths` (O) [m].
+    human or a planner drives it; `widths` (O) [m]; `stands` (O): whether it is likely to stand for
+    good, see `standing`.
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
@@ -72,6 +73,7 @@ class Others:
         self._still = np.zeros(len(self._descriptions), dtype=np.int64)
         self._time_step_s, self._seen_k = time_step_s, -2**62
         self._speed = self._acceleration = np.zeros(len(self._descriptions))
+        self.stands: NDArray[np.bool_] = np.zeros(len(self._descriptions), dtype=bool)
         self._long_enough = round(STANDING_TIME / time_step_s)
         of, shift, length = [], [], []
         for number, x in enumerate(descriptions):
@@ -121,7 +123,8 @@ class Others:
         speed = np.hypot(world.velocities[:, 0], world.velocities[:, 1])
         still = speed < STANDING
         self._still = np.where(still, self._still + 1, 0)
-        return np.asarray(still & (self._parked | (self._still > self._long_enough)))
+        self.stands = np.asarray(still & (self._parked | (self._still > self._long_enough)))
+        return self.stands
 
 
 @compiled
