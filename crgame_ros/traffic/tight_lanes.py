@@ -253,7 +253,7 @@ class _Trials:
         return result
 
     def cost(self, ways: IntArray) -> FloatArray:
-        """Return the cost (L) of how the vehicle drives ways (N, 3), at their middle lanes."""
+        """Return what driving ways (N, 3) costs, for each lane (L) that is one's middle."""
         result = np.zeros(len(self._graph))
         for begin, speed in product(range(0, len(ways), AT_ONCE), SEARCH_SPEEDS):
             some = ways[begin:begin + AT_ONCE]
