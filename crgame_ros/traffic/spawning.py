@@ -122,12 +122,13 @@ def is_long(length: float) -> bool:
 
 def trial_shapes(vehicle_type: str, adopted: Sequence[Adopted],
                  ) -> tuple[Sequence[Shape], Shape, Sequence[Shape]]:
-    """Return the shapes of cars, trucks and recorded long vehicles whose ways must be wide."""
+    """Return the outlines of cars, trucks, and the shortest and longest recorded long vehicle."""
     if vehicle_type == 'bicycle':
         return (BICYCLE,), BICYCLE, ()
-    recorded = sorted((x.description.shape for x in adopted
-                       if LONG < x.description.shape.length < LIMIT), key=lambda x: x.length)
-    return (CAR, LARGE_CAR), TRUCK, [recorded[i] for i in {0, len(recorded) - 1} if recorded]
+    sizes = sorted((x.description.shape.length, x.description.shape.width) for x in adopted
+                   if LONG < x.description.shape.length < LIMIT)
+    recorded = [Shape.rectangle(*x) for x in sorted({*sizes[:1], *sizes[-1:]})]
+    return (CAR, LARGE_CAR), TRUCK, recorded
 
 
 def slot_descriptions(count: int, vehicle_type: str, truck_share: float,

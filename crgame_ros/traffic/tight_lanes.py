@@ -182,8 +182,8 @@ class _Area:
         """
         result = np.zeros(len(x))
         left = np.arange(len(x))
-        areas = zip(self._areas, (OFF[0], *OFF), strict=True)
-        for area, away in areas if with_margin else list(areas)[1:]:
+        steps = list(zip(self._areas, (OFF[0], *OFF), strict=True))
+        for area, away in steps if with_margin else steps[1:]:
             left = left[~shapely.contains_xy(area, x[left], y[left])]
             result[left] = away
         return result
@@ -224,19 +224,17 @@ class _Trials:
         self._reference = np.zeros(len(graph.x))
         self.ways = _ways(graph, np.flatnonzero(np.isfinite(self._extent[:, 0])))
 
-    def drive(self, ways: IntArray, speeds: Sequence[float] = SPEEDS,
-              aside: float | None = None) -> _Tight:
+    def drive(self, ways: IntArray, aside: float | None = None) -> _Tight:
         """
         Drive ways (N, 3), and return how far off the road the vehicle gets on their middle lanes.
 
-        :param speeds: greatest speed of each trial [m/s]
         :param aside: distance from its way's lanes beyond which the vehicle sweeps over others
             [m]; not checked if not given.
         """
         lanes = len(self._graph)
         result = _Tight(np.zeros(lanes), np.full(lanes, np.inf), np.full(lanes, -np.inf),
                         np.zeros(lanes, dtype=bool))
-        for begin, speed in product(range(0, len(ways), AT_ONCE), speeds):
+        for begin, speed in product(range(0, len(ways), AT_ONCE), SPEEDS):
             some = ways[begin:begin + AT_ONCE]
             way, s, x, y, _ = self._drive(some, speed)
             away = self._area.off(x, y)
@@ -291,7 +289,7 @@ class _Trials:
         Drive ways (N, 3) of lanes.
 
         :return: in the order of ways: way, the centre's arc length in the middle lane, x and y of
-            all corners there and around it [m]
+            all corners there and around it [m], and the lateral acceleration [m/s^2]
         """
         graph, shape = self._graph, self._shape
         bad_from, bad_to = self._extent[ways[:, 1]].T
@@ -346,7 +344,8 @@ def _drive(lanes: LaneTable, following: IntArray, agents: AgentTable, ways: IntA
     :param begin, end: (N) arc lengths in the middle lane between which poses are returned [m]
     :param steps: (N) longest drive.
     :param envelope: speed at each row of the lanes' tables [m/s]
-    :return: way (K), arc length in its middle lane (K) and pose (K, 3) of the centre [m, rad]
+    :return: way (K), arc length in its middle lane (K) and pose (K, 3) of the centre [m, rad],
+        lateral acceleration (K) [m/s^2]
     """
     way, at = np.empty(steps.sum(), np.int64), np.empty(steps.sum())
     poses, velocities = np.empty((steps.sum(), 3)), np.empty((1, 3))

@@ -5,9 +5,10 @@
 from pathlib import Path
 
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.spawning import CAR, LARGE_CAR, TRUCK
+from crgame_ros.traffic.spawning import CAR, LARGE_CAR, trial_shapes, TRUCK
 from crgame_ros.traffic.tight_lanes import find_tight_lanes
 from judge.motion import off_road
 from judge.roads import JudgedRoads
@@ -43,6 +44,16 @@ def test_a_bend_is_too_tight_where_the_swept_width_is_more_than_the_lane(
     assert for_trucks[1] == truck
     assert for_cars[1] == car
     assert not for_cars[0]
+
+
+def test_recorded_vehicles_of_any_shape_are_tried_as_boxes() -> None:
+    shapes = [Shape.circle(3.5), Shape.rectangle(12.0, 2.5), Shape.rectangle(9.0, 2.5),
+              Shape.rectangle(300.0, 2.5), Shape.rectangle(4.5, 1.8)]
+    _, _, recorded = trial_shapes('car', [support.driving(
+        i, [(10.0, 0.0, 0.0), (30.0, 0.0, 0.0)], 5.0, kind='bus', shape=shape)
+        for i, shape in enumerate(shapes)])
+    # The shortest and the longest, but what is longer than any vehicle.
+    assert recorded == [Shape.rectangle(7.0, 7.0), Shape.rectangle(12.0, 2.5)]
 
 
 def test_a_straight_lane_that_only_large_cars_are_tried_in_is_wide_enough() -> None:
