@@ -109,6 +109,10 @@ def refuse_malformed(root: etree._Element, source: str) -> None:
                          f'{MAX_POINTS}', source, 'thin them out, or cut the map')
     for element in root.iterchildren(*OBSTACLE_TAGS, 'planningProblem'):
         _check_states(element, source)
+    for occupancies in root.iterfind('phantomObstacle/occupancySet'):
+        if occupancies.find('occupancy') is None:
+            raise InputError('its <occupancySet> has no <occupancy>', where(occupancies, source),
+                             'add one, or remove the set')
     known = {lanelet.get('id') for lanelet in lanelets}
     for reference in root.iterfind('planningProblem/goalState/position/lanelet'):
         if reference.get('ref') not in known:

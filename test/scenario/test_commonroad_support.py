@@ -264,7 +264,7 @@ REFUSALS = {
         scenario(LIGHT.format('blue', ''), '<trafficLightRef ref="6"/>'),
     "'ufo' is not a valid ObstacleType": scenario(static('ufo', state())),
     'has no initialState': scenario(static()),
-    'IndexError: list index out of range':
+    'its <occupancySet> has no <occupancy>':
         scenario('<phantomObstacle id="7"><occupancySet/></phantomObstacle>'),
     'the id 9 is used by a planningProblem too': scenario(problem(count=2)),
 }
