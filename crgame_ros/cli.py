@@ -196,6 +196,9 @@ def _offline(values: argparse.Namespace) -> int:
     with naming(request):
         run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger)
     print(json.dumps(run.summary(), indent=2))
+    if count := run.result.taken_off:
+        print(f'note: removed {count} agent{"s" if count > 1 else ""} of the traffic, because '
+              'agents waited for each other and no driven vehicle was near', file=sys.stderr)
     if values.out is not None:
         for notice in run.exported(values.out)[1]:
             print(f'note: {notice}', file=sys.stderr)

@@ -64,7 +64,8 @@ def run_summary(result: OfflineResult, wall_s: float) -> dict[str, Any]:
         'stop': None if result.stop is None else {
             'vehicle': result.stop.vehicle_id, 'violation_n': result.stop.n,
             'stop_n': len(result.vehicle_states) - 1},
-        'contacts': [item.as_dict() for item in contacts_of(result)]}
+        'contacts': [item.as_dict() for item in contacts_of(result)],
+        'taken_off': result.taken_off}
 
 
 class OfflineRun(Run):

@@ -136,6 +136,11 @@ class Simulation:
                 for bits, command in zip(planned, self.commands, strict=True)]
 
     @property
+    def taken_off(self) -> int:
+        """Return how many agents were removed in process because they blocked each other."""
+        return self._world.taken_off
+
+    @property
     def object_lights(self) -> dict[str, int]:
         """Return the bits of `Light` of the present objects with signals, by id."""
         return self._world.lights

@@ -104,6 +104,7 @@ class OfflineResult:
     :param av_commands: (n + 1, A, 6) the same commands of drivers who took over an AV; NaN, except
         for the lights, while it followed its plan.
     :param tasks: the entries of the game's tasks, in order.
+    :param taken_off: number of agents that were removed because they blocked each other.
     """
 
     setup: Setup
@@ -120,6 +121,7 @@ class OfflineResult:
     av_commands: NDArray[np.float64] = field(
         default_factory=lambda: np.empty((0, 0, COMMAND_WIDTH)))
     tasks: tuple[TaskEntry, ...] = ()
+    taken_off: int = 0
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """Return the states (n + 1, 8) of one driven vehicle."""
@@ -317,7 +319,7 @@ class _Trace:
             np.array(self.objects), np.array(self.object_velocities), self.commands[:count],
             self.intervals_s[:count], planners,
             () if self._drivability is None else self._drivability.report(), simulation.fired,
-            self.stop, self.av_commands[:count], tuple(self.tasks))
+            self.stop, self.av_commands[:count], tuple(self.tasks), simulation.taken_off)
 
     def add(self, simulation: Simulation, result: StepResult, effective_s: float) -> None:
         """Add a state, and the interval of the step that led to it [s]."""

@@ -128,6 +128,11 @@ class LocalTraffic:
             self._k += 1
         return self._traffic.states, self._k
 
+    @property
+    def taken_off(self) -> int:
+        """Return how many agents were removed because they blocked each other."""
+        return self._traffic.taken_off
+
     def publish(self, view: 'WorldView') -> None:
         """Store the world that the agents will react to."""
         self._view = view
@@ -171,6 +176,11 @@ class World:
         """Return the columns of objects whose states differ from the scenario's, in order."""
         moved = [] if self._events is None else self._events.obstacles.changed
         return sorted({*moved, *self._setup.obstacles.living.tolist()})
+
+    @property
+    def taken_off(self) -> int:
+        """Return how many agents were removed in process because they blocked each other."""
+        return self._feed.taken_off if isinstance(self._feed, LocalTraffic) else 0
 
     @property
     def lights(self) -> dict[str, int]:

@@ -2,10 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Agents that wait for each other in a circle."""
 
+import json
 import math
 from pathlib import Path
 
-from commonroad.scenario.scenario import Scenario
+from commonroad.common.file_writer import CommonRoadFileWriter, OverwriteExistingFile
+from commonroad.geometry.shape import Rectangle
+from commonroad.planning.planning_problem import PlanningProblemSet
+from commonroad.prediction.prediction import TrajectoryPrediction
+from commonroad.scenario.obstacle import DynamicObstacle, ObstacleType
+from commonroad.scenario.scenario import Scenario, ScenarioID
+from commonroad.scenario.state import InitialState, KSState
+from commonroad.scenario.trajectory import Trajectory
+from crgame_ros.cli import main
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.traffic.adoption import Adopted
 from crgame_ros.traffic.traffic import SIGHT
@@ -55,6 +64,36 @@ def test_a_circle_that_no_agent_can_open_loses_one_only_out_of_a_drivers_sight()
     run.ticks(100)
     moved = np.hypot(*(run.poses[-1] - run.poses[ticks])[:, :2].T)
     assert np.nanmax(moved) > 1.0 and run.traffic.taken_off == 1
+
+
+def test_an_offline_run_tells_how_many_agents_it_took_off_the_road(
+        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The same full ring as a file, and nobody drives near it."""
+    scenario, box = ring(), Rectangle(CAR.length, CAR.width)
+    scenario.scenario_id = ScenarioID(country_id='ZAM', map_name='Ring')
+    for found in full_ring():
+        # They stand at first; the positions of a file say how fast they are.
+        rows = np.repeat(found.poses, 10, axis=0)
+        states = [{'time_step': k, 'position': row[:2], 'orientation': float(row[2]),
+                   'velocity': 0.0} for k, row in enumerate(rows)]
+        scenario.add_objects(DynamicObstacle(
+            int(found.description.id[1:]) + 100, ObstacleType.CAR, box,
+            InitialState(acceleration=0.0, yaw_rate=0.0, slip_angle=0.0, **states[0]),
+            TrajectoryPrediction(Trajectory(1, [KSState(steering_angle=0.0, **x)
+                                                for x in states[1:]]), box)))
+    CommonRoadFileWriter(scenario, PlanningProblemSet(), '', '', '', set()).write_to_file(
+        str(tmp_path / 'ring.xml'), OverwriteExistingFile.ALWAYS)
+    game = tmp_path / 'ring.yaml'
+    game.write_text(f"""scenario: ring.xml
+duration: {LAST_RESORT + 8.0}
+humans: []
+avs: []
+traffic: {{recorded: reactive, options: {{standstill_gap: {STANDSTILL_GAP}}}}}
+""")
+    assert main(['offline', str(game)]) == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out)['taken_off'] == 1
+    assert 'removed 1 agent of the traffic' in err
 
 
 @pytest.mark.exhaustive
