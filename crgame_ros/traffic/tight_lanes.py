@@ -29,7 +29,7 @@ import shapely
 # A point farther beyond the road than this is off it; in traffic it is a decimetre farther [m].
 SPARE = 0.05
 # A swing that keeps this away from the edge is better than one that does not [m].
-MARGIN = 0.1
+MARGIN = 0.05
 # Steps in which the distance off the road is measured [m].
 OFF = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 2.0)
 # Lanes that are wider than the vehicle by this, and straighter than this, need no trial [m, 1/m].
