@@ -213,7 +213,7 @@ class _Trials:
 
     def __init__(self, graph: LaneGraph, area: _Area, shape: Shape) -> None:
         self._graph, self._area, self._shape = graph, area, shape
-        self._beside: dict[tuple[int, ...], list[shapely.Geometry]] = {}
+        self._enlarged: dict[tuple[int, ...], list[shapely.Geometry]] = {}
         self.front = REAR_TO_CENTER * shape.length + 0.5 * shape.length
         is_long = self.front >= LONG_FRONT
         self._asides: tuple[float, ...] = LONG_ASIDES if is_long else ASIDES
@@ -270,10 +270,10 @@ class _Trials:
 
     def _areas_beside(self, way: tuple[int, ...]) -> list[shapely.Geometry]:
         """Return the areas of a way's lanes, enlarged by each of the distances that cost."""
-        if way not in self._beside:
-            self._beside[way] = [self._around(np.array(way), aside) for aside in self._asides]
-            shapely.prepare(self._beside[way])
-        return self._beside[way]
+        if way not in self._enlarged:
+            self._enlarged[way] = [self._around(np.array(way), aside) for aside in self._asides]
+            shapely.prepare(self._enlarged[way])
+        return self._enlarged[way]
 
     def _around(self, way: IntArray, aside: float) -> shapely.Geometry:
         """Return the area of the lanes of a way (3), enlarged by a distance [m]."""
