@@ -22,9 +22,10 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
 from crgame_ros.roads.surface import lanelet_areas
+from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.scenario.heights import LaneletHeights
 from crgame_ros.scenario.light_and_air import environment_of
-from crgame_ros.scenario.loading import group_outline, LoadedScenario
+from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.vehicle.driver_place import driver_place
 import numpy as np
 from numpy.typing import NDArray

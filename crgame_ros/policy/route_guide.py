@@ -13,7 +13,7 @@ from crgame_ros.planner.reference_path import DrivingPath, plan_driving_path
 from crgame_ros.planner.speed_profile import default_speed, desired_speeds, SLOWEST_DESIRED
 from crgame_ros.policy.observation_spec import FAR
 from crgame_ros.roads.route import goal_lanelets
-from crgame_ros.scenario.loading import group_outline
+from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

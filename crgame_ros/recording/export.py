@@ -21,11 +21,12 @@ from crgame_ros.paths import check_room
 from crgame_ros.recording.export_objects import named, ObjectWriter
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario import guard
+from crgame_ros.scenario.exact_values import exact_value
 from crgame_ros.scenario.export_elements import exact_number, goal_state, planning_problem
 from crgame_ros.scenario.export_goals import goal_where_it_ended, goals_of
 from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
-from crgame_ros.scenario.loading import exact_value, LoadedScenario, parse_scenario
+from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
 from crgame_ros.whole_file import write_whole
 from lxml import etree
@@ -292,14 +293,7 @@ def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,
         'timeStepSize': exact_number(log.game.scheduler.time_step_s),
         'commonRoadVersion': '2020a', 'author': original.get('author', ''),
         'affiliation': original.get('affiliation', ''), 'source': original.get('source', ''),
-        'benchmarkID': benchmark_id, 'date': day if _is_date(day) else '1970-01-01'}
-
-
-def _is_date(text: str) -> bool:
-    try:
-        return date.fromisoformat(text).isoformat() == text
-    except ValueError:
-        return False
+        'benchmarkID': benchmark_id, 'date': day if guard.is_date(day) else '1970-01-01'}
 
 
 def _document(header: dict[str, str], network: Sequence[etree._Element], rest: str) -> str:

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
+from commonroad.prediction.prediction import SetBasedPrediction
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import Release
@@ -68,6 +69,8 @@ class ObjectWriter:
         self._recorded_signals = {
             f'o{obstacle.obstacle_id}': signals for obstacle in scenario.dynamic_obstacles
             if (signals := recorded_signals(obstacle)) is not None}
+        self._set_based = {f'o{obstacle.obstacle_id}' for obstacle in scenario.dynamic_obstacles
+                           if isinstance(obstacle.prediction, SetBasedPrediction)}
         self._released = {event.object_id for event in log.game.events
                           if isinstance(event.action, Release)}
         self._pool = ids
@@ -171,6 +174,8 @@ class ObjectWriter:
         for index, (first, end) in enumerate(pieces):
             number = self._pool.fresh() if index else self.ids[item.id]
             if first == 0:
+                if item.id in self._set_based:
+                    self._notices.append(f'{item.id}: its occupancies are written as a trajectory')
                 rows = np.column_stack((poses, _signed_speeds(poses, velocities)))[:end]
                 self._parts['dynamic'].append(dynamic_obstacle(
                     number, self._type(item, DYNAMIC_TYPES), parts, rows.tolist(), False,

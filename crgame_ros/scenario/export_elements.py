@@ -15,7 +15,7 @@ from commonroad.geometry.shape import Circle, Polygon, Rectangle
 from commonroad.geometry.shape import Shape as CommonRoadShape
 from crgame_ros.geometry.outline import outline, placed_at
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.loading import parts_of
+from crgame_ros.scenario.exact_values import parts_of
 import numpy as np
 from numpy.typing import NDArray
 
@@ -202,12 +202,9 @@ def _body(parts: Parts) -> str:
 
 
 def _placed(parts: Parts, pose: Sequence[float]) -> str:
-    """Return the XML of the shapes of an object at a pose, all of one kind (`goal_position`)."""
+    """Return the XML of the shapes of an object at a pose."""
     x, y, yaw = pose
     places = [(*placed_at(np.array([own[:2]]), x, y, yaw)[0], yaw + own[2]) for _, own in parts]
-    if len({shape.kind for shape, _ in parts}) > 1:
-        return ''.join(_polygon(placed_at(outline(shape), *place).tolist())
-                       for (shape, _), place in zip(parts, places, strict=True))
     return ''.join(_placed_shape(shape, place)
                    for (shape, _), place in zip(parts, places, strict=True))
 

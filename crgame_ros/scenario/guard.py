@@ -3,6 +3,7 @@
 """Checks untrusted scenario files, so that files that pass can be read without harm."""
 
 from collections.abc import Iterable
+from datetime import date
 import math
 from pathlib import Path
 import re
@@ -114,10 +115,11 @@ def refuse_malformed(root: etree._Element, source: str) -> None:
             raise InputError('its <occupancySet> has no <occupancy>', where(occupancies, source),
                              'add one, or remove the set')
     known = {lanelet.get('id') for lanelet in lanelets}
-    for reference in root.iterfind('planningProblem/goalState/position/lanelet'):
+    for reference in root.iterfind('.//position/lanelet'):
         if reference.get('ref') not in known:
-            raise InputError(f'the goal names lanelet {reference.get("ref")}, which does not '
-                             'exist', where(reference, source), 'correct the goal')
+            name = 'goal' if reference.getparent().getparent().tag == 'goalState' else 'position'
+            raise InputError(f'the {name} names lanelet {reference.get("ref")}, which does not '
+                             'exist', where(reference, source), f'correct the {name}')
 
 
 def where(element: etree._Element, source: str) -> str:
@@ -133,6 +135,14 @@ def has_finite_numbers(elements: Iterable[etree._Element]) -> bool:
     """Return whether every leaf among the elements holds a finite number."""
     try:
         return all(math.isfinite(float(e.text or '')) for e in elements if not len(e))
+    except ValueError:
+        return False
+
+
+def is_date(text: str) -> bool:
+    """Return whether a text is a date of the form 2026-01-31, as the schema wants it."""
+    try:
+        return date.fromisoformat(text).isoformat() == text
     except ValueError:
         return False
 

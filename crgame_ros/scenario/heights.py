@@ -22,12 +22,12 @@ class LaneletHeights:
     right: NDArray[np.float64]
 
 
-def read_heights(root: etree._Element) -> dict[int, LaneletHeights]:
+def take_heights(root: etree._Element) -> tuple[dict[int, LaneletHeights], list[str]]:
     """
-    Read the heights of lanelets whose vertices all have one.
+    Read the heights of lanelets whose vertices all have one, and remove all heights.
 
-    :param root: a scenario that passed `guard.refuse_malformed`
-    :return: by lanelet id
+    :param root: a scenario that passed `guard.refuse_malformed`; changed in place
+    :return: by lanelet id, and remarks, one line each
     """
     found = {}
     for lanelet in root.iterchildren('lanelet'):
@@ -37,4 +37,14 @@ def read_heights(root: etree._Element) -> dict[int, LaneletHeights]:
         count = len(lanelet.findall('leftBound/point'))
         if left and len(left) == len(right) == count:
             found[int(lanelet.get('id', ''))] = LaneletHeights(np.array(left), np.array(right))
-    return found
+    points = [point for point in root.iter('point', 'center') if point.find('z') is not None]
+    for point in points:
+        point.remove(point.find('z'))
+    shown = sum(2 * len(heights.left) for heights in found.values())
+    notices = []
+    if shown:
+        notices.append(f'the heights of {shown} points are for the eye alone')
+    if shown < len(points):
+        notices.append(f'the heights of {len(points) - shown} points are ignored: only those of '
+                       'lanelets whose points all have one are shown')
+    return found, notices

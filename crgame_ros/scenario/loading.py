@@ -15,8 +15,6 @@ import warnings
 from xml.etree import ElementTree
 
 from commonroad.common.reader.file_reader_xml import XMLFileReader
-from commonroad.common.util import AngleInterval, Interval
-from commonroad.geometry.shape import Circle, Shape, ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet
 from commonroad.scenario.scenario import Scenario
@@ -25,14 +23,14 @@ from commonroad.scenario.traffic_sign import SupportedTrafficSignCountry
 from crgame_ros.errors import InputError, one_line
 from crgame_ros.roads.surface import lanelet_ring
 from crgame_ros.scenario import guard
+from crgame_ros.scenario.exact_values import exact_position, exact_value, uncertain_values
 from crgame_ros.scenario.format_2017a import upgrade
-from crgame_ros.scenario.heights import LaneletHeights, read_heights
+from crgame_ros.scenario.heights import LaneletHeights, take_heights
 from crgame_ros.scenario.recorded_humans import read_human_note
 from crgame_ros.scenario.repair import mend, mend_places
-from crgame_ros.scenario.simplifications import simplifications, uncertain_values
+from crgame_ros.scenario.simplifications import simplifications, unused_elements
 from lxml import etree
 import numpy as np
-from numpy.typing import NDArray
 import shapely
 
 # Lanes are sampled along their length: one of a million kilometres would fill the memory [m].
@@ -112,8 +110,8 @@ def _parsed(xml_text: str, source: str) -> LoadedScenario:
     root = guard.parse_hardened(xml_text, source)
     notices = upgrade(root) + mend_places(root)
     guard.refuse_malformed(root, source)
-    heights = read_heights(root)
-    notices += mend(root)
+    heights, remarks = take_heights(root)
+    notices += remarks + mend(root) + unused_elements(root)
     scenario, problems, remarks = _read(etree.tostring(root), source)
     notices += remarks
     # commonroad-io looks for an attribute of this name.
@@ -152,43 +150,6 @@ def _is_tangled(lanelet: Lanelet) -> bool:
 def scenario_digest(xml_text: str) -> str:
     """Return the SHA-256 by which a game identifies its scenario's text."""
     return hashlib.sha256(xml_text.encode('utf-8')).hexdigest()
-
-
-def exact_position(position: NDArray[np.float64] | Shape) -> NDArray[np.float64]:
-    """Return a position (x, y), for an uncertain one its centre [m]."""
-    if isinstance(position, ShapeGroup):
-        centroid = group_outline(position).centroid
-        return np.array([centroid.x, centroid.y])
-    if isinstance(position, Shape):
-        return np.asarray(position.center, dtype=np.float64)[:2]
-    return np.asarray(position, dtype=np.float64)[:2]
-
-
-def parts_of(shape: Shape) -> Iterator[Shape]:
-    """Yield the shapes of a group, and of the groups in it; any other shape is its only one."""
-    if isinstance(shape, ShapeGroup):
-        for part in shape.shapes:
-            yield from parts_of(part)
-    else:
-        yield shape
-
-
-def group_outline(group: ShapeGroup) -> shapely.Geometry:
-    """Return the union of a group's shapes; commonroad-io's own outline halves circles' radii."""
-    return shapely.union_all([
-        shapely.Point(shape.center).buffer(shape.radius) if isinstance(shape, Circle)
-        else shape.shapely_object for shape in parts_of(group)])
-
-
-def exact_value(value: float | Interval | None) -> float:
-    """Return a value, for an interval its middle; a missing one is 0."""
-    if value is None:
-        return 0.0
-    if isinstance(value, AngleInterval):
-        return float(value.start + 0.5 * value.length)
-    if isinstance(value, Interval):
-        return float(0.5 * (value.start + value.end))
-    return float(value)
 
 
 def _read(data: bytes, source: str) -> tuple[Scenario, list[PlanningProblem], list[str]]:

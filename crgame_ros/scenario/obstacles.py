@@ -18,7 +18,8 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.scenario.loading import exact_position, exact_value, LoadedScenario, parts_of
+from crgame_ros.scenario.exact_values import exact_position, exact_value, parts_of
+from crgame_ros.scenario.loading import LoadedScenario
 from crgame_ros.scenario.recorded_signals import recorded_signals
 import numpy as np
 from numpy.typing import NDArray

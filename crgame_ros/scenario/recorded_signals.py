@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from commonroad.common.util import Interval
 from commonroad.scenario.obstacle import DynamicObstacle, Obstacle
 from commonroad.scenario.state import SignalState
-from crgame_ros.scenario.loading import exact_value
+from crgame_ros.scenario.exact_values import exact_value
 from crgame_ros.vehicle.lights import HAZARD, Light
 
 _SWITCHES = {'indicator_left': Light.LEFT, 'indicator_right': Light.RIGHT, 'horn': Light.HORN,

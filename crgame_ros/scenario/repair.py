@@ -3,10 +3,12 @@
 """Repairs scenario files where that is safe, before commonroad-io reads them."""
 
 from collections import Counter
+import copy
 import math
 import re
 
 from commonroad.scenario.scenario import ScenarioID, TimeOfDay, Underground, Weather
+from commonroad.scenario.traffic_light import TrafficLightDirection
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.export_ids import renumber
 from lxml import etree
@@ -20,6 +22,7 @@ _BOOLEANS = ('horn', 'indicatorLeft', 'indicatorRight', 'brakingLights', 'hazard
              'flashingBlueLights', 'active', 'virtual')
 # Elements that link a lanelet to others.
 LINKS = ('successor', 'predecessor', 'adjacentLeft', 'adjacentRight')
+_DIRECTIONS = frozenset(each.value for each in TrafficLightDirection)
 _LENIENT_ID = re.compile(
     r'(C-)?([A-Z]{3})[-_.]([A-Za-z0-9]+)[-_.](\d+)'
     r'(?:[-_.](\d+)(?:[-_.]([STPI])((?:[-_.]\d+)+))?)?')
@@ -56,16 +59,18 @@ def mend(root: etree._Element) -> list[str]:
     _mend_adjacency(root, notices)
     _mend_incomings(root, notices)
     _mend_times(root, notices)
+    _mend_positions(root)
     for element in root.iter(*_BOOLEANS):
         text = (element.text or '').strip()
         element.text = {'1': 'true', '0': 'false'}.get(text, text)
     _mend_stop_lines(root, notices)
-    heights = [point for point in root.iter('point', 'center') if point.find('z') is not None]
-    for point in heights:
-        point.remove(point.find('z'))
-    if heights:
-        notices.append(f'the heights of {len(heights)} points are for the eye alone')
     for light in root.iterchildren('trafficLight'):
+        direction = light.find('direction')
+        if direction is not None:
+            direction.text = (direction.text or '').strip()
+            if direction.text not in _DIRECTIONS:
+                notices.append(f'traffic light {light.get("id")}: its direction '
+                               f'{direction.text[:40]!r} is not known and counts as all')
         if light.find('cycle') is None:
             etree.SubElement(light, 'cycle')
             notices.append(f'traffic light {light.get("id")} has no cycle and is inactive')
@@ -84,6 +89,9 @@ def _mend_header(root: etree._Element, notices: list[str]) -> None:
     if benchmark_id != given:
         root.set('benchmarkID', benchmark_id)
         notices.append(f'the malformed benchmark id {given[:60]!r} is replaced by {benchmark_id}')
+    if not guard.is_date(root.get('date', '')):
+        notices.append(f'the date {root.get("date", "")[:40]!r} is no date of the form '
+                       '2026-01-31 and is ignored')
     if root.get('commonRoadVersion') == '2018b':
         root.set('tags', root.get('tags', ''))
     elif root.find('scenarioTags') is None:
@@ -160,6 +168,11 @@ def _mend_references(root: etree._Element, notices: list[str]) -> None:
                 dropped[f'<{reference.tag}> to the missing {target} {reference.get("ref")}'] += 1
     for lanelet in root.iterchildren('lanelet'):
         for link in _links(lanelet):
+            if link.tag.startswith('adjacent') and \
+                    link.get('drivingDir') not in ('same', 'opposite'):
+                notices.append(f'lanelet {lanelet.get("id")}: the drivingDir of its {link.tag} is '
+                               f'{link.get("drivingDir")!r} and counts as opposite')
+                link.set('drivingDir', 'opposite')
             if link.get('ref') is None:
                 lanelet.remove(link)
                 dropped[f'<{link.tag}> of lanelet {lanelet.get("id")}, without a ref'] += 1
@@ -276,6 +289,18 @@ def _mend_times(root: etree._Element, notices: list[str]) -> None:
                 _set_time(goal, {'intervalStart': 0, 'intervalEnd': guard.MAX_TIME_STEP})
                 notices.append(f'planning problem {element.get("id")}: its goal has no time and '
                                'may be reached at any')
+
+
+def _mend_positions(root: etree._Element) -> None:
+    """Write the outlines of lanelets as areas: commonroad-io knows lanelets in goals alone."""
+    lanelets = {lanelet.get('id'): lanelet for lanelet in root.iterchildren('lanelet')}
+    for element in root.iterchildren(*guard.OBSTACLE_TAGS):
+        for reference in element.findall('.//position/lanelet'):
+            lanelet = lanelets[reference.get('ref')]
+            left, right = (lanelet.findall(f'{side}Bound/point') for side in ('left', 'right'))
+            outline = etree.Element('polygon')
+            outline.extend(copy.deepcopy(point) for point in (*right, *reversed(left)))
+            reference.getparent().replace(reference, outline)
 
 
 def _mend_stop_lines(root: etree._Element, notices: list[str]) -> None:

@@ -16,7 +16,7 @@ from crgame_ros.geometry.outline import placed_polygon
 from crgame_ros.geometry.reference_point import ahead
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.scenario.loading import exact_position, exact_value
+from crgame_ros.scenario.exact_values import exact_position, exact_value
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np

@@ -20,8 +20,9 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.registry import POLICY
 from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.scenario.exact_values import exact_position
 from crgame_ros.scenario.export_check import refuse_unwritable
-from crgame_ros.scenario.loading import exact_position, load_scenario, LoadedScenario
+from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.scenario.spawn import lanelet_pose, place_human, problem_pose
 from crgame_ros.scripted.objects import ScriptedObjects

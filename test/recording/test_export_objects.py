@@ -112,7 +112,7 @@ def test_shapes_and_types_of_everything(runs: Any, tmp_path: Path) -> None:
 
 
 def test_parts_of_an_obstacle_are_one_obstacle_again(runs: Any, tmp_path: Path) -> None:
-    """A group is written with all its shapes, of one kind as the schema wants it."""
+    """A group is written with all its shapes, also those of different kinds."""
     log = runs.drive(runs.own(CUT_IN), tmp_path)
     steps = len(log.ks)
 
@@ -135,6 +135,8 @@ def test_parts_of_an_obstacle_are_one_obstacle_again(runs: Any, tmp_path: Path) 
     numbers = {each.obstacle_id for each in scenario.obstacles}
     assert numbers >= {900, 901, 902, 903} and len(numbers) == 4 + len(log.vehicles)
     assert exported.obstacle_ids['o902'] == exported.obstacle_ids['o902_3'] == 902
+    assert [type(shape) for shape in scenario.obstacle_by_id(902).obstacle_shape.shapes] == [
+        Rectangle, Rectangle, Circle]
     again = ScenarioObstacles(parse_scenario(exported.xml_text, 'export'))
     for k in (0, 6, steps - 1):
         found = dict(zip(again.ids, again.states_at(k).poses[:, :2].tolist(), strict=True))
@@ -142,6 +144,23 @@ def test_parts_of_an_obstacle_are_one_obstacle_again(runs: Any, tmp_path: Path) 
             middle = [track[k, :2] for _, track in tracks(of, runs.described(name))]
             np.testing.assert_allclose(
                 [found[name], found[f'{name}_2'], found[f'{name}_3']], middle, atol=2e-4)
+
+
+def test_a_prediction_by_occupancies_is_written_as_a_trajectory(runs: Any, tmp_path: Path) -> None:
+    """And the user is told."""
+    occupancies = ''.join(
+        '<occupancy><shape><circle><radius>1</radius><center><x>20</x><y>9</y></center></circle>'
+        f'</shape><time><exact>{step}</exact></time></occupancy>' for step in range(1, 9))
+    obstacle = (
+        '<dynamicObstacle id="900"><type>car</type><shape><circle><radius>1</radius></circle>'
+        '</shape><initialState><position><point><x>20</x><y>9</y></point></position>'
+        '<orientation><exact>0</exact></orientation><time><exact>0</exact></time></initialState>'
+        f'<occupancySet>{occupancies}</occupancySet></dynamicObstacle>')
+    text = runs.own(CUT_IN).replace('<planningProblem', f'{obstacle}<planningProblem', 1)
+    exported = export_scenario(runs.drive(text, tmp_path))
+    scenario, _ = runs.read_back(exported)
+    assert len(scenario.obstacle_by_id(900).prediction.trajectory.state_list) == 8
+    assert 'o900: its occupancies are written as a trajectory' in exported.notices
 
 
 def test_recorded_signals_are_written_again(runs: Any, tmp_path: Path) -> None:

@@ -132,6 +132,18 @@ def drive(**values: str) -> str:
     return dynamic(f'<trajectory>{step}</trajectory>')
 
 
+def more_values(*names: str) -> str:
+    """Write a car whose state has more values."""
+    values = ''.join(f'<{name}><exact>1.5</exact></{name}>' for name in names)
+    return drive().replace('</state>', f'{values}</state>')
+
+
+def signals(name: str, time: str = EXACT.format(0)) -> str:
+    """Write a car with a signal."""
+    return dynamic(f'<signalSeries><signalState><time>{time}</time><{name}>true</{name}>'
+                   '</signalState></signalSeries>')
+
+
 def static(kind: str = 'unknown', initial: str = '') -> str:
     """Write a static obstacle."""
     return (f'<staticObstacle id="7"><type>{kind}</type><shape>{CIRCLE.format(1)}</shape>'
@@ -177,7 +189,7 @@ NOTES = {
     'planning problem …: the uncertain initial velocity is reduced to its centre':
         scenario(problem(state(velocity=SPREAD))),
     'the heights of … points are for the eye alone':
-        scenario().replace('<y>2</y>', '<y>2</y><z>7</z>'),
+        scenario().replace('</y>', '</y><z>7</z>'),
     'trafficSign …: its position is no number and is ignored':
         scenario(SIGN.format(206, PLACE), '<trafficSignRef ref="5"/>'),
     'trafficLight …: its position is no number and is ignored':
@@ -235,6 +247,38 @@ NOTES = {
     'vehicles wait for people who walk there, but not for those who stand before it':
         scenario(inside='<laneletType>crosswalk</laneletType>'),
     'cars use the bus lane as well': scenario(inside='<laneletType>busLane</laneletType>'),
+    'the date … is no date of the form 2026-01-31 and is ignored':
+        scenario().replace('2026-01-01', 'in May'),
+    'without effect: the hour of the day': scenario(head=environment('day', 'fog')),
+    'without effect: texts in tags':
+        scenario().replace('<scenarioTags/>', '<scenarioTags><urban>old</urban></scenarioTags>'),
+    'without effect: elements in geoReference': scenario(head=location(
+        '48', '<geoTransformation><geoReference>utm<a>32</a></geoReference></geoTransformation>')),
+    'the heights of … points are ignored: only those of lanelets whose points all have one are '
+    'shown': scenario().replace('<y>2</y>', '<y>2</y><z>7</z>', 1),
+    'its speeds do not fit its positions, which count': scenario(drive(velocity=EXACT.format(9))),
+    'without effect: speeds of static obstacles': scenario(static(initial=state())),
+    'without effect: acceleration of obstacles': scenario(more_values('acceleration')),
+    'without effect: velocityY of obstacles': scenario(more_values('velocityY')),
+    'without effect: jerk, positionZ of obstacles': scenario(more_values('positionZ', 'jerk')),
+    'without effect: slip angles of planning problems':
+        scenario(problem(state().replace('</init', '<slipAngle><exact>0.1</exact></slipAngle>'
+                                         '</init'))),
+    'the times of its signals are intervals: each holds until the next begins':
+        scenario(signals('brakingLights', SPREAD)),
+    'without effect: horns': scenario(signals('horn')),
+    'lanelet …: the drivingDir of its adjacentLeft is … and counts as opposite':
+        scenario(inside='<adjacentLeft ref="2" drivingDir="sane"/>'),
+    'without effect: userBidirectional (agents drive one way only)':
+        scenario(inside='<userBidirectional>car</userBidirectional>'),
+    'traffic light …: its direction … is not known and counts as all':
+        scenario(LIGHT.format('red', '<direction>up</direction>'), '<trafficLightRef ref="6"/>'),
+    'without effect: isLeftOf':
+        scenario('<intersection id="30"><incoming id="31"><incomingLanelet ref="1"/>'
+                 '<isLeftOf ref="31"/></incoming></intersection>'),
+    'without effect: crossings of intersections':
+        scenario('<intersection id="30"><incoming id="31"><incomingLanelet ref="1"/></incoming>'
+                 '<crossing><crossingLanelet ref="2"/></crossing></intersection>'),
     'its empty trajectory is ignored': scenario(dynamic('<trajectory/>')),
     'its empty occupancySet is ignored': scenario(dynamic('<occupancySet/>')),
 }
@@ -248,8 +292,8 @@ REFUSALS = {
     'the time step 200000 lies outside 0 to 100000':
         scenario(problem(state(time=EXACT.format(200000)))),
     'the goal names lanelet 22, which does not exist': scenario(goal('<lanelet ref="22"/>')),
-    'commonroad-io cannot read it (Exception: no further explanation)':
-        scenario(drive(position='<lanelet ref="1"/>')),
+    'the position names lanelet 22, which does not exist':
+        scenario(drive(position='<lanelet ref="22"/>')),
     'has no position': scenario(drive(position='')),
     'the initial velocity is 800 m/s': scenario(problem(state(velocity=EXACT.format(800)))),
     'has 1 points': scenario().replace('<point><x>50</x><y>2</y></point>', '', 1),

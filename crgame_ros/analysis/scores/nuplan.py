@@ -23,7 +23,8 @@ from crgame_ros.geometry.outline import outline, placed
 from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route, goal_lanelets, start_lanelet
-from crgame_ros.scenario.loading import exact_position, LoadedScenario
+from crgame_ros.scenario.exact_values import exact_position
+from crgame_ros.scenario.loading import LoadedScenario
 import numpy as np
 from numpy.typing import NDArray
 import shapely

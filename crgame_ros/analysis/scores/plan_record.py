@@ -12,7 +12,7 @@ from commonroad.scenario.state import KSState
 from crgame_ros.analysis.scores.driven_states import goal_step
 from crgame_ros.recording.offline_outcome import planner_entries
 from crgame_ros.recording.timing_report import PLAN_COUNTS
-from crgame_ros.scenario.loading import group_outline
+from crgame_ros.scenario.exact_values import group_outline
 from crgame_ros.simulation.offline import OfflineResult
 import numpy as np
 import shapely

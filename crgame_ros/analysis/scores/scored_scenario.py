@@ -21,12 +21,8 @@ from crgame_ros.geometry.angles import wrap_pi
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.recording.export import export_scenario, ExportedScenario
 from crgame_ros.recording.run_trajectories import RunTrajectories
-from crgame_ros.scenario.loading import (
-    exact_position,
-    exact_value,
-    LoadedScenario,
-    parse_scenario,
-)
+from crgame_ros.scenario.exact_values import exact_position, exact_value
+from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 import numpy as np
 from numpy.typing import NDArray

@@ -14,7 +14,8 @@ from crgame_ros.geometry.curve import Curve
 from crgame_ros.nodes.markers import style
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signs import stop_line_ends
-from crgame_ros.scenario.loading import group_outline, LoadedScenario
+from crgame_ros.scenario.exact_values import group_outline
+from crgame_ros.scenario.loading import LoadedScenario
 import numpy as np
 from numpy.typing import NDArray
 import shapely
