@@ -5,7 +5,8 @@ How many vehicles roads and junctions carry, beside the Highway Capacity Manual 
 
 Drives cars (4.5 m, no trucks) on roads made here, at a demand that they cannot meet: one lane, a
 motorway, a traffic light, a minor road at a T junction and the entry of a roundabout against a
-stream with random arrivals. SUMO drives the same roads with the same arrivals and its own
+stream with random arrivals. Critical gaps are Raff's: as many smaller gaps were accepted as larger
+ones were rejected. SUMO drives the same roads with the same arrivals and its own
 defaults, where it is installed (Debian: apt-get install sumo).
 
 The manual (HCM 6): 1,900 to 2,400 cars/h on a lane (chapter 12), 1,900 at a light, about 2 s lost
@@ -64,6 +65,8 @@ NO_ENTRANCE = 9.0
 GREEN, YELLOW, RED = 40.0, 3.0, 37.0
 # Vehicles of a queue that start up; those after them leave at the saturation flow (HCM 6).
 STARTING = 4
+# Fewer accepted or rejected gaps tell no critical one.
+LEAST_GAPS = 10
 RADIUS = 18.0
 NOBODY = np.zeros((0, 3))
 
@@ -75,11 +78,43 @@ class Result(NamedTuple):
     :param flow: [veh/h]
     :param lost_s: of a light: time lost by the first vehicles of a queue.
     :param first_s: of a light: from the start of green to the first front on the line.
+    :param critical_s: critical gap in the stream with the right of way.
+    :param follow_up_s: mean time between two vehicles that use the same gap.
     """
 
     flow: float
     lost_s: float = math.nan
     first_s: float = math.nan
+    critical_s: float = math.nan
+    follow_up_s: float = math.nan
+
+    def text(self) -> str:
+        """Return the values for a table."""
+        pair = (self.lost_s, self.first_s) if math.isfinite(self.lost_s) \
+            else (self.critical_s, self.follow_up_s)
+        return f'{self.flow:.0f}' + (
+            f' ({pair[0]:.1f}, {pair[1]:.1f} s)' if math.isfinite(pair[0]) else '')
+
+
+class Gate(NamedTuple):
+    """A line across a lane: its middle (x, y) [m], and the lane's direction there [rad]."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class Passes(NamedTuple):
+    """
+    Times at which fronts pass gates, ascending [s].
+
+    :param measured: the gate at which vehicles are counted.
+    :param stream: those of the stream at the gates of the conflict; `entering` the others there.
+    """
+
+    measured: list[float]
+    stream: list[float]
+    entering: list[float]
 
 
 @dataclass(frozen=True)
@@ -95,6 +130,7 @@ class Site:
     :param sumo: nodes, edges, connections, lights and routes of SUMO's plain formats.
     :param flow: of the stream that has the right of way [veh/h]
     :param stream: its way.
+    :param gates: where its vehicles and those that enter it pass, once each.
     """
 
     name: str
@@ -105,6 +141,7 @@ class Site:
     sumo: 'Sumo'
     flow: float = 0.0
     stream: FloatArray | None = None
+    gates: tuple[Gate, ...] = ()
     is_light: bool = False
 
 
@@ -236,9 +273,10 @@ def t_junction(turn: str, flow: float) -> Site:
         'sx xe' if to_east else 'sx xw', ('xe_0' if to_east else 'xw_0', 0.1),
         ('wx xe',) if to_east else ('wx xe', 'ex xw'))
     stream = np.array([[-far, y, 0.0], [far, y, 0.0]])
+    gates = (Gate(near, y, 0.0),) if to_east else (Gate(0.0, y, 0.0), Gate(-near, -y, math.pi))
     return Site(f'T junction, {turn} turn', roads(
         lanes, TOWN, [1], TrafficSignIDZamunda.STOP), 2, manual, TOWN, sumo, flow,
-                stream)
+                stream, gates)
 
 
 def ring(start_deg: float, end_deg: float) -> FloatArray:
@@ -287,7 +325,8 @@ def roundabout(flow: float) -> Site:
                 'ins se en outn', ('ins_0', 200.0), ('inw ws se oute', 'inw ws se en outn'))
     stream = np.array([[-far, y, 0.0], [far, y, 0.0]])
     return Site('roundabout', roads(lanes, TOWN, [12, 1]), 2,
-                1380.0 * math.exp(-0.00102 * flow), TOWN, sumo, flow, stream)
+                1380.0 * math.exp(-0.00102 * flow), TOWN, sumo, flow, stream,
+                (Gate(*leave[0], out[0] + 0.5 * math.pi),))
 
 
 def arrivals(flow: float, seconds: float, seed: int) -> list[float]:
@@ -323,36 +362,42 @@ def streams_of(site: Site, seconds: float, seed: int) -> list[Adopted]:
     return found
 
 
-def drive(site: Site, model: str, settle_s: float, seconds: float, seed: int) -> list[float]:
-    """Return the times at which fronts come onto the measured lanelet [s]."""
+def drive(site: Site, model: str, settle_s: float, seconds: float, seed: int) -> Passes:
+    """Drive agents, and return when fronts pass the start of the measured lanelet, and gates."""
     network = RoadNetwork(site.scenario.lanelet_network)
     lights = TrafficLights(site.scenario)
     spec = TrafficSpec(recorded='reactive', flow=3600.0, model=model, truck_share=0.0)
-    traffic = Traffic(spec, network, site.scenario, (),
-                      streams_of(site, settle_s + seconds, seed), STEP_S, SUBSTEPS, seed, 0)
+    stream = streams_of(site, settle_s + seconds, seed)
+    traffic = Traffic(spec, network, site.scenario, (), stream, STEP_S, SUBSTEPS, seed, 0)
     way = site.scenario.lanelet_network.find_lanelet_by_id(site.measured).center_vertices
-    along = (way[1] - way[0]) / np.hypot(*(way[1] - way[0]))
+    gates = (Gate(*way[0], math.atan2(*(way[1] - way[0])[::-1])), *site.gates)
+    middles = np.array(gates)[:, :2]
+    along, across = (np.array([(math.cos(gate.heading + turn), math.sin(gate.heading + turn))
+                               for gate in gates]) for turn in (0.0, 0.5 * math.pi))
     half = 0.5 * CAR.length
     before: FloatArray | None = None
-    times = []
+    found = Passes([], [], [])
     for k in range(round((settle_s + seconds) / STEP_S)):
         poses = traffic.states.poses
         fronts = poses[:, :2] + half * np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
-        offset = fronts - way[0]
-        ahead = offset @ along
-        ahead[np.abs(offset @ (-along[1], along[0])) > HALF_LANE] = np.nan
+        offset = fronts[:, None] - middles
+        ahead = (offset * along).sum(axis=2)
+        ahead[np.abs((offset * across).sum(axis=2)) > HALF_LANE] = np.nan
         if before is not None:
             passed = (before < 0.0) & (ahead >= 0.0) & (ahead - before < 10.0)
-            for slot in np.flatnonzero(passed):
-                share = -before[slot] / (ahead[slot] - before[slot])
-                times.append((k - 1 + float(share)) * STEP_S)
+            for slot, gate in np.argwhere(passed):
+                share = -before[slot, gate] / (ahead[slot, gate] - before[slot, gate])
+                time = (k - 1 + float(share)) * STEP_S
+                if time >= settle_s:
+                    (found.measured if gate == 0 else found.stream if slot < len(stream)
+                     else found.entering).append(time)
         before = ahead
         traffic.advance(WorldView(k, NOBODY, NOBODY, lights.states_at(k)))
-    return sorted(time for time in times if time >= settle_s)
+    return Passes(*map(sorted, found))
 
 
-def drive_sumo(site: Site, settle_s: float, seconds: float, seed: int) -> list[float]:
-    """Return the times at which SUMO's vehicles enter its detector [s]."""
+def drive_sumo(site: Site, settle_s: float, seconds: float, seed: int) -> Passes:
+    """Drive SUMO's vehicles, and return when they enter its detector."""
     sumo, end = site.sumo, settle_s + seconds
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -378,15 +423,44 @@ def drive_sumo(site: Site, settle_s: float, seconds: float, seed: int) -> list[f
                         str(end), '--seed', str(seed), '--time-to-teleport', '-1',
                         '--no-step-log'], cwd=folder, check=True, capture_output=True)
         own = {str(n) for n, (_, edges) in enumerate(sorted(trips)) if edges == sumo.saturated}
-        return sorted(float(entry.get('time', '')) for entry in ET.parse(folder / 'out.xml').iter(
-            'instantOut') if entry.get('state') == 'enter' and entry.get('vehID') in own
-            and float(entry.get('time', '')) >= settle_s)
+        return Passes(sorted(
+            float(entry.get('time', '')) for entry in ET.parse(folder / 'out.xml').iter(
+                'instantOut') if entry.get('state') == 'enter' and entry.get('vehID') in own
+            and float(entry.get('time', '')) >= settle_s), [], [])
 
 
-def result(site: Site, times: list[float], seconds: float) -> Result:
-    """Return what the times of passing mean [s]."""
+def accepted_gaps(stream: list[float], entering: list[float]) -> tuple[float, float]:
+    """
+    Return the critical gap by Raff's method, and the mean follow-up time [s]; NaN if unknown.
+
+    Vehicles that enter wait in one queue: the gaps between two of them were rejected by the later
+    one.
+    """
+    accepted, rejected, follow_up = [], [], []
+    gap_of = np.searchsorted(stream, entering)
+    for n in range(1, len(entering)):
+        first, last = int(gap_of[n - 1]), int(gap_of[n])
+        if first == last:
+            follow_up.append(entering[n] - entering[n - 1])
+            continue
+        rejected += np.diff(stream[first:last]).tolist()
+        if last < len(stream):
+            accepted.append(stream[last] - stream[last - 1])
+    if len(accepted) < LEAST_GAPS or len(rejected) < LEAST_GAPS:
+        return math.nan, math.nan
+    candidates = np.unique(accepted + rejected)
+    smaller = np.searchsorted(np.sort(accepted), candidates, 'right') / len(accepted)
+    larger = 1.0 - np.searchsorted(np.sort(rejected), candidates, 'right') / len(rejected)
+    critical = float(candidates[np.argmax(smaller >= larger)])
+    return critical, float(np.mean(follow_up)) if follow_up else math.nan
+
+
+def result(site: Site, passes: Passes, seconds: float) -> Result:
+    """Return what the times of passing mean."""
+    times = passes.measured
     if not site.is_light:
-        return Result(3600.0 * len(times) / seconds)
+        critical, follow_up = accepted_gaps(passes.stream, passes.entering)
+        return Result(3600.0 * len(times) / seconds, critical_s=critical, follow_up_s=follow_up)
     cycle = GREEN + YELLOW + RED
     headways, lost, first = [], [], []
     for _, group in itertools.groupby(times, lambda time: time // cycle):
@@ -466,6 +540,8 @@ def main() -> None:
     values = parser.parse_args()
     models = values.models.split(',') + ([SUMO] if shutil.which('sumo') else [])
     measured: list[tuple[Site, list[Result]]] = []
+    print('vehicles an hour; at a light the time lost and that of the first vehicle, else the '
+          'critical gap and the follow-up time')
     print(f'{"site":28}{"against":>9}{"manual":>8}' + ''.join(f'{name:>20}' for name in models))
     tasks: list[Task] = [
         (kind, index, model, 60.0 * values.settle, 60.0 * values.minutes, values.seed)
@@ -477,10 +553,8 @@ def main() -> None:
             for site in SITES[kind]():
                 results = [next(found) for _ in models]
                 measured.append((site, results))
-                cells = (f'{x.flow:.0f}' + (f' ({x.lost_s:.1f}, {x.first_s:.1f} s)'
-                                            if site.is_light else '') for x in results)
                 print(f'{site.name:28}{site.flow:9.0f}{site.manual:8.0f}'
-                      + ''.join(f'{cell:>20}' for cell in cells), flush=True)
+                      + ''.join(f'{each.text():>20}' for each in results), flush=True)
     if values.picture is not None:
         draw(measured, models, values.picture)
 

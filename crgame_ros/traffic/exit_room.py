@@ -75,11 +75,15 @@ def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, step: 
 @compiled
 def is_full(rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int, way: Ways,
             passage: Passages, at: Situation, i: int) -> bool:
-    """Return whether there is no room for an agent behind its next junction."""
+    """
+    Return whether there is no room for an agent behind its next junction.
+
+    In a roundabout agents close up, so that those behind them get to their exits.
+    """
     step = passage.last[i]
     # Agents that go there through the same lane are leaders and already count in `rear_stop`.
     taken = 0.0
     if 0 <= step < way.depth[i] - 1:
         taken = promised.behind[way.lane[i, step + 1]] - promised.through[way.lane[i, step]]
-    return bool(at.rear_stop[i] - taken
+    return bool(not passage.ring[i] and at.rear_stop[i] - taken
                 < passage.end[i] + agents.length[slot] + rules.room)

@@ -75,6 +75,7 @@ class Passages(NamedTuple):
     :param inside: (A) the same where it waits in the middle for oncoming vehicles; `hold` where
         there is no such place [m]
     :param end: (A) distance of its centre from the end of the last conflict [m]
+    :param ring: (A) whether the agent drives in a roundabout there, and all others yield to it.
     """
 
     granted: IntArray
@@ -84,6 +85,7 @@ class Passages(NamedTuple):
     hold: FloatArray
     inside: FloatArray
     end: FloatArray
+    ring: NDArray[np.bool_]
 
 
 @compiled
@@ -99,7 +101,7 @@ def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way:
     result = Passages(
         np.full(count, -1, np.int64), np.full(count, -1, np.int64), np.full(count, -1, np.int64),
         np.full(count, -1, np.int64), np.full(count, math.inf), np.full(count, math.inf),
-        np.full(count, -math.inf))
+        np.full(count, -math.inf), np.zeros(count, np.bool_))
     for i, slot in enumerate(slots):
         wide = 1 if agents.width[slot] > NARROW else 0
         entry, leave = conflicts.entry[wide], conflicts.leave[wide]
@@ -140,7 +142,19 @@ def passages(conflicts: ConflictTable, lines: FloatArray, lights: IntArray, way:
             result.last[i], result.end[i] = last, end
         if result.first[i] >= 0:
             result.inside[i] = _place_inside(conflicts, lights, way, agents, slot, result, i)
+            result.ring[i] = _is_in_ring(conflicts, way, result, i)
     return result
+
+
+@compiled
+def _is_in_ring(conflicts: ConflictTable, way: Ways, passage: Passages, i: int) -> bool:
+    """Return `Passages.ring`."""
+    for step in range(passage.first[i], passage.last[i] + 1):
+        lane = way.lane[i, step]
+        for row in range(conflicts.first[lane], conflicts.first[lane] + conflicts.rows[lane]):
+            if conflicts.priority[row] < 2:
+                return False
+    return True
 
 
 @compiled

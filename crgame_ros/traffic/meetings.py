@@ -19,6 +19,8 @@ BoolArray = NDArray[np.bool_]
 
 # Acceleration of a fast agent towards a conflict, and of a slow one out of it [m/s^2].
 HURRY, TIMID = 1.8, 0.7
+# In a roundabout, an agent above this share of the speed that the road allows drives freely.
+FREELY = 0.85
 
 
 class CrossingRules(NamedTuple):
@@ -31,6 +33,7 @@ class CrossingRules(NamedTuple):
     :param merging: the same where a turn joins the lane of another agent, from when the agent's
         rear is past the start of the conflict [s]; benchmarks/capacity.py compares what minor
         roads carry with the Highway Capacity Manual.
+    :param ring: the same where an agent enters a roundabout and the other drives freely in it [s]
     :param patience: standing time after which, among standing agents, the one that has stood
         longest goes first, whatever the right of way [s]; own choice.
     :param acceleration: with which agents expect to cross [m/s^2]
@@ -51,6 +54,7 @@ class CrossingRules(NamedTuple):
     gap_after: float = 0.7
     gap_before: float = 2.0
     merging: float = 0.8
+    ring: float = 1.6
     patience: float = 3.0
     acceleration: float = 1.3
     gentle: float = 2.0
@@ -234,9 +238,11 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     speed, here = arrivals.speed[theirs], _into(conflicts, arrivals, mine, pair)
     clear, leave, slower = out, _out(conflicts, arrivals, mine, pair), 0.0
     i = arrivals.owner[mine]
-    # In a roundabout, and where a lane ends beside another, agents leave the whole conflict free.
-    joins = owner >= 0 and conflicts.merges[conflict] and not conflicts.tapers[conflict] \
-        and abs(conflicts.priority[conflict]) < 2
+    # Where a lane ends beside another, and in a dense roundabout, agents leave the whole conflict
+    # free: a roundabout that is full would block its exits.
+    ring = abs(conflicts.priority[conflict]) > 1
+    joins = owner >= 0 and conflicts.merges[conflict] and not conflicts.tapers[conflict] and (
+        not ring or speed > FREELY * min(arrivals.pace[theirs], desired[owner]))
     if joins:
         # The agent that is behind where the lanes come together follows the other from there on.
         clear, leave = into + 2.0 * arrivals.half[theirs], here + 2.0 * arrivals.half[mine]
@@ -259,7 +265,7 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.other[n], found.into[n] = owner, here
     found.step[n], found.theirs[n] = arrivals.step[mine], arrivals.step[theirs]
     found.priority[n] = conflicts.priority[conflict]
-    ahead = rules.merging if joins else rules.gap_before
+    ahead = (rules.ring if ring else rules.merging) if joins else rules.gap_before
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
     found.inside[n] = into <= 0.0 and out > 0.0
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
