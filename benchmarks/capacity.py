@@ -93,7 +93,7 @@ class Result(NamedTuple):
         pair = (self.lost_s, self.first_s) if math.isfinite(self.lost_s) \
             else (self.critical_s, self.follow_up_s)
         return f'{self.flow:.0f}' + (
-            f' ({pair[0]:.1f}, {pair[1]:.1f} s)' if math.isfinite(pair[0]) else '')
+            f' ({pair[0]:.1f}, {pair[1]:.1f} s)' if all(map(math.isfinite, pair)) else '')
 
 
 class Gate(NamedTuple):
