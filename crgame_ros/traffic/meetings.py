@@ -54,7 +54,7 @@ class CrossingRules(NamedTuple):
     gap_after: float = 0.7
     gap_before: float = 2.0
     merging: float = 0.8
-    ring: float = 1.6
+    ring: float = 1.0
     patience: float = 3.0
     acceleration: float = 1.3
     gentle: float = 2.0
