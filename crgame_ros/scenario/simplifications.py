@@ -38,6 +38,8 @@ _UNUSED = {'location/environment/time': 'the hour of the day',
            'intersection/incoming/isLeftOf': 'isLeftOf',
            'intersection/crossing': 'crossings of intersections',
            'staticObstacle/initialState/velocity': 'speeds of static obstacles',
+           'obstacle[role="static"]/initialState/velocity': 'speeds of static obstacles',
+           './/horn': 'horns',
            'planningProblem/initialState/slipAngle': 'slip angles of planning problems'}
 _LANELETS = {LaneletType.BUS_LANE: 'cars use the bus lane as well',
              LaneletType.CROSSWALK: 'vehicles wait for people who walk there, but not for those '
@@ -77,9 +79,7 @@ def unused_elements(root: etree._Element) -> list[str]:
         values.discard('velocityY')
     names = [f'{", ".join(sorted(values))} of obstacles'] if values else []
     names += [name for path, name in _UNUSED.items()
-              if any(_says_something(each) for each in root.iterfind(path))]
-    if any(_says_something(horn) for horn in root.iter('horn')):
-        names.append('horns')
+              if any(map(_says_something, root.iterfind(path)))]
     return [f'without effect: {"; ".join(names)}'] if names else []
 
 

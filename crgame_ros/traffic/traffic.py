@@ -205,7 +205,8 @@ class Traffic:
         """Return which entries (E) stand for good, and swerve around them."""
         if not len(self._others):
             return np.zeros(len(entries.owner), dtype=bool)
-        standing = standing_entries(entries, self._others.standing(others))
+        self._others.update_standing(others)
+        standing = standing_entries(entries, self._others.stands)
         if self._spec.swerve:
             self._swerving.update(entries.select(np.flatnonzero(standing)))
             if self._swerving.version != self._slowed:

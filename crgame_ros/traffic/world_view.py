@@ -58,7 +58,7 @@ class Others:
 
     Attributes `drives` (O): whether it is a vehicle that follows lanes; `driven` (O): whether a
     human or a planner drives it; `widths` (O) [m]; `stands` (O): whether it is likely to stand for
-    good, see `standing`.
+    good, see `update_standing`.
     """
 
     def __init__(self, descriptions: Sequence[ObjectDescription], time_step_s: float) -> None:
@@ -118,13 +118,12 @@ class Others:
         self._seen_k, self._speed = world.k, speed
         return self._acceleration
 
-    def standing(self, world: WorldView) -> NDArray[np.bool_]:
-        """Return which others (O) are present and likely to stand for good."""
+    def update_standing(self, world: WorldView) -> None:
+        """Update `stands`: whether each of the others is present and likely to stand for good."""
         speed = np.hypot(world.velocities[:, 0], world.velocities[:, 1])
         still = speed < STANDING
         self._still = np.where(still, self._still + 1, 0)
         self.stands = np.asarray(still & (self._parked | (self._still > self._long_enough)))
-        return self.stands
 
 
 @compiled
