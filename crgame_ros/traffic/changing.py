@@ -34,6 +34,8 @@ from crgame_ros.traffic.routes import Routes
 import numpy as np
 from numpy.typing import NDArray
 
+BoolArray = NDArray[np.bool_]
+
 LOOK_BEHIND = 120.0
 MAX_LANES_BEHIND = 32
 MAX_LANES_AHEAD = 12
@@ -53,7 +55,7 @@ class Beside(NamedTuple):
     :param turn: (N) its heading against the lane's [rad]
     :param lead_gap: (N) bumper to bumper, inf without a leader [m]
     :param lead_speed: (N) [m/s]
-    :param leader: (N) row of `Entries` of the leader, -1 without one.
+    :param blocked: (N) gap to the first obstacle that stands there, inf without one [m]
     :param follow_gap: (N) bumper to bumper, inf without a follower [m]
     :param follow_speed: (N) [m/s]
     :param follower: (N) the agent behind; -1 without a follower or if it is no agent.
@@ -65,7 +67,7 @@ class Beside(NamedTuple):
     turn: FloatArray
     lead_gap: FloatArray
     lead_speed: FloatArray
-    leader: IntArray
+    blocked: FloatArray
     follow_gap: FloatArray
     follow_speed: FloatArray
     follower: IntArray
@@ -73,28 +75,29 @@ class Beside(NamedTuple):
 
 @compiled
 def find_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
-                lane: IntArray, entries: Entries) -> Beside:
+                lane: IntArray, entries: Entries, standing: BoolArray) -> Beside:
     """
     Find the leaders and followers in the lanes beside agents.
 
     :param following: (D, L) next lane to a destination, or -1.
     :param slots: (N) the agents.
     :param lane: (N) the lane beside each.
+    :param standing: (E) which entries are obstacles that stand for good.
     """
     count = len(slots)
     result = Beside(
         lane, np.empty(count), np.empty(count), np.empty(count), np.full(count, math.inf),
-        np.zeros(count), np.full(count, -1, np.int64), np.full(count, math.inf),
+        np.zeros(count), np.full(count, math.inf), np.full(count, math.inf),
         np.zeros(count), np.full(count, -1, np.int64))
-    _find_all_beside(lanes, following, agents, slots, entries, result,
+    _find_all_beside(lanes, following, agents, slots, entries, standing, result,
                      np.empty(MAX_LANES_BEHIND, np.int64), np.empty(MAX_LANES_BEHIND))
     return result
 
 
 @bare
 def _find_all_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, slots: IntArray,
-                     entries: Entries, result: Beside, pending_lane: IntArray,
-                     pending_offset: FloatArray) -> None:
+                     entries: Entries, standing: BoolArray, result: Beside,
+                     pending_lane: IntArray, pending_offset: FloatArray) -> None:
     """Write leaders and followers beside all agents; `pending_…` is room to list lanes."""
     lane = result.lane
     for i, slot in enumerate(slots):
@@ -104,14 +107,14 @@ def _find_all_beside(lanes: LaneTable, following: IntArray, agents: AgentTable, 
         guess = agents.s[slot] * lanes.length[lane[i]] / lanes.length[agents.lane[slot]]
         s, d, heading = project_on(lanes, lane[i], x, y, guess, 3)
         result.s[i], result.d[i], result.turn[i] = s, d, angle_between(yaw, heading)
-        _find_ahead(lanes, following, agents, slot, entries, result, i)
+        _find_ahead(lanes, following, agents, slot, entries, standing, result, i)
         _find_behind(lanes, agents, slot, entries, result, i, pending_lane, pending_offset)
 
 
 @bare
 def _find_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot: int,
-                entries: Entries, result: Beside, i: int) -> None:
-    """Find the leader in the lane beside and in the lanes that follow it on the route."""
+                entries: Entries, standing: BoolArray, result: Beside, i: int) -> None:
+    """Find the leader and the first obstacle beside, also in lanes that follow on the route."""
     speed, half = agents.speed[slot], 0.5 * agents.width[slot] + SIDE_MARGIN
     horizon = 30.0 + 3.0 * speed + speed**2 / 4.0
     lane, offset = result.lane[i], -result.s[i]
@@ -123,11 +126,12 @@ def _find_ahead(lanes: LaneTable, following: IntArray, agents: AgentTable, slot:
             if middle > 0.0 and entries.owner[n] != slot:
                 gap = rear_within(entries, n, -half, half) + offset - 0.5 * agents.length[slot]
                 if gap < result.lead_gap[i]:
-                    result.lead_gap[i], result.leader[i] = gap, n
-                    result.lead_speed[i] = entries.speed[n]
+                    result.lead_gap[i], result.lead_speed[i] = gap, entries.speed[n]
+                if standing[n] and gap < result.blocked[i]:
+                    result.blocked[i] = gap
         offset += lanes.length[lane]
         lane = following[agents.destination[slot], lane]
-        if lane < 0 or offset > horizon or result.leader[i] >= 0:
+        if lane < 0 or offset > horizon or result.blocked[i] < math.inf:
             break
 
 
@@ -168,25 +172,23 @@ def _find_behind(lanes: LaneTable, agents: AgentTable, slot: int, entries: Entri
                     pending += 1
 
 
-BoolArray = NDArray[np.bool_]
-
 # After a change, time without another one [s].
 CALM = 4.0
 # After any change, time without one for speed; interval at which agents consider those [s].
 CONTENT = 12.0
 THOUGHT = 1.0
-# With less room than this to an obstacle a lane change is as short as possible [m].
-TIGHT = 10.0
 # A change is at least this many lengths of the vehicle long.
 LENGTHS = 2.7
 # An agent that stops for another at a lane's end brakes by this factor harder than needed.
 LETTING_IN = 1.1
+# It stops this much before the gap is too small [m].
+SPARE = 0.2
 # An agent that has stood this long [s] before this share of its change gives the change up.
 GIVE_UP = 5.0
 STARTED = 0.4
 # Beyond that share it gives up after this many times as long.
 LATER = 5
-# A lane that is blocked too is worth changing into if its blockage is this much farther [m].
+# Least distance between the obstacles in two lanes that is worth a change [m].
 BEYOND = 25.0
 
 
@@ -275,8 +277,10 @@ class LaneChanges:
         if not len(found.slots):
             return
         wish = Wish(found.slots, found.side, found.urgency, found.room, find_beside(
-            graph.table, self._routes.next, agents.table, found.slots, found.lane, entries))
-        wish = wish.select(~_blocked(wish, standing))
+            graph.table, self._routes.next, agents.table, found.slots, found.lane, entries,
+            standing))
+        # A lane that is blocked too is worth changing into if that is much farther ahead.
+        wish = wish.select(wish.beside.blocked >= wish.room + BEYOND)
         want, now, most = (np.zeros(agents.count) for _ in range(3))
         want[slots], now[slots], most[slots] = desired, acceleration, limit
         ok, gain = self._judge(agents, wish, want, now, most)
@@ -338,8 +342,8 @@ class LaneChanges:
         if self._routes.drops[agents.lane[slot]]:
             rest = float(self._graph.length[agents.lane[slot]] - agents.s[slot])
             span = max(min(span, rest), 0.6 * SHORTEST_CHANGE)
-        if wish.room[i] < TIGHT and speed < SLOWEST:
-            span = min(span, max(float(wish.room[i]) + 1.0, 1.5 * TOO_NEAR))
+        if speed < SLOWEST:
+            span = min(span, max(float(wish.room[i] + agents.length[slot]), 1.5 * TOO_NEAR))
         agents.curve[slot] = quintic(shift, np.tan(beside.turn[i:i + 1]), np.zeros(1),
                                      np.zeros(1), np.array([span]))[0]
         agents.span[slot], agents.from_s[slot] = span, beside.s[i]
@@ -397,8 +401,9 @@ class LaneChanges:
             slot, lane, s = int(wish.slots[i]), wish.beside.lane[i], wish.beside.s[i]
             row, step = np.nonzero((way.lane == lane) & (
                 np.arange(way.lane.shape[1]) < way.depth[:, None]))
-            room = way.offset[row, step] + s - 0.5 * (
-                agents.length[slots[row]] + agents.length[slot]) - self._gaps.standstill_gap
+            apart = self._gaps.standstill_gap + SPARE + 0.5 * (
+                agents.length[slots[row]] + agents.length[slot])
+            room = way.offset[row, step] + s - apart
             fits = (room > 0.0) & (slots[row] != slot) & (
                 speed[row]**2 <= 2.0 * rules.patient_deceleration * room)
             if not fits.any():
@@ -427,13 +432,3 @@ def _finish(agents: AgentTable, give_up: int) -> IntArray:
             stuck[count] = i
             count += 1
     return stuck[:count]
-
-
-def _blocked(wish: Wish, standing: BoolArray) -> BoolArray:
-    """Return whether each lane beside is blocked by an obstacle that stands there."""
-    leader = wish.beside.leader
-    blocked = np.zeros(len(leader), dtype=bool)
-    known = leader >= 0
-    blocked[known] = standing[leader[known]]
-    # An obstacle much farther ahead than the one in the own lane does not count.
-    return blocked & (wish.beside.lead_gap < wish.room + BEYOND)

@@ -5,9 +5,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from crgame_ros.traffic.agents import AgentTable, FREE
+from crgame_ros.traffic.agents import AgentTable, FREE, NONE
 from crgame_ros.traffic.car_following import Array, CAR_FOLLOWING, CarFollowing
 from crgame_ros.traffic.compiled import bare, compiled, inlined
+from crgame_ros.traffic.lane_change import offset_at
 from crgame_ros.traffic.lane_graph import FloatArray, IntArray
 from crgame_ros.traffic.lane_table import first_at_least, LaneTable, nearest_row
 from crgame_ros.traffic.placement import Entries, rear_within
@@ -21,6 +22,8 @@ MAX_AHEAD, MAX_LEADERS = 6, 2
 # A vehicle this far behind the beginning of a body may still be beside it [m].
 LONGEST = 25.0
 SIDE_MARGIN = 0.15
+# The place where a lane change meets a body is found in so many steps.
+CLOSER = 3
 
 
 class Ways(NamedTuple):
@@ -154,23 +157,25 @@ def first_from(entries: Entries, lane: int, rear: float) -> int:
 
 
 @compiled
-def ahead(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
-          reference: FloatArray) -> Pairs:
+def ahead(lanes: LaneTable, agents: AgentTable, entries: Entries, way: Ways,
+          corridor: Corridors, reference: FloatArray) -> Pairs:
     """
     Find the entries that are ahead of each agent and in its way.
+
+    An agent that changes lanes has left the lane where its path leaves it.
 
     :param reference: offset of the reference at each point of the lanes [m]; empty: none.
     """
     room = len(way.depth) * MAX_AHEAD
     found = Pairs(np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room),
                   np.empty(room))
-    used = _find(lanes, entries, way, corridor, reference, found)
+    used = _find(lanes, agents, entries, way, corridor, reference, found)
     return Pairs(found.agent[:used], found.entry[:used], found.gap[:used], found.distance[:used])
 
 
 @bare
-def _find(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
-          reference: FloatArray, found: Pairs) -> int:
+def _find(lanes: LaneTable, agents: AgentTable, entries: Entries, way: Ways,
+          corridor: Corridors, reference: FloatArray, found: Pairs) -> int:
     """Write the pairs of all agents; return how many there are."""
     used = 0
     for i in range(len(way.depth)):
@@ -182,7 +187,8 @@ def _find(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
             for n in range(first_from(entries, lane, -offset - LONGEST), behind):
                 if entries.rear[n] + offset >= horizon:
                     break
-                rear = _in_the_way(lanes, entries, n, lane, offset, corridor, i, reference)
+                rear = _in_the_way(lanes, agents, entries, n, lane, offset, corridor, i,
+                                   reference)
                 if rear < np.inf:
                     found.agent[used], found.entry[used] = i, n
                     found.distance[used] = rear + offset
@@ -197,8 +203,8 @@ def _find(lanes: LaneTable, entries: Entries, way: Ways, corridor: Corridors,
 
 
 @bare
-def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: float,
-                corridor: Corridors, i: int, reference: FloatArray) -> float:
+def _in_the_way(lanes: LaneTable, agents: AgentTable, entries: Entries, n: int, lane: int,
+                offset: float, corridor: Corridors, i: int, reference: FloatArray) -> float:
     """Return where an entry that is in an agent's way begins [m], inf for any other."""
     middle = 0.5 * (entries.rear[n] + entries.front[n])
     if middle + offset <= 0.0 or entries.owner[n] == corridor.owner[i]:
@@ -209,8 +215,38 @@ def _in_the_way(lanes: LaneTable, entries: Entries, n: int, lane: int, offset: f
     if len(reference):
         shift += reference[row]
     margin = SIDE_MARGIN + abs(curve_shift(at.curvature, corridor.front[i]))
-    return float(rear_within(entries, n, corridor.low[i] + shift - margin,
-                             corridor.high[i] + shift + margin))
+    low, high = corridor.low[i] + shift - margin, corridor.high[i] + shift + margin
+    slot, place = corridor.owner[i], rear_within(entries, n, low, high)
+    if agents.source[slot] == NONE or agents.source[slot] == agents.lane[slot]:
+        return float(place)
+    wide = agents.width[slot] + 2.0 * margin
+    for _ in range(CLOSER):
+        if place == np.inf:
+            break
+        steered = _steered(agents, slot, place + offset)
+        right, left = low + max(steered, 0.0), high + min(steered, 0.0)
+        place = rear_within(entries, n, min(right, left - wide), max(left, right + wide))
+    return float(place)
+
+
+@bare
+def _steered(agents: AgentTable, slot: int, distance: float) -> float:
+    """
+    Return how far an agent in a lane change has moved to the side where it passes a place [m].
+
+    :param distance: of the place from the agent's centre [m]
+    """
+    curve, span = agents.curve[slot], agents.span[slot]
+    done, half, off = agents.s[slot] - agents.from_s[slot], 0.5 * agents.length[slot], \
+        agents.d[slot]
+    here, least = offset_at(curve, done, span), abs(off)
+    for center in (distance - half, distance, distance + half):
+        at = done + max(center, 0.0)
+        slope = offset_at(curve, at + 0.5, span) - offset_at(curve, at - 0.5, span)
+        # The vehicle's axis, where it passes the place.
+        moved = offset_at(curve, at, span) + (done + distance - at) * slope - here
+        least = min(least, max(moved if off < 0.0 else -moved, 0.0))
+    return least if off < 0.0 else -least
 
 
 @compiled

@@ -27,7 +27,7 @@ AT_LINE, AT_END = 1.6, 3.0
 # Agents halt at this gap before a line, and a standing agent this near to it stays [m].
 LINE_GAP, NEAR = 0.5, 0.3
 # Room that an agent needs before a standing obstacle to get into the next lane [m].
-SWING_OUT = 10.0
+SWING_OUT, SWING_LENGTHS = 10.0, 2.0
 # Share of a short lane that ends which is kept for a lane change.
 REST_SHARE = 0.2
 # Comfortable jerk [m/s^3]: of braking more, of braking less or accelerating; braking harder than
@@ -93,6 +93,12 @@ def _fill_speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Wa
         limit[i] = max(limit[i], -2.0 * COASTING)
 
 
+@compiled
+def swing_out_room(length: float) -> float:
+    """Return the room that a vehicle of a length [m] leaves to steer out by an obstacle [m]."""
+    return max(SWING_OUT, SWING_LENGTHS * length)
+
+
 @bare
 def halt_before(speed: float, distance: float, braking: float) -> float:
     """
@@ -123,7 +129,7 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
     Behind an obstacle that it can pass in the next lane an agent leaves room to get around it.
 
     :param drops: (L) lanes that end on the road.
-    :param distance: (A) of the front from a line, or inf; lowered for obstacles [m]
+    :param distance: (A) of the front from a line, or inf [m]
     :param blocked: (A) gap to an obstacle that stands in the lane, or inf [m]
     :param swings: whether agents change lanes, of all slots.
     :param wanted: (A) accelerations, which are lowered [m/s^2]
@@ -131,10 +137,13 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
     for i, slot in enumerate(slots):
         speed, lane = agents.speed[slot], agents.lane[slot]
         beside = lanes.left[lane] >= 0 or lanes.right[lane] >= 0
+        before_obstacle = math.inf
         # An agent that is nearer already cannot leave this room any more.
-        if swings[slot] and beside and agents.source[slot] == NONE and (
-                blocked[i] > 0.5 * SWING_OUT):
-            distance[i] = min(distance[i], blocked[i] - SWING_OUT)
+        room = swing_out_room(agents.length[slot])
+        if swings[slot] and beside and agents.source[slot] == NONE and blocked[i] > 0.5 * room:
+            # One that is nearer already halts where it comfortably can.
+            before_obstacle = max(blocked[i] - room, min(
+                speed * speed / (2.0 * FIRMEST), blocked[i] - 0.5 * room))
         last = way.lane[i, way.depth[i] - 1]
         end = math.inf
         if drops[last]:
@@ -142,7 +151,8 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
             end = (way.offset[i, way.depth[i] - 1] + lanes.length[last]
                    - 0.5 * agents.length[slot]
                    - min(SHORTEST_CHANGE, REST_SHARE * lanes.length[last]))
-        wanted[i] = min(wanted[i], halt_before(speed, max(distance[i], 0.0), AT_LINE))
+        wanted[i] = min(wanted[i], halt_before(
+            speed, max(min(distance[i], before_obstacle), 0.0), AT_LINE))
         wanted[i] = min(wanted[i], halt_before(speed, max(end, 0.0), AT_END))
 
 

@@ -239,8 +239,8 @@ class Spawner:
         lanes, middle = self._graph.table, np.zeros(len(slots))
         entries = place(lanes, self._cells.table, with_agents(others, agents.table))
         way = own_ways(lanes, self._routes.next, agents.table, slots)
-        pairs = ahead(lanes, entries, way, corridors(agents.table, slots, middle, middle),
-                      np.empty(0))
+        corridor = corridors(agents.table, slots, middle, middle)
+        pairs = ahead(lanes, agents.table, entries, way, corridor, np.empty(0))
         gap, _, entry = nearest(pairs, entries, len(slots))
         speed = np.zeros(len(slots))
         speed[entry >= 0] = entries.speed[entry[entry >= 0]]

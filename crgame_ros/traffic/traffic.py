@@ -262,7 +262,7 @@ class Traffic:
         agents, lanes, reference = self._agents, self._graph.table, self._swerving.reference
         way = own_ways(lanes, self._routes.next, agents.table, slots)
         corridor = own_corridors(lanes, agents.table, slots, reference)
-        return way, corridor, ahead(lanes, entries, way, corridor, reference)
+        return way, corridor, ahead(lanes, agents.table, entries, way, corridor, reference)
 
     def _mind_left_lanes(self, slots: IntArray, desired: FloatArray, entries: Entries,
                          standing: NDArray[np.bool_], acceleration: FloatArray) -> None:
@@ -277,8 +277,8 @@ class Traffic:
         guess = agents.s[slot] * self._graph.length[lane] / self._graph.length[agents.lane[slot]]
         s, d, _ = self._graph.project(lane, center[:, 0], center[:, 1], guess)
         corridor = corridors(agents.table, slot, d, d)
-        pairs = ahead(lanes, entries, ways(lanes, self._routes.next, agents.table, slot, lane, s),
-                      corridor, NO_REFERENCE)
+        way = ways(lanes, self._routes.next, agents.table, slot, lane, s)
+        pairs = ahead(lanes, agents.table, entries, way, corridor, NO_REFERENCE)
         # An agent that steers out from behind an obstacle gets nearer to it than s0.
         pairs.gap[standing[pairs.entry]] += CLOSE
         acceleration[row] = np.minimum(acceleration[row], self._longitudinal.behind(

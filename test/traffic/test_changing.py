@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lane changes for the route, past slow leaders and where a lane ends; courtesy; swerving."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from commonroad.scenario.scenario import Scenario
@@ -109,6 +110,44 @@ def test_an_obstacle_that_blocks_the_lane_is_passed_in_the_next() -> None:
     assert run.overlaps() == []
     assert np.nanmax(run.series(0)[0][:, 0]) > 400.0
     assert np.nanmax(run.series(1)[0][:, 0]) > 400.0
+
+
+def test_an_agent_that_stands_behind_an_obstacle_passes_it_when_the_next_lane_is_free() -> None:
+    wreck = support.human(130.0, -3.5, 0.0, kind='parkedVehicle')
+    beside = [agent(2 + i, 110.0 - 22.0 * i, 0.0, 11.0, 11.0) for i in range(4)]
+    run = support.Run(two_lanes(), TrafficSpec(lane_changes=True), 0, [wreck],
+                      [agent(1, 112.0, -3.5, 3.0, 11.0), *beside]).ticks(400)
+    assert run.overlaps() == []
+    poses, speeds = run.series(0)
+    assert np.nanmin(speeds) < 0.1, 'it stood until the four beside had passed'
+    assert np.nanmax(poses[:, 0]) > 200.0
+
+
+@pytest.mark.parametrize('length', [4.5, 8.0])
+def test_a_standing_vehicle_steers_out_from_behind_another(length: float) -> None:
+    """A lane change that clears the leader's corner is not given up before it, by no length."""
+    wreck = support.human(130.0, -3.5, 0.0, kind='parkedVehicle')
+    waiting = agent(1, 130.0 - 2.25 - 2.0 * length - 0.5 * length, -3.5, 0.0, 11.0)
+    shape = Shape.rectangle(length, 2.5)
+    waiting = replace(waiting, description=replace(waiting.description, shape=shape))
+    run = support.Run(two_lanes(), TrafficSpec(), 0, [wreck], [waiting]).ticks(250)
+    assert run.overlaps() == []
+    poses, _ = run.series(0)
+    assert np.nanmax(poses[:, 0]) > 180.0
+    # The outer edge is at 1.75 m, and the front swings out beyond the vehicle's middle.
+    assert np.nanmax(poses[:, 1]) < 0.75
+
+
+def test_no_change_into_a_lane_that_is_blocked_behind_a_queue() -> None:
+    """Two cars stand behind an obstacle in the right lane; who is faster stays left of them."""
+    wreck = support.human(160.0, -3.5, 0.0, kind='parkedVehicle')
+    queue = [agent(2 + i, 148.0 - 7.0 * i, -3.5, 0.0, 0.0) for i in range(2)]
+    slow = agent(4, 110.0, 0.0, 4.0, 4.0)
+    run = support.Run(two_lanes(), TrafficSpec(), 0, [wreck],
+                      [agent(1, 90.0, 0.0, 8.0, 14.0), slow, *queue]).ticks(150)
+    assert run.overlaps() == []
+    poses, _ = run.series(0)
+    assert np.nanmin(poses[:, 1]) > -0.5
 
 
 def test_an_obstacle_at_the_edge_of_the_lane_is_swerved_around() -> None:
