@@ -18,6 +18,7 @@ from crgame_ros.driver.source import (
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GameDocument, parse_game_document, parse_seats_document
 from crgame_ros.registry import POLICY
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.device_delay import DeviceDelay
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.live_driver import live_driver
@@ -147,7 +148,7 @@ class DriverNode(PromptNode):
             seat = parse_seats_document(message.data).get(self._vehicle_id)
             self._silent = seat is not None and seat['source'] != GAME
         except InputError as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            complain(self, 'seats', str(error))
 
     def _on_clock(self, message: Clock) -> None:
         """Begin the cycle that the clock has reached."""

@@ -10,6 +10,7 @@ from crgame_ros.game.documents import parse_signals_document, Signals
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.nodes.markers.markers import SceneMarkers
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -181,7 +182,7 @@ class MarkerNode(Node):
                         av_id, from_joint_trajectory(request, f'/{av_id}/plan_request'))
             except InputError as error:
                 # The plan's AV refuses it and reports that; here the plan is just not drawn.
-                self.get_logger().warning(str(error), throttle_duration_sec=5.0)
+                complain(self, av_id, str(error))
 
     def _read_signals(self, text: str) -> None:
         try:

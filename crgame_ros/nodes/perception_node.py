@@ -11,6 +11,7 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.perception.perception import Perception
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints, NodeReport
 from crgame_ros.ros.messages import SeriesMessage
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -71,7 +72,7 @@ class PerceptionNode(Node):
                 self._observe(step)
             self._answer()
         except CrgameError as error:
-            self.get_logger().error(f'{self._vehicle_id}: {error}', throttle_duration_sec=1.0)
+            complain(self, 'perception', f'{self._vehicle_id}: {error}', failed=True)
 
     def _forget(self) -> None:
         """Discard the state for a new run, or for a restart of the same one."""

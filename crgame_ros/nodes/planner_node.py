@@ -16,6 +16,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager, swapped_in
 from crgame_ros.planner.request_reader import RequestReader
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import SeriesMessage, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
@@ -168,7 +169,7 @@ class PlannerNode(Node):
                 from_joint_trajectory(message, f'/{self._vehicle_id}/plan_request'))
         except InputError as error:
             # A request of the game before or after this one; its documents have not arrived yet.
-            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            complain(self, 'request', str(error))
             self._waiting = message
             return
         course = self._time.follow(request.stamp_ns)

@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STATES = 4
+# The noise of at most this many steps is summed at once.
+MOST_STEPS = 1000
 # Columns of a step's row of random numbers.
 _HEADING, _SPEED_CHANGE, _WALK, _MEASUREMENT, _WIDTH = 0, 1, 2, 4, 8
 
@@ -96,7 +98,7 @@ class Localisation:
         """
         if n <= self._n:
             return
-        rows = np.sum([self._noise.normal(step) for step in range(self._n + 1, n + 1)], axis=0)
+        rows = self._summed_noise(n)
         self._find_dropouts(n)
         self._predict(n - self._n, truth, rows)
         self._walk += self._spec.bias_walk * math.sqrt(self._dt_s) * rows[_WALK:_WALK + 2]
@@ -104,6 +106,14 @@ class Localisation:
         self._truth = truth
         if n % self._period == 0:
             self._correct(n, truth)
+
+    def _summed_noise(self, n: int) -> Array:
+        """Return the sum of the noise of all steps after the last one, up to n."""
+        steps = n - self._n
+        latest = range(n + 1 - min(steps, MOST_STEPS), n + 1)
+        # A stamp far ahead must not cost time: the noise of the latest steps stands for all.
+        return np.sum([self._noise.normal(step) for step in latest], axis=0) \
+            * math.sqrt(steps / len(latest))
 
     def _predict(self, steps: int, truth: VehicleState, rows: Array) -> None:
         """Predict the estimate by the inertial unit's measurements; sum up their noise."""

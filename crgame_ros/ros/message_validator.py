@@ -10,6 +10,7 @@ from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.messages.contract import Topic
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.diagnostics import Diagnostics, printable
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
@@ -186,13 +187,13 @@ class Refusals:
         self._told_s = -math.inf
 
     def note(self, where: str, reason: str) -> None:
-        """Count a refusal; publish it unless another one was published just before."""
+        """Count a refusal, log one line a minute, and publish at most one status a second."""
         self.counts[where] = self.counts.get(where, 0) + 1
+        text = printable(reason)[:LONGEST_REASON]
+        complain(self._node, where, f'refused: {text}')
         now_s = time.monotonic()
         if now_s - self._told_s < REPORT_S:
             return
         self._told_s = now_s
-        text = printable(reason)[:LONGEST_REASON]
-        self._node.get_logger().warning(f'refused: {text}')
         self._diagnostics.publish(f'{self._node.get_name()}: messages refused',
                                   DiagnosticStatus.WARN, text, self.counts)

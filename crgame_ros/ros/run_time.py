@@ -33,11 +33,12 @@ class RunTime:
     The course of time in the stamps of one topic.
 
     :param usual_ns: largest usual time from one message to the next [ns].
+    :param at_ns: where it begins; None: with the first stamp, whatever it is [ns].
     """
 
-    def __init__(self, usual_ns: int = USUAL_NS) -> None:
+    def __init__(self, usual_ns: int = USUAL_NS, at_ns: int | None = None) -> None:
         self._usual_ns = usual_ns
-        self._at_ns: int | None = None
+        self._at_ns = at_ns
         self._elsewhere_ns: list[int] = []
 
     def follow(self, stamp_ns: int) -> TimeCourse:

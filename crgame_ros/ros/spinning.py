@@ -7,6 +7,7 @@ from pathlib import Path
 import time
 import traceback
 
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import PolledGroup
 from crgame_ros.ros.node_main import StopFlag
 from rclpy.executors import Executor, SingleThreadedExecutor
@@ -15,8 +16,6 @@ from rclpy.subscription import Subscription
 
 # A waiting executor does not notice a signal: the flag is polled at this period [s].
 LOOK_S = 0.1
-# Period of log lines about a persistent failure [s].
-COMPLAIN_S = 1.0
 
 
 class PromptNode(Node):
@@ -32,7 +31,7 @@ class PromptNode(Node):
 
 def attempt(node: Node, work: Callable[[], None]) -> None:
     """
-    Do a piece of work, and log one line if it fails.
+    Do a piece of work, and log one line a minute if it fails.
 
     An unforeseen error in a received message must cost only that message, not the node.
     """
@@ -41,8 +40,18 @@ def attempt(node: Node, work: Callable[[], None]) -> None:
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         place = f'{Path(last.filename).name}:{last.lineno}'
-        node.get_logger().error(f'{type(error).__name__} at {place}: {error}'[:500],
-                                throttle_duration_sec=COMPLAIN_S)
+        complain(node, place, f'{type(error).__name__} at {place}: {error}'[:500], failed=True)
+
+
+def serve(node: Node, executor: Executor, timeout_s: float) -> None:
+    """
+    Run the next callback of a node, if there is one or one comes in time.
+
+    A callback that fails costs only its own request.
+
+    :param timeout_s: longest wait [s]
+    """
+    attempt(node, lambda: executor.spin_once(timeout_sec=timeout_s))
 
 
 def prompt_executor() -> Executor:
@@ -69,7 +78,7 @@ def spin(node: Node, stop: StopFlag, executor: Executor | None = None) -> None:
     executor = executor or SingleThreadedExecutor()
     executor.add_node(node)
     while not stop.requested:
-        attempt(node, lambda: executor.spin_once(timeout_sec=LOOK_S))
+        serve(node, executor, LOOK_S)
     executor.remove_node(node)
 
 
@@ -87,7 +96,7 @@ def poll(node: Node, stop: StopFlag, period_s: float, work: Callable[[], None]) 
     while not stop.requested:
         attempt(node, work)
         if time.monotonic() - served_s > LOOK_S:
-            attempt(node, lambda: executor.spin_once(timeout_sec=0))
+            serve(node, executor, 0.0)
             served_s = time.monotonic()
         time.sleep(period_s)
     attempt(node, work)

@@ -12,7 +12,7 @@ from crgame_ros.messages.joints import vehicles_from_joints
 from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time
-from crgame_ros.ros.run_time import RunTime, TimeCourse
+from crgame_ros.ros.run_time import RunTime, TimeCourse, USUAL_NS
 from crgame_ros.ros.scenario_documents import ScenarioSet
 import numpy as np
 from numpy.typing import NDArray
@@ -68,12 +68,17 @@ class WorldFollower:
         self._objects = endpoints.polled('/traffic/objects', depth=MAX_WAITING)
         self._scenario: ScenarioSet | None = None
         self._waiting: deque[JointTrajectory] = deque(maxlen=MAX_STATES)
+        # Messages far ahead of the others: of a run that goes on there, or false.
+        self._ahead: list[JointTrajectory] = []
         self._objects_by_n: dict[int, ObjectStates] = {}
         self._latest: ObjectStates | None = None
 
     def begin(self, scenario: ScenarioSet) -> None:
         """Follow another run; messages of it that have already come are kept."""
         self._scenario = scenario
+        self._time = RunTime(at_ns=scenario.game.scheduler.clock_offset_ns)
+        self._waiting.extend(self._ahead)
+        self._ahead.clear()
         self._reader = WorldMessages(scenario.objects)
         self._objects_by_n.clear()
         self._latest = None
@@ -99,7 +104,15 @@ class WorldFollower:
 
     def _receive_states(self) -> None:
         while (message := self._states.pop()) is not None:
-            course = self._time.follow(from_time(message.header.stamp))
+            course = self._time.follow(_stamp_ns(message))
+            if course is TimeCourse.AHEAD:
+                self._ahead.append(message)
+                continue
+            if self._ahead and course is not TimeCourse.BEHIND:
+                # Time has moved on to there only if this message follows those.
+                if 0 <= _stamp_ns(message) - _stamp_ns(self._ahead[-1]) <= USUAL_NS:
+                    self._waiting.extend(self._ahead)
+                self._ahead.clear()
             if course is TimeCourse.BACK:
                 self._waiting.clear()
                 self._objects_by_n.clear()
@@ -126,7 +139,7 @@ class WorldFollower:
     def _complete(self, scenario: ScenarioSet, message: JointTrajectory) -> WorldStep | None:
         """Return a step, None if its objects have not come yet; n < 0: of another run."""
         scheduler = scenario.game.scheduler
-        n = scheduler.step_of_stamp(from_time(message.header.stamp))
+        n = scheduler.step_of_stamp(_stamp_ns(message))
         nothing = np.empty((0, 4))
         foreign = WorldStep(-1, False, nothing, nothing, nothing,
                             ObjectStates(nothing, nothing))
@@ -149,3 +162,7 @@ class WorldFollower:
         if self._latest is None:
             return foreign
         return WorldStep(n, tick, joints[0], joints[1], joints[2], self._latest)
+
+
+def _stamp_ns(message: JointTrajectory) -> int:
+    return from_time(message.header.stamp)

@@ -19,6 +19,8 @@ TIMING_COLUMNS = (
 LATE_COLUMNS = (*(f'late_{cause}_s' for cause in Causes._fields), 'late_in')
 # Earlier versions had the first four, then no `put_back`.
 COMMAND_COLUMNS = ('throttle', 'brake', 'steering', 'reverse', 'lights', 'put_back')
+# No number of timing is larger, in seconds, steps or counts.
+LARGEST = 1e12
 # Their first columns in a row.
 _LATE, _COMMANDS = len(TIMING_COLUMNS), len(TIMING_COLUMNS) + len(LATE_COLUMNS)
 
@@ -85,13 +87,16 @@ class CycleTable:
     Rows read from `/timing/cycle`.
 
     :param columns: names of the columns.
-    :param rows: (R, columns) one row per cycle.
+    :param rows: (R, columns) one row per cycle; rows without numbers of timing are left out,
+        because anyone can publish them.
     """
 
     def __init__(self, columns: Sequence[str], rows: NDArray[np.float64]) -> None:
         self._place = {name: index for index, name in enumerate(columns)}
         self.columns = tuple(columns)
-        self.rows = rows
+        timing = rows[:, [self._place[name] for name in TIMING_COLUMNS]]
+        # Written so that NaN fails the comparison.
+        self.rows = rows[(np.abs(timing) <= LARGEST).all(axis=1)]
 
     @classmethod
     def from_message(cls, label: str, data: Sequence[float]) -> 'CycleTable':
@@ -111,7 +116,7 @@ class CycleTable:
 
     @property
     def epoch(self) -> int:
-        """Return the epoch of the rows."""
+        """Return the epoch of the rows, of which there must be one."""
         return int(self.column('epoch')[0])
 
     def column(self, name: str) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from live_support import PATIENCE_S
 import numpy as np
 from numpy.typing import NDArray
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 import rclpy
@@ -109,6 +110,14 @@ class Peer:
         self.wait_until(future.done, f'an answer to the parameter {name}')
         self.node.destroy_client(client)
         return future.result().results[0]
+
+    def send_parameter(self, parameter: ParameterMessage) -> None:
+        """Ask for a parameter of the simulation, without waiting for an answer."""
+        client = self.node.create_client(SetParameters, '/sim_node/set_parameters')
+        self.wait_until(client.service_is_ready, 'the parameters of sim_node')
+        client.call_async(SetParameters.Request(parameters=[parameter]))
+        self.listen_for(0.5)
+        self.node.destroy_client(client)
 
     @property
     def clock_ns(self) -> list[int]:

@@ -5,6 +5,7 @@
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 import json
+import math
 import os
 from pathlib import Path
 import signal
@@ -19,6 +20,7 @@ from live_peer import Peer
 from live_support import is_node, Launcher, SCENARIOS
 import numpy as np
 import pytest
+from rcl_interfaces.msg import Parameter, ParameterValue
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
@@ -154,6 +156,32 @@ def test_no_game_ends_a_node_or_names_code_that_is_run(run: Run, tmp_path: Path)
     # The test's own node has received all these messages, too.
     peer.messages['/scenario/game'][:] = [String(data=good)]
     _whole(run, pids)
+
+
+def test_bad_orders_and_numbers_cost_the_run_nothing(run: Run) -> None:
+    """
+    Orders at which a callback raises, states hours ahead and infinite rows are refused.
+
+    The runs of other tests end with the conversion of what was recorded.
+    """
+    launcher, peer = run
+    pids, sender = dict(launcher.started), Sender(peer)
+    for name in ('x' * 300, 'a\0b', '../' * 2_000):
+        assert not peer.set_parameter('game', name).successful
+    # rclpy itself raises for a type that there is not: the caller gets no answer.
+    peer.send_parameter(Parameter(name='game', value=ParameterValue(type=200)))
+    sender.meet((topic, '') for topic in ('/vehicles/state', '/timing/cycle'))
+    state = peer.messages['/vehicles/state'][-1]
+    state.header.stamp.sec += 20_000
+    sender.send('/vehicles/state', '', state)
+    for value in (math.inf, math.nan):
+        cycle = peer.messages['/timing/cycle'][-1]
+        cycle.data[0] = value
+        sender.send('/timing/cycle', '', cycle)
+    peer.listen_for(1.0)
+    sender.close()
+    _whole(run, pids)
+    assert peer.call('/sim/pause').success and peer.call('/sim/start').success
 
 
 @pytest.mark.clock

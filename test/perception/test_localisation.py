@@ -220,3 +220,22 @@ def test_own_sensors_give_the_rest_of_the_state() -> None:
     localisation = trace(course, np.arange(1, 51), 0)
     assert localisation.estimate[4:] == course[50][4:]
     assert localisation.estimate[:4] != course[50][:4]
+
+
+@pytest.mark.parametrize('steps', [1_000, 4_000, 10**9, 2 * 10**11])
+def test_a_step_far_ahead_is_bounded_work(steps: int) -> None:
+    """
+    A stamp may name any step; the heading still walks as white noise of its rate does.
+
+    After a time t its deviation is sigma sqrt(t), here of 100 vehicles.
+    """
+    spec, at_rest = LocalisationSpec(yaw_rate_noise=1e-7), VehicleState(0.0, 0.0, 0.0, 0.0)
+    yaws = []
+    for seed in range(100):
+        localisation = Localisation(spec, seed, 'av0', at_rest, DT)
+        before = localisation.estimate.yaw
+        # No multiple of the period of measurements.
+        localisation.step(steps + 1, at_rest)
+        yaws.append(localisation.estimate.yaw - before)
+    expected = spec.yaw_rate_noise * math.sqrt(steps * DT)
+    assert np.std(yaws) == pytest.approx(expected, rel=0.25)

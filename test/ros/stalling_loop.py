@@ -109,7 +109,8 @@ def main() -> None:
     """Run the loop; the argument is a folder for files."""
     rclpy.init()
     controller = TimeController(TimingSpec(drift_reset=False), DT_S)
-    pacer = Pacer(SingleThreadedExecutor(), controller, DT_S, 50)
+    executor = SingleThreadedExecutor()
+    pacer = Pacer(lambda: executor.spin_once(timeout_sec=0.0), controller, DT_S, 50)
     steps = 20 * (len(DEEDS) + 1)
     rows = CycleRows((), steps)
     deeds = {20 * (index + 1): name for index, name in enumerate(DEEDS)}

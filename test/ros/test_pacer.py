@@ -35,7 +35,7 @@ def test_orders_are_served_after_a_bounded_number_of_steps(left_s: float,
     rclpy.init(context=context, domain_id=ros_domain)
     executor = CountingExecutor(context=context)
     controller = TimeController(TimingSpec(drift_reset=False), DT_S)
-    pacer = Pacer(executor, controller, DT_S, LONGEST)
+    pacer = Pacer(lambda: executor.spin_once(timeout_sec=0.0), controller, DT_S, LONGEST)
     controller.start(time.monotonic_ns())
     served = []
     with StepWatch() as watch:

@@ -122,3 +122,23 @@ def test_a_tick_whose_objects_are_lost_holds_up_nothing(stage: Stage) -> None:
     stage.objects(3)
     # Of tick 2 the last known ones.
     assert stage.follow(3) == [(1, 1.0), (2, 1.0), (3, 3.0)]
+
+
+def test_a_single_state_from_far_ahead_is_dropped(stage: Stage) -> None:
+    """One message must not move the world by hours: time jumps only where others follow."""
+    for k in (0, 1):
+        stage.objects(k)
+        stage.state(k)
+    stage.state(200_000)
+    for k in (2, 3):
+        stage.objects(k)
+        stage.state(k)
+    assert [k for k, _ in stage.follow(4)] == [0, 1, 2, 3]
+
+
+def test_a_run_that_goes_on_far_ahead_is_followed_without_a_gap(stage: Stage) -> None:
+    """A node may hear nothing for a while; the first states that it hears then are kept."""
+    for k in (0, 1, 100, 101, 102, 103):
+        stage.objects(k)
+        stage.state(k)
+    assert [k for k, _ in stage.follow(6)] == [0, 1, 100, 101, 102, 103]

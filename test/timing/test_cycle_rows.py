@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rows of /timing/cycle: filled, taken and read back."""
 
+import math
+
 from crgame_ros.errors import InputError
 from crgame_ros.timing.cycle_rows import CycleRows, CycleTable, TIMING_COLUMNS
 from crgame_ros.timing.time_controller import Cycle
@@ -100,3 +102,14 @@ def test_other_messages_are_refused(label: str, data: list[float]) -> None:
     """Missing columns or rows that are not whole: another version wrote them."""
     with pytest.raises(InputError, match='/timing/cycle: has other columns'):
         CycleTable.from_message(label, data)
+
+
+@pytest.mark.parametrize('wrong', [math.inf, -math.inf, math.nan, 1e300])
+def test_rows_that_are_no_measurements_are_left_out(wrong: float) -> None:
+    """Anyone may publish a row; its numbers must not reach tables or conversions."""
+    good = [0.0, 7.0, 1.0, *[0.01] * (len(TIMING_COLUMNS) - 3)]
+    for place in range(len(TIMING_COLUMNS)):
+        bad = list(good)
+        bad[place] = wrong
+        table = CycleTable.from_message(','.join(TIMING_COLUMNS), [*good, *bad, *good])
+        np.testing.assert_array_equal(table.rows, [good, good])

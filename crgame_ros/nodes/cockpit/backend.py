@@ -17,6 +17,7 @@ from crgame_ros.game.task_documents import PageTimes, TaskReport
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.nodes.cockpit.seat_desk import PeopleFeed, SeatDesk
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.diagnostics import Diagnostics
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.spinning import attempt
@@ -95,8 +96,6 @@ WATCH_PERIOD_S = 0.01
 IDLE_PERIOD_S = 0.05
 # Period of the work that may wait: services, names of people, orders without an answer [s].
 SERVE_PERIOD_S = 0.1
-# Period of log lines about messages that cannot be read: peers repeat them [s].
-COMPLAIN_S = 1.0
 # A client that uploads a game gets its seat if the game begins within this time [s].
 BEGINS_WITHIN_S = 60.0
 _DEEDS = {'start': 'started the run', 'pause': 'paused the run', 'step': 'stepped through the run',
@@ -160,13 +159,13 @@ class LiveBackend:
 
     def _pass_on(self) -> None:
         for problem in self._feed.poll():
-            self._node.get_logger().error(problem[:500], throttle_duration_sec=COMPLAIN_S)
+            complain(self._node, 'feed', problem[:500], failed=True)
         message = self._seat_slot.latest()
         if message is not None:
             try:
                 self._desk.receive_seats(message.data)
             except InputError as error:
-                self._node.get_logger().warning(str(error), throttle_duration_sec=COMPLAIN_S)
+                complain(self._node, 'seats', str(error))
         if self._lost != self._feed.status.seats_lost:
             self._lost = dict(self._feed.status.seats_lost)
             self._desk.show()

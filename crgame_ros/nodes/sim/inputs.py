@@ -14,6 +14,7 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.request_layout import request_head
 from crgame_ros.messages.status_values import read_status, status_truth
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
 from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.seats import Seats
@@ -152,7 +153,7 @@ class SimInputs:
             except InputError as error:
                 reason = str(error)
             if reason is not None:
-                self._node.get_logger().warning(reason, throttle_duration_sec=1.0)
+                complain(self._node, 'task', reason)
 
     def stop_request(self) -> tuple[str, str] | None:
         """Return (vehicle, n) of a violation that asks for a stop, None if there is none."""

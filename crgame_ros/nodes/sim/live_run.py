@@ -17,10 +17,12 @@ from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
 from crgame_ros.nodes.sim.run_state import Outcome, RunState
 from crgame_ros.nodes.sim.start_gate import ReadyGate, StartGate
 from crgame_ros.nodes.sim.step_watch import StepWatch
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.seats import SeatSpells
+from crgame_ros.ros.spinning import serve
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.late_step import Phase
@@ -46,15 +48,15 @@ class Pacer:
     """
     The pacer of the loop: it waits for each cycle on the steady clock and serves orders meanwhile.
 
-    :param executor: runs the services.
+    :param serve: runs a waiting service.
     :param controller: computes when cycles are due.
     :param dt_s: nominal step [s]
     :param longest: cycles after which orders are served even if no time is left for them.
     """
 
-    def __init__(self, executor: SingleThreadedExecutor, controller: TimeController,
+    def __init__(self, serve: Callable[[], object], controller: TimeController,
                  dt_s: float, longest: int) -> None:
-        self._executor = executor
+        self._serve = serve
         self._controller = controller
         # At high rates half a step must be enough, or no service could stop the run.
         self._slack_ns = min(SERVICE_SLACK_NS, 0.5 * dt_s * NS_PER_S)
@@ -81,7 +83,7 @@ class Pacer:
         if (left_ns > self._slack_ns and n % self._every == 0) or self._unserved >= self._longest:
             self._unserved = 0
             watch.mark(Phase.SERVICES)
-            self._executor.spin_once(timeout_sec=0)
+            self._serve()
         watch.mark(Phase.WAIT)
         left_ns = self.due_ns - time.monotonic_ns()
         if left_ns > self._awake_ns:
@@ -127,7 +129,7 @@ class LiveRun:
         self._inputs.choose(self._answers, None if feed is None else feed.wants)
         self._dt_s = scheduler.dt_s
         self._controller = TimeController(setup.game.timing, self._dt_s)
-        self._pacer = Pacer(executor, self._controller, self._dt_s,
+        self._pacer = Pacer(lambda: self._serve(0.0), self._controller, self._dt_s,
                             setup.game.timing.max_catch_up_steps)
         self._watch = StepWatch()
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
@@ -191,7 +193,7 @@ class LiveRun:
         self._state.stand()
         while not (self._stop.requested or control.reset_wanted):
             self._state.publish('ended', self._reason)
-            self._executor.spin_once(timeout_sec=0.02)
+            self._serve(0.02)
             self._state.show_newcomers()
             self._apply_orders(time.monotonic_ns())
         control.over = False
@@ -203,11 +205,15 @@ class LiveRun:
         self._inputs.destroy()
         self._watch.close()
 
+    def _serve(self, timeout_s: float) -> None:
+        """Serve an order, if there is one or one comes in time [s]."""
+        serve(self._node, self._executor, timeout_s)
+
     def _settle(self) -> None:
         """Wait until subscribers have the new documents, before messages that need them."""
         until_ns = time.monotonic_ns() + SETTLE_NS
         while time.monotonic_ns() < until_ns:
-            self._executor.spin_once(timeout_sec=0.02)
+            self._serve(0.02)
 
     def _wait_for_companions(self, result: StepResult,
                              heard: HeardTopics | None) -> Outcome | None:
@@ -231,7 +237,7 @@ class LiveRun:
             if people.opens(now_ns, is_open):
                 return None
             self._state.publish('paused' if is_open and control.stands_still else 'waiting')
-            self._executor.spin_once(timeout_sec=0.005)
+            self._serve(0.005)
             if is_open:
                 self._state.show_newcomers()
             self._apply_orders(time.monotonic_ns())
@@ -294,7 +300,7 @@ class LiveRun:
         if changed:
             self._publish_seats()
         for refusal in refusals:
-            self._node.get_logger().warning(refusal, throttle_duration_sec=1.0)
+            complain(self._node, 'order', refusal)
             self._diagnostics.order_refused(refusal)
         for av_id, running in self._inputs.planner_orders.items():
             self.simulation.set_planner_running(av_id, running)
@@ -333,7 +339,7 @@ class LiveRun:
         self._outputs.publish_rows()
         self._state.publish('paused')
         while self._control.stands_still and self._ordered_end() is None:
-            self._executor.spin_once(timeout_sec=0.02)
+            self._serve(0.02)
             self._state.publish('paused')
             self._state.show_newcomers()
             self._apply_orders(time.monotonic_ns())
