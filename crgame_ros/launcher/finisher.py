@@ -3,6 +3,7 @@
 """Finishing the recordings of ended runs, while the graph stays for the next one."""
 
 from collections.abc import Callable
+import json
 from pathlib import Path
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
 
 if TYPE_CHECKING:  # It takes a second to import.
+    from crgame_ros.analysis.criticality.criticality import Criticality
     from crgame_ros.recording.finish import FinishedRecording
 
 LOOK_S = 0.5
@@ -36,6 +38,7 @@ class Finisher:
         self._say = say
         self._reports = reports
         self._finished: list[FinishedRecording] = []
+        self._criticality: dict[Path, Criticality | None] = {}
         self._process: subprocess.Popen[str] | None = None
         self._codes: dict[Path, int] = {}
         self._folder = session
@@ -85,9 +88,29 @@ class Finisher:
         try:
             with writing(self._say, 'still writing the report; once more leaves it out'):
                 for each in self._finished:
-                    write_run_report(each, self._say)
+                    self._criticality[each.bag.parent] = write_run_report(each, self._say)
         except KeyboardInterrupt:
             self._say(f'no report; `crgame report {self._session}` writes it')
+
+    def tell_outcomes(self) -> int:
+        """
+        Print one line about each run, as the last lines of a session.
+
+        :return: `NO_PLANS` if some planner drove none of its plans, else 0.
+        """
+        from crgame_ros.analysis.outcome_line import NO_PLANS, outcome_line, undriven
+        code = 0
+        for folder in run_folders(self._session):
+            try:
+                timing = json.loads((folder / 'timing.json').read_text(encoding='utf-8'))
+            except (OSError, ValueError):
+                # What kept it from being written has been told.
+                continue
+            for line in undriven(timing):
+                self._say(f'error: {line}')
+                code = NO_PLANS
+            self._say(f'{folder.name}: {outcome_line(timing, self._criticality.get(folder))}')
+        return code
 
     def _start(self, folder: Path) -> None:
         self._folder = folder

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import os
 from pathlib import Path
 import selectors
+import shlex
 import shutil
 import signal
 import sys
@@ -245,8 +246,9 @@ def launch(arguments: Sequence[str] | None = None) -> int:
         with writing(print_now):
             code = max(code, finisher.finish_all(graph.was_asked_to_end))
         finisher.write_reports()
-        print_now(f'again: ./run.sh {plan.game_file}; tools: ./crgame --help')
-        return code
+        print_now(f'again: ./run.sh {shlex.quote(str(plan.game_file))}; tools: ./crgame --help')
+        failed = finisher.tell_outcomes()
+        return code or failed
     except CrgameError as error:
         print(f'error: {error}', file=sys.stderr, flush=True)
         return error.exit_code

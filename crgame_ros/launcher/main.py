@@ -15,8 +15,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     Run a game from the command line.
 
-    :return: exit code: 0 at a good end, 2 for bad input, 1 for other failures, 130 where a second
-        signal left files unwritten.
+    :return: exit code: 0 at a good end, 2 for bad input, 3 where a planner drove none of its
+        plans, 1 for other failures, 130 where a second signal left files unwritten.
     """
     before = signal.getsignal(signal.SIGINT)
     # A shell that starts this in the background may have set SIGINT to be ignored.

@@ -10,13 +10,14 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.recording.progress import Progress
 
 if TYPE_CHECKING:  # It takes a second to import.
+    from crgame_ros.analysis.criticality.criticality import Criticality
     from crgame_ros.recording.finish import FinishedRecording
 
 
 def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object],
-                     progress: bool = True) -> None:
+                     progress: bool = True) -> 'Criticality | None':
     """
-    Write the report of a run beside its recording.
+    Write the report of a run beside its recording, and return the run's criticality.
 
     A failure is only reported, because it must not harm the run.
 
@@ -39,8 +40,9 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
         write_report([run], path, driven_here=True)
     except (CrgameError, OSError) as error:
         say(f'error: no report: {error}')
-        return
+        return None
     except Exception as error:
         say(f'error: no report: {type(error).__name__}: {error}')
-        return
+        return None
     say(f'  {path} ({time.monotonic() - began_s:.1f} s)')
+    return run.criticality

@@ -13,6 +13,7 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
+from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager, swapped_in
 from crgame_ros.planner.request_reader import RequestReader
@@ -156,8 +157,8 @@ class PlannerNode(Node):
         gc.disable()
         if manager.failure is None:
             self.get_logger().info(f'{self._vehicle_id}: planner {name} is ready')
-        else:
-            self.get_logger().error(f'{self._vehicle_id}: planner {name}: {manager.failure}')
+        self._failures = FailureLines(self._vehicle_id, self.get_logger().error)
+        self._failures.note(manager)
         self._apply_events()
 
     def _on_request(self, message: JointTrajectory) -> None:
@@ -180,6 +181,8 @@ class PlannerNode(Node):
             self._prepare(self._scenario)
         self._diagnostics.now_ns = request.stamp_ns
         plan = self._manager.plan(request)
+        if plan.fallback:
+            self._failures.note(self._manager)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)
         self._message = SeriesMessage.for_series(series, self._message)
         self._plans.publish(self._message.fill(series))

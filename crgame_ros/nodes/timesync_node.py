@@ -7,6 +7,7 @@ import time
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GameDocument, parse_game_document
 from crgame_ros.game.game import TimingSpec
+from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
@@ -14,13 +15,15 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.timing.frame_skipping import FrameSkipping
 from crgame_ros.timing.late_steps import LateSteps
-from crgame_ros.timing.metrics import TimingMetrics
+from crgame_ros.timing.metrics import SLOW, TimingMetrics
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
 PERIOD_S = 0.02
 REPORT_S = 1.0
+# Before this simulated time a run's ratio says little [s].
+SETTLED_S = 3.0
 
 
 class TimesyncNode(Node):
@@ -63,7 +66,8 @@ class TimesyncNode(Node):
 
     def _add(self, table: CycleTable) -> None:
         self._awaited.check(self._game is not None, True)
-        if self._game is None or self._metrics is None or table.epoch != self._game.epoch:
+        if self._game is None or self._metrics is None or not len(table.rows) \
+                or table.epoch != self._game.epoch:
             return
         stamp_ns = self._game.scheduler.stamp_ns(int(table.column('n')[-1]))
         course = self._time.follow(stamp_ns)
@@ -103,6 +107,9 @@ class TimesyncNode(Node):
         values = summary.as_dict()
         ratios = values.pop('real_time_ratio')
         values.update({f'real_time_ratio_{key}': value for key, value in ratios.items()})
+        if ratios['final'] < SLOW and metrics.cycles * metrics.dt_s > SETTLED_S:
+            complain(self, 'slow', f'slower than real time (ratio {ratios["final"]:.2f}): the '
+                     'machine is too busy or too slow for this game')
         values['frame_skipping'] = self._skipping.active
         values['frame_skip_orders'] = self._skipping.orders
         values['late_steps'] = self._late.count

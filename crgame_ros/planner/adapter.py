@@ -149,7 +149,12 @@ class PlannerAdapter:
 
     def _keep_failure(self, error: Exception) -> None:
         if not self.statistics.failure and not isinstance(error, PlanningError):
-            self.statistics.failure = ''.join(traceback.format_exception(error))
+            frames = error.__traceback__
+            # The caller's frame here says nothing about the planner.
+            if frames is not None and frames.tb_next is not None:
+                frames = frames.tb_next
+            self.statistics.failure = ''.join(traceback.format_exception(
+                type(error), error, frames))
 
 
 def describe(error: Exception) -> str:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a game as fast as possible, without ROS."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +20,7 @@ from crgame_ros.python_interface.games import argument_names, as_game, FileName
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.recording.export import scenario_path, write_scenario
 from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_inputs import (
     inputs_of,
     recorded_inputs,
@@ -49,6 +50,7 @@ def run_summary(result: OfflineResult, wall_s: float) -> dict[str, Any]:
             av_id: {'accepted_ratio': round(record.accepted_ratio, 4),
                     'requests': record.counters.requests, 'accepted': record.counters.accepted,
                     'refused': record.counters.refused,
+                    'last_refusal': record.counters.last_refusal or None,
                     'fallbacks': record.statistics.fallbacks,
                     'reasons': dict(record.statistics.reasons),
                     **({} if record.tracking is None else {'worst_tracking_errors': {
@@ -171,13 +173,15 @@ def run(game: Game | FileName | None = None, *,
 
 
 def drive(name: str, setup: Setup, latency_steps: int = 0,
-          triggers: Sequence[tuple[str, float]] = ()) -> OfflineRun:
+          triggers: Sequence[tuple[str, float]] = (),
+          say: Callable[[str], object] = lambda _: None) -> OfflineRun:
     """
     Run a setup, with the recorded inputs of humans whose driver is a recording.
 
     :param name: displayed name of the run.
     :param latency_steps: simulation steps between a request and its plan.
     :param triggers: names of events, with their times after the start [s]
+    :param say: called with each text about failing planners, and about progress.
     :raises InputError: as `run_offline`; if the latency is negative.
     """
     if latency_steps < 0:
@@ -186,7 +190,8 @@ def drive(name: str, setup: Setup, latency_steps: int = 0,
     steps = [(round(time_s / setup.scheduler.dt_s), event) for event, time_s in triggers]
     began_s = time.perf_counter()
     result = run_offline(setup, latency_steps=latency_steps, drivers=drivers,
-                         intervals_s=intervals_s, clock_s=time.perf_counter, triggers=steps)
+                         intervals_s=intervals_s, clock_s=time.perf_counter, triggers=steps,
+                         say=say, progress=Progress(say, f'driving {name}'))
     return OfflineRun(name, result, time.perf_counter() - began_s)
 
 

@@ -14,6 +14,7 @@ from crgame_ros.game.task_documents import TaskEntry
 from crgame_ros.messages.joints import JointSeries, plan_to_joints
 from crgame_ros.perception.perception import Perception
 from crgame_ros.planner.adapter import PlannerStatistics
+from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager
 from crgame_ros.planner.request_reader import RequestReader
@@ -132,7 +133,8 @@ class PlannerSeat:
     """One AV's planner in process, answering a stated number of steps late."""
 
     def __init__(self, setup: Setup, av_index: int, simulation: Simulation, latency_steps: int,
-                 clock_s: Callable[[], float] | None) -> None:
+                 clock_s: Callable[[], float] | None,
+                 say: Callable[[str], object] = lambda _: None) -> None:
         av = setup.avs[av_index]
         self.id = av.id
         self._latency = latency_steps
@@ -146,6 +148,8 @@ class PlannerSeat:
             setup.game.drivability.road)
         self.manager = PlannerManager(
             context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
+        self._failures = FailureLines(av.id, say)
+        self._failures.note(self.manager)
         self.perception: Perception | None = None
         if av.spec.perception is not None:
             initial = published_states([av.state])[0]
@@ -167,6 +171,8 @@ class PlannerSeat:
             request = self.perception.perceive(request)
             self._simulation.request_perceived(self.id, request)
         plan = self.manager.plan(self._reader.read(request))
+        if plan.fallback:
+            self._failures.note(self.manager)
         series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
         n = self._simulation.n
         self._due.append((n + (self._latency if n else 0), series))
@@ -174,7 +180,7 @@ class PlannerSeat:
     def deliver(self) -> None:
         """Deliver the answers that are due before the next step."""
         while self._due and self._due[0][0] <= self._simulation.n:
-            self._simulation.offer_plan(self.id, self._due.pop(0)[1])
+            self._failures.refuse(self._simulation.offer_plan(self.id, self._due.pop(0)[1]))
 
     def record(self) -> PlannerRecord:
         """Return the results of the planner."""
@@ -191,6 +197,8 @@ def run_offline(
     clock_s: Callable[[], float] | None = None, triggers: Sequence[tuple[int, str]] = (),
     observers: Sequence[RunObserver] = (),
     traces: Mapping[str, NDArray[np.float64]] | None = None,
+    say: Callable[[str], object] = lambda _: None,
+    progress: Callable[[float], object] = lambda _: None,
 ) -> OfflineResult:
     """
     Run a game as fast as possible.
@@ -207,6 +215,8 @@ def run_offline(
         the first tick from n on.
     :param observers: receive every state that a live run publishes.
     :param traces: (N, 8) states by human, from step 0 on, that replace driving.
+    :param say: called with each text about a planner that fails.
+    :param progress: called with the share of the run that is done, 0 to 1, at each step.
     :raises InputError: if a human's driver needs a person or a device, or a trigger is refused.
     """
     simulation = Simulation(setup, traces=traces)
@@ -215,7 +225,7 @@ def run_offline(
     hands = [drivers.get(human.id) or offline_driver(setup, index)
              for index, human in enumerate(setup.humans)]
     takers = [drivers.get(av.id) for av in setup.avs]
-    seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s)
+    seats = [PlannerSeat(setup, index, simulation, latency_steps, clock_s, say)
              for index in range(len(setup.avs))]
     trace = _Trace(setup, steps, check_drivability, observers)
     dt_s = simulation.scheduler.dt_s
@@ -241,6 +251,7 @@ def run_offline(
         effective_s = intervals[simulation.n] if simulation.n < len(intervals) else dt_s
         _trigger(simulation, triggers, simulation.n + 1)
         result = simulation.step(effective_s, commands)
+        progress(simulation.n / steps)
     else:
         trace.add(simulation, result, effective_s)
     return trace.result(simulation, {seat.id: seat.record() for seat in seats})

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 LOWEST_S = 1e-8
 HIGHEST_S = 1e3
 BINS_PER_DECADE = 100
+# A run below this real-time ratio is too slow for people and planners.
+SLOW = 0.95
 
 
 class LogHistogram:

@@ -17,6 +17,7 @@ from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
 from crgame_ros.nodes.sim.run_state import Outcome, RunState
 from crgame_ros.nodes.sim.start_gate import ReadyGate, StartGate
 from crgame_ros.nodes.sim.step_watch import StepWatch
+from crgame_ros.planner.adapter import reason_kind
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics
@@ -273,8 +274,14 @@ class LiveRun:
         """Return whether a plan answers a request; any number of others is refused."""
         reason = self.simulation.unasked_plan(av_id, stamp_ns)
         if reason is not None:
-            self._diagnostics.refusal(av_id, reason)
+            self._refuse(av_id, reason)
         return reason is None
+
+    def _refuse(self, av_id: str, reason: str) -> None:
+        """Report a refused answer of an AV's planner."""
+        self._diagnostics.refusal(av_id, reason)
+        complain(self._node, f'{av_id}: {reason_kind(reason)}',
+                 f'{av_id}: its planner answered, but the plan was refused: {reason}')
 
     def _accept_plan(self, av_id: str) -> bool:
         """Pass an AV its new plan; return whether it was accepted."""
@@ -291,7 +298,7 @@ class LiveRun:
             reason = str(error)
             self.simulation.refuse_malformed_plan(av_id, reason)
         if reason is not None:
-            self._diagnostics.refusal(av_id, reason)
+            self._refuse(av_id, reason)
         return reason is None
 
     def _apply_orders(self, now_ns: int) -> None:

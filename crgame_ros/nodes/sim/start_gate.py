@@ -141,7 +141,12 @@ class StartGate:
 
     def _time_out(self, now_ns: int, timeout_s: float) -> None:
         missing = [] if self._connected else self._missing()
-        missing += [f'the planner of {av_id}' for av_id in sorted(self._planners)]
+        for av in self._simulation.avs:
+            if av.setup.id in self._planners and av.counters.refused:
+                self._say(f'starting without a plan of {av.setup.id}: its planner answered, but '
+                          f'was refused {av.counters.refused} times: {av.counters.last_refusal}')
+            elif av.setup.id in self._planners:
+                missing.append(f'the planner of {av.setup.id}')
         missing += ['the traffic'] if self._traffic_answers is not None else []
         missing += [f'a record of {topic}' for topic in self._unrecorded.values()
                     if self._connected and not missing]

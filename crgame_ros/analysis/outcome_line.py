@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run in one line, and the AVs whose planners never drove; the same for live and offline."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.timing.metrics import SLOW
+
+# Exit code of a run in which no plan of some planner was driven.
+NO_PLANS = 3
+
+
+def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = None) -> str:
+    """
+    Return contacts, least TTC, driven plans and the real-time ratio of a run.
+
+    :param outcome: content of `timing.json`, or result of `offline_outcome`.
+    """
+    contacts = outcome['contacts']
+    parts = [] if contacts is None else [_counted(len(contacts), 'contact')]
+    found = () if criticality is None else criticality.report()
+    worst = [each.worst['ttc'].value for each in found if 'ttc' in each.worst]
+    if worst:
+        parts.append(f'least TTC {min(worst):.2f} s')
+    # The last request of a run has no answer yet.
+    due = sum(entry[key] or 0 for entry in outcome['planners'].values()
+              for key in ('accepted', 'refused', 'timed_out'))
+    if due:
+        driven = sum(_driven(entry) for entry in outcome['planners'].values())
+        parts.append(f'{driven} of {_counted(due, "plan")} accepted')
+    if (ratio := outcome.get('real_time_ratio')) is not None:
+        slow = ' (slower than real time: the machine is too busy or too slow)'
+        parts.append(f'real-time ratio {ratio["final"]:.3f}'
+                     + (slow if ratio['final'] < SLOW else ''))
+    return ', '.join(parts)
+
+
+def undriven(outcome: Mapping[str, Any]) -> list[str]:
+    """Return one line for each AV that drove none of its planner's plans, with the reason."""
+    return [f'{av}: no plan of its planner was driven: {_why(entry)}'
+            for av, entry in outcome['planners'].items()
+            if entry['requests'] and not _driven(entry)]
+
+
+def _driven(entry: Mapping[str, Any]) -> int:
+    """Return how many plans were accepted, without the braking plans that stand for failures."""
+    return max(0, (entry['accepted'] or 0) - (entry['fallback'] or 0))
+
+
+def _why(entry: Mapping[str, Any]) -> str:
+    reasons: Mapping[str, int] = entry['fallback_reasons'] or {}
+    if reasons:
+        return max(reasons, key=lambda each: reasons[each])
+    if entry['refused']:
+        return f'answered, but refused {entry["refused"]} times: {entry["last_refusal"]}'
+    return 'it never answered'
+
+
+def _counted(count: int, what: str) -> str:
+    return f'{count} {what}' if count == 1 else f'{count} {what}s'
