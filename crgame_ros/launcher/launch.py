@@ -3,6 +3,7 @@
 """A live run from the command line: check it, run it, and convert the recording to a scenario."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 import os
 from pathlib import Path
 import selectors
@@ -203,10 +204,9 @@ def restarted(spec: NodeSpec, count: int) -> NodeSpec:
     """Return the spec of a node that is started again: a recorder continues in a new folder."""
     if spec.executable != 'recorder_node':
         return spec
-    folder = Path(spec.parameters['directory'].strip('"'))
+    folder = Path(str(spec.parameters['directory']))
     name = f'{folder.name.partition("_part")[0]}_part{count + 1}'
-    parameters = spec.parameters | {'directory': f'"{folder.with_name(name)}"'}
-    return NodeSpec(spec.executable, spec.name, parameters, spec.nice, spec.restart)
+    return replace(spec, parameters={**spec.parameters, 'directory': folder.with_name(name)})
 
 
 def launch(arguments: Sequence[str] | None = None) -> int:

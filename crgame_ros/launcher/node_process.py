@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """One node of the graph as a child process."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import json
 import os
+from pathlib import Path
 import signal
 
 from crgame_ros.launcher.forked_node import fork_node
 from crgame_ros.ros.node_main import TELL_WHERE
 
 MAX_LINE = 10_000
+
+Parameter = str | bool | int | float | Path | Sequence[str | Path]
 
 
 @dataclass(frozen=True)
@@ -19,14 +24,14 @@ class NodeSpec:
 
     :param executable: sim_node, planner_node, …
     :param name: node name in the graph; the prefix of its output.
-    :param parameters: ROS parameters.
+    :param parameters: ROS parameters; a path is passed as text.
     :param nice: its niceness, to give the simulation priority.
     :param restart: whether it may be started again when it dies.
     """
 
     executable: str
     name: str
-    parameters: dict[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     nice: int = 0
     restart: bool = False
 
@@ -39,7 +44,8 @@ class NodeSpec:
         """Return the arguments of the command line, for a graph in a namespace."""
         ros = ['--ros-args', '-r', f'__node:={self.name}', '-r', f'__ns:={namespace}']
         for key, value in self.parameters.items():
-            ros += ['-p', f'{key}:={value}']
+            # JSON is YAML, which rcl reads: any path stays one text.
+            ros += ['-p', f'{key}:={json.dumps(value, ensure_ascii=False, default=str)}']
         return ros
 
 

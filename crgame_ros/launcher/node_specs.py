@@ -24,7 +24,7 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     setup, request = plan.setup, plan.request
     companions = [
         *participant_specs(Participants.from_setup(setup), plan.roster),
-        NodeSpec('recorder_node', 'recorder_node', {'directory': f'"{plan.bag}"'},
+        NodeSpec('recorder_node', 'recorder_node', {'directory': plan.bag},
                  nice=COMPANION_NICE, restart=True),
         NodeSpec('drivability_node', 'drivability_node', nice=COMPANION_NICE, restart=True),
         NodeSpec('timesync_node', 'timesync_node', nice=COMPANION_NICE, restart=True),
@@ -34,20 +34,17 @@ def node_specs(plan: RunPlan) -> list[NodeSpec]:
     # the page.
     waits = any(human.driver == COCKPIT for human in setup.humans)
     drivers = [spec for spec in viewers if waits and spec.executable == 'cockpit_node']
-    waiting = ', '.join(f'"{spec.name}"' for spec in (*companions, *drivers))
     # Later games may come from the page, and from the folder of the first one.
     folders = [plan.cockpit / 'games']
     if request.game is not None:
         folders.append(request.game.resolve().parent)
-    directories = ', '.join(f'"{folder}"' for folder in folders)
     simulation = NodeSpec('sim_node', 'sim_node', {
-        'at_end': at_end(request), 'countdown': repr(float(request.countdown_s)),
-        'folder': f'"{plan.folder}"',
-        'game': f'"{plan.game_file}"', 'real_time_factor': repr(float(request.real_time_factor)),
-        'realtime_priority': str(request.realtime_priority).lower(),
-        'start_paused': str(request.start_paused).lower(),
-        'scenario_directories': f'[{directories}]', 'roster': f'"{plan.roster}"',
-        'wait_for': f'[{waiting}]'})
+        'at_end': at_end(request), 'countdown': float(request.countdown_s),
+        'folder': plan.folder, 'game': plan.game_file,
+        'real_time_factor': float(request.real_time_factor),
+        'realtime_priority': request.realtime_priority, 'start_paused': request.start_paused,
+        'scenario_directories': folders, 'roster': plan.roster,
+        'wait_for': [spec.name for spec in (*companions, *drivers)]})
     return [simulation, *companions, *viewers]
 
 
@@ -75,7 +72,7 @@ def participant_specs(participants: Participants, roster: Path) -> list[NodeSpec
 
     :param roster: file in which sim_node names the code that they may run.
     """
-    code = {'roster': f'"{roster}"'}
+    code = {'roster': roster}
     specs = [
         *(NodeSpec('planner_node', f'planner_node_{av}', {'vehicle': av, **code},
                    nice=COMPANION_NICE, restart=True)
@@ -99,24 +96,22 @@ def _viewer_specs(plan: RunPlan) -> list[NodeSpec]:
     request = plan.request
     viewers = [NodeSpec('marker_node', 'marker_node', nice=VIEWER_NICE, restart=True)]
     if not request.headless:
-        seats = ', '.join(f'"{human.id}"' for human in plan.setup.humans)
         viewers.append(NodeSpec('cockpit_node', 'cockpit_node', {
-            'port': str(request.port), 'listen': f'"{cockpit_host(request)}"',
-            'token': str(request.token).lower(),
-            'open_cockpit': str(request.open_cockpit).lower(),
+            'port': request.port, 'listen': cockpit_host(request), 'token': request.token,
+            'open_cockpit': request.open_cockpit,
             'certificate': _path(request.certificate), 'key': _path(request.key),
-            'framed_by': f'"{request.framed_by}"',
-            'private': f'"{plan.private}"', 'seats': f'[{seats}]',
-            'folders': f'["{plan.setup.game.scenario.resolve().parent}"]',
-            'directory': f'"{plan.cockpit}"', 'runs': f'"{plan.folder}"',
+            'framed_by': request.framed_by, 'private': plan.private,
+            'seats': [human.id for human in plan.setup.humans],
+            'folders': [plan.setup.game.scenario.resolve().parent],
+            'directory': plan.cockpit, 'runs': plan.folder,
             # The files beside a folder that the user named are not shown.
-            'archive': f'"{plan.folder.parent if request.out is None else ""}"'},
+            'archive': plan.folder.parent if request.out is None else ''},
             nice=COMPANION_NICE, restart=True))
     return viewers
 
 
 def _path(path: Path | None) -> str:
-    return '""' if path is None else f'"{path.resolve()}"'
+    return '' if path is None else str(path.resolve())
 
 
 class Roster:

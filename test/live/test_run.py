@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import json
 import math
 from pathlib import Path
+import re
 import signal
 
 import commonroad
@@ -53,9 +54,9 @@ NODES = {'sim_node', 'driver_node_hv0', 'planner_node_av0', 'recorder_node', 'dr
 
 @pytest.fixture(scope='module')
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Launcher]:
-    """Run the cut-in game to the end of its short duration."""
+    """Run the cut-in game to the end of its short duration, in a folder of any name."""
     with Launcher([CUT_IN, '--duration', DURATION_S],
-                  tmp_path_factory.mktemp('finished') / 'run', report=True) as launcher:
+                  tmp_path_factory.mktemp('finished') / 'a "run": \'ü #', report=True) as launcher:
         assert launcher.wait() == 0, launcher.text
         yield launcher
 
@@ -102,6 +103,9 @@ def test_a_run_leaves_its_outputs(finished: Launcher) -> None:
     _check_outputs(finished.out, BENCHMARK_ID, 'report.html')
     # The report comes last: all other files cannot be made later.
     assert finished.text.index('/timing.json') < finished.text.index('writing ')
+    # Nothing comes after what matters most.
+    assert re.fullmatch(r'a "run".*: 0 contacts, (least TTC [0-9.]+ s, )?(\d+) of \2 plans '
+                        r'accepted, real-time ratio [0-9.]+.*', finished.text.splitlines()[-1])
     assert {name for name, _ in finished.started} == NODES
     assert len(finished.started) == len(NODES)
     assert not any(is_node(pid) for _, pid in finished.started)
