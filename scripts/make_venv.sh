@@ -37,7 +37,8 @@ index=${PIP_INDEX_URL:-$("$python" -m pip config get global.index-url 2>/dev/nul
 [[ -z $index ]] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$index}
 export UV_SYSTEM_CERTS=1 UV_NATIVE_TLS=1
 unset PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE VIRTUAL_ENV CONDA_PREFIX PIP_TARGET PIP_PREFIX
-if ! uv=$(command -v uv); then
+# The one on the PATH may be the link below, which must not lead to itself.
+if ! uv=$(realpath -e "$(command -v uv)" 2>/dev/null); then
     uv=$venv/uv/bin/uv
     if [[ ! -x $uv ]]; then
         "$python" -m venv "$venv/uv" >/dev/null ||

@@ -26,6 +26,7 @@ def require_dask() -> None:
     :raises InputError: if it is not, with the command that installs it.
     """
     try:
+        import cryptography  # noqa: F401
         import distributed  # noqa: F401
     except ImportError as error:
         raise InputError(f'needs Dask ({error})', 'crgame evaluate', INSTALL) from error
@@ -36,6 +37,9 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     """
     Connect to a scheduler, or start one with workers on this machine's loopback.
 
+    What is started here speaks TLS with a certificate made for it: without that, every user of
+    this machine could have the workers run any code.
+
     :param scheduler: address of an existing scheduler; None starts one.
     :param workers: number of worker processes to start, each with one thread.
     :param dashboard: port of Dask's page, on the loopback; None for no page.
@@ -44,7 +48,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     """
     require_dask()
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client, LocalCluster, Security
     # Suppress the many log lines about workers that end while others work.
     for name in (*logging.root.manager.loggerDict, 'tornado.application', 'asyncio'):
         if name.startswith(('distributed', 'tornado', 'asyncio')):
@@ -72,7 +76,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
             # The scheduler serves its health page in any case: on the loopback only, at any port.
             dashboard_address=f'127.0.0.1:{dashboard or 0}', worker_dashboard_address=None,
             scheduler_kwargs={'dashboard': dashboard is not None},
-            silence_logs=logging.CRITICAL, memory_limit=0)
+            security=Security.temporary(), silence_logs=logging.CRITICAL, memory_limit=0)
         with cluster, Client(cluster, set_as_default=False) as client:
             yield client
 
