@@ -149,7 +149,8 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
     parser.description = ('Run a game on a virtual clock, planners in lockstep. The same inputs '
                           'give the same state hash on every run.')
     add = parser.add_argument
-    add('game', nargs='?', type=Path, help='game file (default: the cut-in game)')
+    add('game', nargs='?', type=Path, help='game file, CommonRoad file, or name of a game of this '
+        'package (default: cut_in)')
     add('--scenario', type=Path, help='CommonRoad file instead of a game')
     add('--planner', help='planner of all AVs')
     add('--problem', type=int, action='append', default=[], metavar='ID', help=PROBLEM_HELP)

@@ -11,7 +11,7 @@ import stat
 import sys
 import tempfile
 
-from crgame_ros.errors import CrgameError
+from crgame_ros.errors import CrgameError, InputError
 
 PACKAGE = 'crgame_ros'
 
@@ -83,6 +83,22 @@ def config_directory() -> Path:
 def scenarios_directory() -> Path:
     """Find the directory of the package's own scenarios and game files."""
     return share_directory() / 'scenarios'
+
+
+def find_game(name: Path) -> Path:
+    """
+    Return the file of a game: the one named, or the package's own game of that name (`cut_in`).
+
+    :raises InputError: if it is neither.
+    """
+    if name.suffix or len(name.parts) > 1 or name.exists():
+        return name
+    own = {path.stem: path for path in scenarios_directory().glob('*.yaml')
+           if '.' not in path.stem}
+    if name.name not in own:
+        raise InputError('is neither a file nor one of the games of this package', str(name),
+                         'these are ' + ', '.join(sorted(own)))
+    return own[name.name]
 
 
 def default_game() -> Path:

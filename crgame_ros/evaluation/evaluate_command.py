@@ -14,6 +14,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.evaluation.folder import EvaluationFolder, REPORTS
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.evaluation.summary.command import add_summary_arguments
+from crgame_ros.paths import find_game
 from crgame_ros.schema.marks import named_file
 
 if TYPE_CHECKING:  # Other commands do not wait for it.
@@ -74,7 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('plan', nargs='?', type=Path, help='plan file (*.yaml), or the folder of an evaluation')
     add('--out', type=Path, metavar='DIR',
         help='folder of the evaluation (default: evaluations/<name of the plan>)')
-    add('--games', nargs='+', default=[], metavar='FILE', help='game files, or folders of them')
+    add('--games', nargs='+', default=[], metavar='FILE', help='game files, folders of '
+        'them, or names of games of this package: cut_in,merge')
     add('--scenarios', nargs='+', default=[], metavar='FILE',
         help='CommonRoad files, or folders of them')
     add('--humans', nargs='+', default=[], metavar='RUN',
@@ -181,6 +183,9 @@ def _given(values: argparse.Namespace) -> dict[str, Any]:
     given: dict[str, Any] = {
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
         if getattr(values, name)}
+    if values.games:
+        given['games'] = [str(find_game(Path(name))) for word in values.games
+                          for name in ([word] if Path(word).exists() else word.split(','))]
     if values.planners:
         given['planners'] = [named_file(name, Path.cwd())
                              for name in values.planners.split(',') if name]

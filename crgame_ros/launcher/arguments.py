@@ -11,6 +11,7 @@ import re
 
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
+from crgame_ros.paths import find_game
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 
 DESCRIPTION = """\
@@ -45,7 +46,8 @@ class RunRequest:
     """
     The user's request on the command line.
 
-    :param game: game file, if any.
+    :param game: game file, or name of one of the package's games; a CommonRoad file is moved to
+        `scenario`.
     :param scenario: CommonRoad file instead of the game's.
     :param driver: driver source of the first human.
     :param planners: planners of the AVs in their order; a single one serves all.
@@ -96,6 +98,15 @@ class RunRequest:
     start_paused: bool = False
     framed_by: str = ''
 
+    def __post_init__(self) -> None:
+        if self.game is None:
+            return
+        game = find_game(self.game)
+        is_scenario = game.suffix.lower() == '.xml' and self.scenario is None
+        object.__setattr__(self, 'game', None if is_scenario else game)
+        if is_scenario:
+            object.__setattr__(self, 'scenario', game)
+
 
 class _Parser(argparse.ArgumentParser):
 
@@ -108,7 +119,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     parser = _Parser(prog=program, description=DESCRIPTION, epilog=EPILOG,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
-    add('game', nargs='?', type=Path, metavar='GAME.yaml', help='game file (scenarios/*.yaml)')
+    add('game', nargs='?', type=Path, metavar='GAME', help='game file (YAML), CommonRoad file '
+        '(XML), or the name of a game of this package: cut_in, dense_merge, …')
     add('--scenario', type=Path, metavar='FILE.xml', help='CommonRoad file')
     add('--driver', action='append', default=[], metavar='[hvN=]SOURCE', dest='drivers',
         help="driver of the first human's vehicle, or that of hvN; may be given again")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from crgame_ros.errors import InputError, short
-from crgame_ros.game import file as game_file
 from crgame_ros.game.game import Game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
@@ -37,14 +36,12 @@ def load_game(path: FileName) -> Game:
     """
     Read a game file (YAML), or build a game from a CommonRoad scenario (XML) as `--scenario` does.
 
-    Use `dataclasses.replace` to change a game.
+    The games of this package have names, such as `cut_in`. Use `dataclasses.replace` to change
+    one.
 
     :raises InputError: naming the file, the key and the remedy.
     """
-    file = as_path(path, 'game')
-    if file.suffix.lower() == '.xml':
-        return effective_game(RunRequest(scenario=file))
-    return game_file.load_game(file)
+    return effective_game(RunRequest(game=as_path(path, 'game')))
 
 
 def as_game(game: Game | FileName | None) -> Game:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import cockpit_host, parse_arguments, RunRequest
+from crgame_ros.paths import default_game
 import pytest
 
 
@@ -93,3 +94,13 @@ def test_help_teaches(capsys: pytest.CaptureFixture[str]) -> None:
     assert text.startswith('usage: run.sh')
     for word in ('examples:', 'replay:BAG', 'idm', 'reactive', '--real-time-factor'):
         assert word in text
+
+
+def test_games_of_the_package_have_names_and_scenarios_need_no_option(tmp_path: Path) -> None:
+    assert parse_arguments(['cut_in']).game == default_game()
+    request = parse_arguments(['road.xml'])
+    assert (request.game, request.scenario) == (None, Path('road.xml'))
+    # A file or folder of that name goes first; anything else that is named like a file is one.
+    assert parse_arguments(['games/mine.yaml']).game == Path('games/mine.yaml')
+    with pytest.raises(InputError, match='neither a file nor one of the games .*cut_in, '):
+        parse_arguments(['nothing_like_it'])
