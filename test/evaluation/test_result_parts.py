@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of an evaluation survive every end of the process that writes them."""
 
+from collections.abc import Callable
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 import time
@@ -92,6 +94,29 @@ def test_a_second_writer_is_refused(tmp_path: Path) -> None:
         ResultParts(tmp_path)
 
 
+@pytest.mark.parametrize('table', ['cells', 'vehicles', 'work'])
+@pytest.mark.parametrize('damage', [
+    lambda data: b'', lambda data: data[:len(data) // 2], lambda data: data[:-4] + b'none',
+    lambda data: bytes(len(data) - 8) + data[-8:]])
+def test_a_damaged_part_is_refused_with_what_to_remove(
+        tmp_path: Path, table: str, damage: Callable[[bytes], bytes]) -> None:
+    """As the message says, the cells of that part are gone then, and only those."""
+    with ResultParts(tmp_path, part_cells=2) as parts:
+        for number in range(6):
+            parts.add(rows(number))
+    part = tmp_path / table / 'part-000001.parquet'
+    part.write_bytes(damage(part.read_bytes()))
+    with pytest.raises(InputError, match='is damaged') as refused, ResultParts(tmp_path) as parts:
+        list(parts.keys())
+        parts.keep_wanted(lambda key, status: int(key, 16) > 4)
+    assert str(part) in str(refused.value)
+    removed = re.search(r'remove (\S+),', str(refused.value))
+    assert removed is not None
+    Path(removed[1]).unlink()
+    with ResultParts(tmp_path) as parts:
+        assert sorted(int(key, 16) for key in parts.keys()) in ([0, 1, 4, 5], [4, 5])
+
+
 def test_what_is_not_wanted_is_put_away_and_comes_back(tmp_path: Path) -> None:
     with ResultParts(tmp_path, part_cells=3) as parts:
         for number in range(7):
@@ -113,17 +138,17 @@ def test_each_part_that_was_put_away_is_read_as_often_as_one(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reading all parts for each of them took hours with some thousand parts."""
     reads: dict[Path, int] = {}
-    read_table = pq.read_table
+    parquet_file = pq.ParquetFile
 
-    def counted(path: Path, **options: Any) -> pa.Table:
+    def counted(path: Path) -> pq.ParquetFile:
         reads[path] = reads.get(path, 0) + 1
-        return read_table(path, **options)
+        return parquet_file(path)
 
     with ResultParts(tmp_path, part_cells=1) as parts:
         for number in range(12):
             parts.add(rows(number))
         assert parts.keep_wanted(lambda key, status: int(key, 16) > 9) == 10
-        monkeypatch.setattr(pq, 'read_table', counted)
+        monkeypatch.setattr(pq, 'ParquetFile', counted)
         assert parts.keep_wanted(lambda key, status: int(key, 16) > 9) == 0
     # Ten parts are empty now, and two are not.
     assert len(reads) == 22

@@ -3,7 +3,7 @@
 """The tables of an evaluation on disk: complete parts, and a journal of newer rows."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 import fcntl
 from functools import partial
 import json
@@ -230,8 +230,12 @@ def _joinable(folder: Path, most_cells: int) -> list[list[str]]:
     groups: list[list[str]] = []
     size, columns = 0, None
     for name in _part_names(folder):
-        cells = pq.read_metadata(folder / CELLS.name / name).num_rows
-        schemas = [pq.read_schema(folder / table.name / name) for table in TABLES_OF_CELLS]
+        with _refused(folder / CELLS.name / name):
+            cells = pq.read_metadata(folder / CELLS.name / name).num_rows
+        schemas = []
+        for table in TABLES_OF_CELLS:
+            with _refused(folder / table.name / name):
+                schemas.append(pq.read_schema(folder / table.name / name))
         if not groups or schemas != columns or size + cells > most_cells:
             groups.append([])
             size, columns = 0, schemas
@@ -243,7 +247,7 @@ def _joinable(folder: Path, most_cells: int) -> list[list[str]]:
 def _write_joined(folder: Path, names: Sequence[str], table: TableDeclaration,
                   path: Path) -> None:
     """Write the rows of some parts of a table, in their order."""
-    rows = pa.concat_tables([pq.ParquetFile(folder / table.name / name).read() for name in names])
+    rows = pa.concat_tables([_read(folder / table.name / name) for name in names])
     pq.write_table(rows.combine_chunks(), path, compression='zstd')
 
 
@@ -327,7 +331,7 @@ def _replace_part(folder: Path, name: str,
 
 def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bool]) -> int:
     """Move the chosen cells of a part into a part of another folder; return their number."""
-    cells = pq.read_table(source / CELLS.name / name, columns=['cell', 'status'])
+    cells = _read(source / CELLS.name / name, ['cell', 'status'])
     keys = {key for key, status in zip(*(column.to_pylist() for column in cells.columns),
                                        strict=True) if chosen(key, status)}
     if keys:
@@ -340,15 +344,40 @@ def _move(source: Path, name: str, target: Path, chosen: Callable[[str, str], bo
 def _write_filtered(source: Path, name: str, keys: set[str], inside: bool,
                     table: TableDeclaration, path: Path) -> None:
     """Write the rows of a part whose cells are among the keys, or those whose cells are not."""
-    rows = pq.read_table(source / table.name / name)
+    rows = _read(source / table.name / name)
     pq.write_table(rows.filter(pa.array(
         [(key in keys) is inside for key in rows['cell'].to_pylist()], pa.bool_())), path,
         compression='zstd')
 
 
 def _column(path: Path, name: str) -> list[str]:
-    values: list[str] = pq.read_table(path, columns=[name])[name].to_pylist()
+    values: list[str] = _read(path, [name])[name].to_pylist()
     return values
+
+
+def _read(path: Path, columns: list[str] | None = None) -> pa.Table:
+    """
+    Read a part of a table.
+
+    :param columns: only these, in this order; None: all.
+    :raises InputError: if it is damaged.
+    """
+    with _refused(path):
+        # Of one file alone: read_table would look for others around it.
+        found = pq.ParquetFile(path).read(columns)
+        return found if columns is None else found.select(columns)
+
+
+@contextmanager
+def _refused(path: Path) -> Iterator[None]:
+    """Refuse a damaged part in one line."""
+    try:
+        yield
+    except (pa.ArrowException, OSError, ValueError, KeyError) as error:
+        reason = ' '.join(str(error).split())[:120]
+        raise InputError(f'is damaged ({reason})', str(path), 'remove '
+                         f'{path.parent.parent / CELLS.name / path.name}, and the same command '
+                         'computes its cells again') from error
 
 
 def _refusal(folder: Path, error: OSError) -> InputError:
