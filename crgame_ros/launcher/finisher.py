@@ -71,6 +71,8 @@ class Finisher:
             self._process.kill()
             self._process.communicate()
         folders = run_folders(self._session)
+        if not folders:
+            self._say(f'error: {self._session} has been removed during the run: nothing is left')
         for folder in folders:
             if folder not in self._codes:
                 self._codes[folder] = finish_run(

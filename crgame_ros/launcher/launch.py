@@ -246,7 +246,9 @@ def launch(arguments: Sequence[str] | None = None) -> int:
         with writing(print_now):
             code = max(code, finisher.finish_all(graph.was_asked_to_end))
         finisher.write_reports()
-        print_now(f'again: ./run.sh {shlex.quote(str(plan.game_file))}; tools: ./crgame --help')
+        if plan.game_file.is_file():
+            print_now(f'again: ./run.sh {shlex.quote(str(plan.game_file))}; '
+                      'tools: ./crgame --help')
         failed = finisher.tell_outcomes()
         return code or failed
     except CrgameError as error:

@@ -26,7 +26,9 @@ def run_folder(session: Path, epoch: int) -> Path:
 
 
 def run_folders(session: Path) -> list[Path]:
-    """Find the folders of all runs of a session, in the order of the runs."""
+    """Find the folders of all runs of a session, in the order of the runs; none if it is gone."""
+    if not session.is_dir():
+        return []
     later = [(int(found[1]), path) for path in session.iterdir()
              if (found := _LATER.fullmatch(path.name)) and path.is_dir()]
     return [session, *(path for _, path in sorted(later))]

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -38,6 +39,19 @@ def test_a_closed_terminal_is_an_end_in_good_order(tmp_path: Path) -> None:
         assert launcher.wait() == 0
         _files(launcher.out)
         assert 'again: ./run.sh' in launcher.lines[-1]
+
+
+@pytest.mark.exhaustive
+def test_a_run_whose_folder_is_removed_goes_on_to_its_end(tmp_path: Path) -> None:
+    with Launcher([CUT_IN, '--duration', '4'], tmp_path / 'run') as launcher:
+        wait_until(lambda: launcher.says('recording into'), 'the recording')
+        shutil.rmtree(tmp_path / 'run')
+        assert launcher.wait() == 1
+        assert launcher.says(r'finished at 4.00 s')
+        assert launcher.text.splitlines()[-1].endswith(
+            'has been removed during the run: nothing is left')
+        assert not launcher.says('Traceback')
+        assert launcher.errors == []
 
 
 @pytest.mark.exhaustive
