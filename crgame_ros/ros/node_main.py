@@ -85,6 +85,22 @@ def name_process(name: str) -> None:
     ctypes.CDLL(None).prctl(PR_SET_NAME, name.encode())
 
 
+def _check_parameters(node: RunnableNode) -> None:
+    """
+    Refuse parameters of the command line that the node does not have.
+
+    rclpy ignores them: with a misspelt name a node would silently do something else.
+
+    :raises InputError: naming those that it has.
+    """
+    from crgame_ros.errors import InputError
+    has = sorted(getattr(node, '_parameters', {}))
+    for name in getattr(node, '_parameter_overrides', {}):
+        if name not in has and not name.startswith('qos_overrides.'):
+            raise InputError(f'there is no parameter "{name[:100]}"', 'command line',
+                             'there are ' + ', '.join(has))
+
+
 def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) -> None:
     """
     Run a node until it is done, interrupted or shut down.
@@ -116,6 +132,7 @@ def run_node(create: Callable[[], RunnableNode], args: list[str] | None = None) 
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = create()
+        _check_parameters(node)
         # Planners and the recorder yield processor time to the simulation and the driver. The
         # middleware's threads, which already exist, do not: they hold locks that the simulation
         # and the driver wait for.

@@ -7,3 +7,4 @@ EXIT = 'exit'
 STAY = 'stay'
 # As `STAY` if the run's game was chosen after the start, else as `EXIT`.
 STAY_IF_CHOSEN = 'stay-if-chosen'
+AT_END = (EXIT, STAY, STAY_IF_CHOSEN)

@@ -14,7 +14,7 @@ from crgame_ros.game.seat_documents import SeatOccupant
 from crgame_ros.paths import default_game, scenarios_directory
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.number_parameters import declare_number
-from crgame_ros.ros.run_ends import EXIT, STAY, STAY_IF_CHOSEN
+from crgame_ros.ros.run_ends import AT_END, EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
@@ -106,6 +106,10 @@ class SimControl:
             'stay-if-chosen: exit unless its game was chosen after the start', read_only=True))
         declare_number(self._node, 'planner_timeout', 10.0,
                        'seconds to wait for planners and companions at the start', (0.0, 1e4))
+
+        if self._value('at_end') not in AT_END:
+            raise InputError(f'is "{str(self._value("at_end"))[:40]}"', 'parameter at_end',
+                             'give ' + ', '.join(AT_END))
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(name).value
