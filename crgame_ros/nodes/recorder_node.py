@@ -80,7 +80,8 @@ class RecorderNode(Node):
         self._recorded: set[str] = set()
         self._recorded_told, self._recorded_told_s = True, -math.inf
         self._begun_s = -math.inf
-        self._heard_s = -math.inf
+        # When a message on /clock has come, and when one that moved time on.
+        self._heard_s = self._moved_s = -math.inf
         self._report_s = 0.0
         self._time = RunTime()
         # Messages whose run is not certain yet, and messages that came before any run.
@@ -126,13 +127,24 @@ class RecorderNode(Node):
                 self._writer.flush_if_due()
             except RecordingError as error:
                 self._report_failure(error)
-            if self._ended_s is not None and time.monotonic() - self._ended_s > DRAIN_S:
-                self._close()
+            self._close_at_end()
         if not self._recorded_told or self._is_awaited:
             self._publish_recorded()
         if time.monotonic() - self._report_s > REPORT_S:
             self._report_s = time.monotonic()
             self._report(self._writer)
+
+    def _close_at_end(self) -> None:
+        """Close the bag some time after the end of the run, unless the run goes on."""
+        if self._ended_s is None or time.monotonic() - self._ended_s <= DRAIN_S:
+            return
+        if self._moved_s - self._ended_s > 0.5 * DRAIN_S:
+            # The last cycles come just after the end; these come later.
+            self._ended_s = None
+            self._endpoints.refusals.note(
+                DIAGNOSTICS_TOPIC, f'{DIAGNOSTICS_TOPIC}: the end of a run that goes on')
+            return
+        self._close()
 
     @property
     def _is_awaited(self) -> bool:
@@ -175,6 +187,8 @@ class RecorderNode(Node):
             elif recorded.name == CLOCK_TOPIC:
                 self._heard_s = time.monotonic()
                 stamp_ns = header_stamp_ns(data)
+                if stamp_ns > self._endpoints.diagnostics.now_ns:
+                    self._moved_s = self._heard_s
                 self._endpoints.diagnostics.now_ns = stamp_ns
                 self._follow(stamp_ns)
             elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
@@ -204,6 +218,8 @@ class RecorderNode(Node):
         if self._ended_s is None and from_time(message.header.stamp) >= self._offset_ns \
                 and any(item.name == 'sim_node: run' and item.message == 'ended'
                         for item in message.status):
+            # Of the clock, only what comes after this tells that the run goes on.
+            self._write_waiting(self._topics[CLOCK_TOPIC])
             self._ended_s = time.monotonic()
 
     def _begin_bag(self, game_data: bytes) -> None:

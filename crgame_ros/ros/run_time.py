@@ -34,27 +34,28 @@ class RunTime:
 
     :param usual_ns: largest usual time from one message to the next [ns].
     :param at_ns: where it begins; None: with the first stamp, whatever it is [ns].
+    :ivar at_ns: where it is; None before the first stamp [ns].
     """
 
     def __init__(self, usual_ns: int = USUAL_NS, at_ns: int | None = None) -> None:
         self._usual_ns = usual_ns
-        self._at_ns = at_ns
+        self.at_ns = at_ns
         self._elsewhere_ns: list[int] = []
 
     def follow(self, stamp_ns: int) -> TimeCourse:
         """Return how the stamp of the next message [ns] follows the previous ones."""
-        if self._at_ns is None or 0 <= stamp_ns - self._at_ns <= self._usual_ns:
-            self._at_ns = stamp_ns
+        if self.at_ns is None or 0 <= stamp_ns - self.at_ns <= self._usual_ns:
+            self.at_ns = stamp_ns
             self._elsewhere_ns.clear()
             return TimeCourse.ON
         if self._elsewhere_ns \
                 and not 0 < stamp_ns - self._elsewhere_ns[-1] <= self._usual_ns:
             self._elsewhere_ns.clear()
         self._elsewhere_ns.append(stamp_ns)
-        back = stamp_ns < self._at_ns
+        back = stamp_ns < self.at_ns
         if len(self._elsewhere_ns) < AGREEING:
             return TimeCourse.BEHIND if back else TimeCourse.AHEAD
-        self._at_ns = stamp_ns
+        self.at_ns = stamp_ns
         self._elsewhere_ns.clear()
         return TimeCourse.BACK if back else TimeCourse.ON
 

@@ -76,7 +76,11 @@ class WorldFollower:
     def begin(self, scenario: ScenarioSet) -> None:
         """Follow another run; messages of it that have already come are kept."""
         self._scenario = scenario
-        self._time = RunTime(at_ns=scenario.game.scheduler.clock_offset_ns)
+        # A new run begins ahead of the one before. One that is played again goes back, which its
+        # messages tell.
+        begins_ns = scenario.game.scheduler.clock_offset_ns
+        if self._time.at_ns is None or begins_ns > self._time.at_ns:
+            self._time = RunTime(at_ns=begins_ns)
         self._waiting.extend(self._ahead)
         self._ahead.clear()
         self._reader = WorldMessages(scenario.objects)

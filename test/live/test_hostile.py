@@ -15,6 +15,7 @@ import time
 
 from builtin_interfaces.msg import Time
 from commonroad.common.file_reader import CommonRoadFileReader
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hostile import code, games, messages
 from live_peer import Peer
 from live_support import is_node, Launcher, SCENARIOS
@@ -178,9 +179,19 @@ def test_bad_orders_and_numbers_cost_the_run_nothing(run: Run) -> None:
         cycle = peer.messages['/timing/cycle'][-1]
         cycle.data[0] = value
         sender.send('/timing/cycle', '', cycle)
-    peer.listen_for(1.0)
+    ended = DiagnosticArray(status=[DiagnosticStatus(name='sim_node: run', message='ended')])
+    ended.header.stamp = peer.messages['/clock'][-1].clock
+    ended.header.stamp.sec += 3600
+    peer.forget()
+    sender.send('/diagnostics', '', ended)
+    peer.wait_until(lambda: any(
+        'the end of a run that goes on' in status.message
+        for status, _ in peer.statuses('recorder_node: messages refused')), 'its refusal')
     sender.close()
     _whole(run, pids)
+    peer.wait_until(lambda: len(peer.statuses('recorder_node: recording')) > 1, 'two reports')
+    assert {status.message for status, _ in peer.statuses('recorder_node: recording')} == {
+        'recording into bag'}
     assert peer.call('/sim/pause').success and peer.call('/sim/start').success
 
 
