@@ -21,6 +21,7 @@ from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.planner.adapter import reason_kind
 from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import run_record_of
@@ -129,7 +130,9 @@ def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
     told: dict[str, Any] = {}
     for vehicle, record in planners.items():
         plans, statistics = record.statistics.plans, record.statistics
-        failed, refused = ({reason: number for reason, number in statistics.reasons.items()
+        # Without numbers, so that a summary can count them over all cells.
+        failed, refused = ({reason_kind(reason): number
+                            for reason, number in statistics.reasons.items()
                             if bool(_CODE_FAILED.match(reason)) is is_failure}
                            for is_failure in (True, False))
         if record.counters.refused:

@@ -30,7 +30,8 @@ class PlannerStatistics:
     :param plans: answers given, braking plans included.
     :param fallbacks: braking plans given.
     :param shortened: plans given that stop before the planner's plan leaves the road.
-    :param reasons: how often each reason for braking occurred, numbers replaced by `#`.
+    :param reasons: how often each reason for braking occurred; those that differ in numbers alone
+        count together, under the first of them.
     :param durations_s: duration of each call; empty without a clock [s]
     :param failure: traceback of the first failure of the planner's code; empty without one.
     """
@@ -41,6 +42,11 @@ class PlannerStatistics:
     reasons: Counter[str] = field(default_factory=Counter)
     durations_s: list[float] = field(default_factory=list)
     failure: str = ''
+    _first: dict[str, str] = field(default_factory=dict)
+
+    def count_reason(self, reason: str) -> None:
+        """Count a reason for braking."""
+        self.reasons[first_of_kind(self._first, reason)] += 1
 
 
 class PlannerAdapter:
@@ -111,7 +117,7 @@ class PlannerAdapter:
         self.statistics.plans += 1
         if reason is not None:
             self.statistics.fallbacks += 1
-            self.statistics.reasons[reason_kind(reason)] += 1
+            self.statistics.count_reason(reason)
         self._last_plan = plan
         return plan
 
@@ -166,5 +172,14 @@ def describe(error: Exception) -> str:
 
 
 def reason_kind(reason: str) -> str:
-    """Return a reason with `#` for its numbers, so that similar ones are counted together."""
+    """Return a reason with `#` for its numbers, the same for reasons of one kind."""
     return re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)
+
+
+def first_of_kind(first: dict[str, str], reason: str) -> str:
+    """
+    Return the first reason of the same kind.
+
+    :param first: by kind; gets this reason if it is the first of its kind.
+    """
+    return first.setdefault(reason_kind(reason), reason)

@@ -16,7 +16,7 @@ from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.joints import vehicles_from_joints
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
-from crgame_ros.planner.adapter import reason_kind
+from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
 from crgame_ros.recording.export import write_text
 from crgame_ros.recording.reader import BagReader
@@ -210,6 +210,7 @@ class _Collector:
         self._plan_times_ms: dict[str, list[float]] = defaultdict(list)
         self._ages_ms: dict[str, list[float]] = defaultdict(list)
         self._reasons: dict[str, Counter[str]] = defaultdict(Counter)
+        self._first_reasons: dict[str, dict[str, str]] = defaultdict(dict)
         self._statuses: dict[str, dict[str, str]] = {}
         self.sound = SeatSound()
         self.view = ViewPeriods()
@@ -271,7 +272,8 @@ class _Collector:
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
             if status.message.startswith(_BRAKING):
-                reason = reason_kind(status.message.removeprefix(_BRAKING))
+                reason = first_of_kind(self._first_reasons[status.name],
+                                       status.message.removeprefix(_BRAKING))
                 self._reasons[status.name][reason] += 1
         elif status.name.startswith('sim_node: ') and values.get('age_ms'):
             self._ages_ms[status.name].append(float(values['age_ms']))

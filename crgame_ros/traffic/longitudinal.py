@@ -26,7 +26,8 @@ LOOKS = (0.3, 0.6, 1.0)
 AT_LINE, AT_END = 1.6, 3.0
 # Agents halt at this gap before a line, and a standing agent this near to it stays [m].
 LINE_GAP, NEAR = 0.5, 0.3
-# Room that an agent needs before a standing obstacle to get into the next lane [m].
+# Room that an agent needs before a standing obstacle to get into the next lane [m], and the number
+# of its lengths that it needs at least.
 SWING_OUT, SWING_LENGTHS = 10.0, 2.0
 # Share of a short lane that ends which is kept for a lane change.
 REST_SHARE = 0.2

@@ -146,7 +146,7 @@ def test_planners(tmp_path: Path, recorder: Any, drive: Drive) -> None:
     # The run waits for the first plan: the planner's time to start is reported separately.
     assert av0['first_latency_ms'] == pytest.approx(300.0)
     # Numbers differ from fallback to fallback, reasons do not.
-    assert av0['fallback_reasons'] == {'# m short': 2}
+    assert av0['fallback_reasons'] == {'1 m short': 2}
     assert av0['age_ms'] == pytest.approx({'p50': 30.0, 'p99': 39.8, 'max': 40.0})
     assert av0['worst_tracking_errors'] == {'lane': 0.2}
     silent = report['planners']['av1']
