@@ -44,4 +44,5 @@ def run(values: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f'cannot be written ({error.strerror})', str(values.out),
                          'choose another file with --out') from error
+    print(values.out)
     return 0

@@ -27,6 +27,8 @@ PERIOD_S = 1.0
 MAX_PASSED_OVER = 100
 # Depth of a queue whose messages are filtered here: others' would fill a single slot.
 SHARED_DEPTH = 200
+# Depth of a service's queues: with ten, which is usual, most calls of a burst get no answer.
+SERVICE_DEPTH = 1000
 # One entry for each node of this process.
 _TOLD: WeakKeyDictionary[Node, tuple[Diagnostics, Refusals]] = WeakKeyDictionary()
 
@@ -180,10 +182,11 @@ class Endpoints:
 
     def service(self, name: str, callback: Callable[[Any, Any], Any],
                 vehicle_id: str = '') -> Service:
-        """Create a service."""
+        """Create a service, whose queue holds a burst of calls until they are answered."""
         row = self._contract.services[name]
         return self._node.create_service(
-            message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback)
+            message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback,
+            qos_profile=QoSProfile(depth=SERVICE_DEPTH))
 
     def client(self, name: str, vehicle_id: str = '') -> Client:
         """Create a client of a service."""

@@ -13,6 +13,8 @@ from live_peer import Peer
 from live_support import CUT_IN, is_node, Launcher, SCENARIOS
 import numpy as np
 import pytest
+from rclpy.qos import QoSProfile
+from std_srvs.srv import Trigger
 
 pytestmark = pytest.mark.clock
 
@@ -97,6 +99,22 @@ def test_pause_freezes_everything_and_step_advances_one_tick(peer: Peer) -> None
     throttle = cycles.commands('hv0')[:, 0]
     assert abs(throttle[paused_n] - throttle[paused_n - 1]) < 0.1
     assert peer.statuses('sim_node: hv0 seat')[-1][1]['losses'] == '0'
+
+
+def test_each_order_of_a_burst_is_answered_and_done(peer: Peer) -> None:
+    """200 steps ordered at once are 200 scenario steps."""
+    count = 200
+    assert peer.set_parameter('real_time_factor', 10.0).successful
+    assert peer.call('/sim/pause').success
+    before = peer.wait_for_pause()
+    client = peer.node.create_client(Trigger, '/sim/step', qos_profile=QoSProfile(depth=2 * count))
+    peer.wait_until(client.service_is_ready, 'the service')
+    answers = [client.call_async(Trigger.Request()) for _ in range(count)]
+    peer.wait_until(lambda: all(answer.done() for answer in answers), 'all answers')
+    assert all(answer.result().success for answer in answers)
+    peer.node.destroy_client(client)
+    peer.wait_until(lambda: peer.n >= before + count * STEPS_PER_TICK, 'all steps')
+    assert peer.wait_for_pause() == before + count * STEPS_PER_TICK
 
 
 @pytest.mark.usefixtures('_anew')
