@@ -177,7 +177,7 @@ def _trigger(text: str) -> tuple[str, float]:
 
 
 def _offline(values: argparse.Namespace) -> int:
-    from crgame_ros.analysis.outcome_line import NO_PLANS, outcome_line, undriven
+    from crgame_ros.analysis.outcome_line import tell_outcome
     from crgame_ros.launcher.arguments import RunRequest
     from crgame_ros.launcher.run_plan import effective_setup, naming
     from crgame_ros.python_interface.offline_runs import drive
@@ -195,9 +195,9 @@ def _offline(values: argparse.Namespace) -> int:
             raise InputError(f'{setup.game.duration} s are less than a time step of the scenario',
                              '--duration', f'give {setup.scheduler.time_step_s} s or more')
         prepare_folder(values.out)
+    say = partial(print, file=sys.stderr, flush=True)
     with naming(request):
-        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger,
-                    partial(print, file=sys.stderr, flush=True))
+        run = drive(setup.loaded.benchmark_id, setup, values.latency, values.trigger, say)
     print(json.dumps(run.summary(), indent=2))
     if count := run.result.taken_off:
         print(f'note: removed {count} agent{"s" if count > 1 else ""} of the traffic, because '
@@ -205,11 +205,7 @@ def _offline(values: argparse.Namespace) -> int:
     if values.out is not None:
         for notice in run.exported(values.out)[1]:
             print(f'note: {notice}', file=sys.stderr)
-    failed = undriven(run.outcome)
-    for line in failed:
-        print(f'error: {line}', file=sys.stderr)
-    print(outcome_line(run.outcome, run.usual_criticality), file=sys.stderr)
-    return NO_PLANS if failed else 0
+    return tell_outcome(say, run.outcome, run.usual_criticality)
 
 
 def _convert(values: argparse.Namespace) -> int:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lines about what fails again and again: one line a minute for each kind, with their number."""
 
+import re
 import time
 
 # Time between two lines about one kind of failure [s].
@@ -9,6 +10,11 @@ PERIOD_S = 60.0
 # Kinds with lines of their own; senders can make up any number of kinds.
 MOST_KINDS = 50
 OTHERS = 'others'
+
+
+def kind_of(text: str) -> str:
+    """Return a text with `#` for its numbers, the same for texts of one kind."""
+    return re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', text)
 
 
 class EachMinute:

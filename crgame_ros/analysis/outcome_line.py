@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run in one line, and the AVs whose planners never drove; the same for live and offline."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
@@ -10,6 +10,21 @@ from crgame_ros.timing.metrics import SLOW
 
 # Exit code of a run in which no plan of some planner was driven.
 NO_PLANS = 3
+
+
+def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, Any],
+                 criticality: Criticality | None, name: str = '') -> int:
+    """
+    Tell of a run, as the last lines about it.
+
+    :param name: of the run, before its line.
+    :return: `NO_PLANS` if some planner drove none of its plans, else 0.
+    """
+    failed = undriven(outcome)
+    for line in failed:
+        say(f'error: {line}')
+    say(name + outcome_line(outcome, criticality))
+    return NO_PLANS if failed else 0
 
 
 def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = None) -> str:

@@ -186,7 +186,7 @@ class ChunkBuilder:
         if len(content.layout.dim) != 2:
             return
         table = CycleTable.from_message(content.layout.dim[1].label, content.data)
-        if len(table.rows) and table.epoch == self._epoch:
+        if table.is_of(self._epoch):
             commands.update(zip(table.column('n').astype(int).tolist(),
                                 table.commands_of(self._vehicles), strict=True))
 

@@ -195,7 +195,7 @@ class _Indexer:
         if self._after or len(content.layout.dim) != 2:
             return
         table = CycleTable.from_message(content.layout.dim[1].label, content.data)
-        if not len(table.rows) or table.epoch != self._run.game.epoch:
+        if not table.is_of(self._run.game.epoch):
             return
         steps = table.column('n')
         places = self._places[CYCLE_TOPIC]

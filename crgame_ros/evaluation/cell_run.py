@@ -13,6 +13,7 @@ from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.driver.replay_driver import ReplayDriver
+from crgame_ros.each_minute import kind_of
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.cell_scene import INPUTS
 from crgame_ros.evaluation.content import resolved
@@ -21,7 +22,6 @@ from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.planner.adapter import reason_kind
 from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import run_record_of
@@ -131,7 +131,7 @@ def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
     for vehicle, record in planners.items():
         plans, statistics = record.statistics.plans, record.statistics
         # Without numbers, so that a summary can count them over all cells.
-        failed, refused = ({reason_kind(reason): number
+        failed, refused = ({kind_of(reason): number
                             for reason, number in statistics.reasons.items()
                             if bool(_CODE_FAILED.match(reason)) is is_failure}
                            for is_failure in (True, False))

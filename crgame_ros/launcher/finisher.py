@@ -100,7 +100,7 @@ class Finisher:
 
         :return: `NO_PLANS` if some planner drove none of its plans, else 0.
         """
-        from crgame_ros.analysis.outcome_line import NO_PLANS, outcome_line, undriven
+        from crgame_ros.analysis.outcome_line import tell_outcome
         code = 0
         for folder in run_folders(self._session):
             try:
@@ -108,10 +108,8 @@ class Finisher:
             except (OSError, ValueError):
                 # What kept it from being written has been told.
                 continue
-            for line in undriven(timing):
-                self._say(f'error: {line}')
-                code = NO_PLANS
-            self._say(f'{folder.name}: {outcome_line(timing, self._criticality.get(folder))}')
+            code = tell_outcome(self._say, timing, self._criticality.get(folder),
+                                f'{folder.name}: ') or code
         return code
 
     def _start(self, folder: Path) -> None:

@@ -66,8 +66,7 @@ class TimesyncNode(Node):
 
     def _add(self, table: CycleTable) -> None:
         self._awaited.check(self._game is not None, True)
-        if self._game is None or self._metrics is None or not len(table.rows) \
-                or table.epoch != self._game.epoch:
+        if self._game is None or self._metrics is None or not table.is_of(self._game.epoch):
             return
         stamp_ns = self._game.scheduler.stamp_ns(int(table.column('n')[-1]))
         course = self._time.follow(stamp_ns)

@@ -5,9 +5,9 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-import re
 import traceback
 
+from crgame_ros.each_minute import kind_of
 from crgame_ros.errors import CrgameError, PlanningError
 from crgame_ros.geometry.curve import arc_length
 from crgame_ros.messages.plan import Plan, PlanRequest
@@ -171,15 +171,10 @@ def describe(error: Exception) -> str:
     return f'{type(error).__name__}: {text}' if text else type(error).__name__
 
 
-def reason_kind(reason: str) -> str:
-    """Return a reason with `#` for its numbers, the same for reasons of one kind."""
-    return re.sub(r'-?\d+(\.\d+)?(e[-+]?\d+)?', '#', reason)
-
-
 def first_of_kind(first: dict[str, str], reason: str) -> str:
     """
     Return the first reason of the same kind.
 
     :param first: by kind; gets this reason if it is the first of its kind.
     """
-    return first.setdefault(reason_kind(reason), reason)
+    return first.setdefault(kind_of(reason), reason)

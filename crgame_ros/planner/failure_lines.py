@@ -3,10 +3,12 @@
 """What a run says of a planner that fails: its first traceback, then one line a minute."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from crgame_ros.each_minute import EachMinute
-from crgame_ros.planner.adapter import reason_kind
-from crgame_ros.planner.manager import PlannerManager
+from crgame_ros.each_minute import EachMinute, kind_of
+
+if TYPE_CHECKING:  # sim_node tells of refusals and has no planner.
+    from crgame_ros.planner.manager import PlannerManager
 
 
 class FailureLines:
@@ -22,7 +24,7 @@ class FailureLines:
         self._shown = ''
         self._minute = EachMinute()
 
-    def note(self, manager: PlannerManager) -> None:
+    def note(self, manager: 'PlannerManager') -> None:
         """Tell what is new after a setup or an answer."""
         failure = manager.statistics.failure
         if failure != self._shown:
@@ -38,6 +40,6 @@ class FailureLines:
             self._tell('its planner answered, but the plan was refused', reason)
 
     def _tell(self, what: str, reason: str) -> None:
-        line = self._minute.line(reason_kind(reason), f'{self._vehicle_id}: {what}: {reason}')
+        line = self._minute.line(kind_of(reason), f'{self._vehicle_id}: {what}: {reason}')
         if line is not None:
             self._say(line)

@@ -119,6 +119,10 @@ class CycleTable:
         """Return the epoch of the rows, of which there must be one."""
         return int(self.column('epoch')[0])
 
+    def is_of(self, epoch: int) -> bool:
+        """Return whether it has rows, of this epoch."""
+        return bool(len(self.rows)) and self.epoch == epoch
+
     def column(self, name: str) -> NDArray[np.float64]:
         """Return a column by its name."""
         return self.rows[:, self._place[name]]

@@ -94,12 +94,6 @@ def _fill_speeds(lanes: LaneTable, envelope: FloatArray, lateral: float, way: Wa
         limit[i] = max(limit[i], -2.0 * COASTING)
 
 
-@compiled
-def swing_out_room(length: float) -> float:
-    """Return the room that a vehicle of a length [m] leaves to steer out by an obstacle [m]."""
-    return max(SWING_OUT, SWING_LENGTHS * length)
-
-
 @bare
 def halt_before(speed: float, distance: float, braking: float) -> float:
     """
@@ -140,7 +134,7 @@ def halt(lanes: LaneTable, drops: NDArray[np.bool_], way: Ways, agents: AgentTab
         beside = lanes.left[lane] >= 0 or lanes.right[lane] >= 0
         before_obstacle = math.inf
         # An agent that is nearer already cannot leave this room any more.
-        room = swing_out_room(agents.length[slot])
+        room = max(SWING_OUT, SWING_LENGTHS * agents.length[slot])
         if swings[slot] and beside and agents.source[slot] == NONE and blocked[i] > 0.5 * room:
             # One that is nearer already halts where it comfortably can.
             before_obstacle = max(blocked[i] - room, min(

@@ -305,7 +305,7 @@ class CockpitFeed:
             return
         table = CycleTable.from_message(cycle.layout.dim[1].label, cycle.data)
         # A table of the game before or after this one is ignored.
-        if len(table.rows) and table.epoch == self.scenario.game.epoch:
+        if table.is_of(self.scenario.game.epoch):
             self._commands = table.commands_of(self._vehicle_ids)[-1]
 
     def poll_states(self) -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The services and parameters that control sim_node."""
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -223,13 +224,11 @@ class SimControl:
         """Return the path of a game or scenario, by its name or as a file in a known directory."""
         for directory in self._directories:
             for ending in ('', '.yaml' if kind == 'game' else '.xml'):
-                try:
+                # A text may be no name of a file: too long, or with a zero byte.
+                with suppress(OSError, ValueError):
                     path = (directory / f'{name}{ending}').resolve()
                     if path.is_relative_to(directory) and path.is_file():
                         return path
-                except (OSError, ValueError):
-                    # No name of a file: too long, or with a zero byte.
-                    continue
         raise InputError(f'"{name[:200]}" is in none of the configured directories', 'sim_node',
                          'name a file of the parameter scenario_directories')
 

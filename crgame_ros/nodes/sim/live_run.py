@@ -17,7 +17,7 @@ from crgame_ros.nodes.sim.remote_traffic import RemoteTraffic
 from crgame_ros.nodes.sim.run_state import Outcome, RunState
 from crgame_ros.nodes.sim.start_gate import ReadyGate, StartGate
 from crgame_ros.nodes.sim.step_watch import StepWatch
-from crgame_ros.planner.adapter import reason_kind
+from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.heard_topics import HeardTopics
@@ -134,6 +134,8 @@ class LiveRun:
                             setup.game.timing.max_catch_up_steps)
         self._watch = StepWatch()
         self._diagnostics = LiveDiagnostics(self._outputs, self.simulation, self._inputs)
+        self._failures = {av.id: FailureLines(av.id, node.get_logger().warning)
+                          for av in setup.avs}
         self._state = RunState(self._outputs, self.simulation, self._diagnostics, control)
         duration_s = control.duration_s or setup.game.duration
         self._last_n = None if duration_s == float('inf') else scheduler.steps_for(duration_s)
@@ -280,8 +282,7 @@ class LiveRun:
     def _refuse(self, av_id: str, reason: str) -> None:
         """Report a refused answer of an AV's planner."""
         self._diagnostics.refusal(av_id, reason)
-        complain(self._node, f'{av_id}: {reason_kind(reason)}',
-                 f'{av_id}: its planner answered, but the plan was refused: {reason}')
+        self._failures[av_id].refuse(reason)
 
     def _accept_plan(self, av_id: str) -> bool:
         """Pass an AV its new plan; return whether it was accepted."""
