@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.messages.status_values import Status, status_truth
+from crgame_ros.messages.status_values import BRAKING, Status, status_truth
 
 OK, ERROR = 0, 2
 # Late traffic is reported at each late tick, and its end is never reported [s].
@@ -121,7 +121,9 @@ class RunStatus:
             self._planner(vehicle).update(
                 planner=values.get('planner', ''),
                 plan_time_ms=_number(values.get('plan_time_ms')),
-                fallbacks=_number(values.get('fallbacks')))
+                fallbacks=_number(values.get('fallbacks')),
+                failure=text.removeprefix(BRAKING) if text.startswith(BRAKING) else
+                self._planner(vehicle)['failure'])
         elif node == 'sim_node' and rest == 'seat':
             self.seats_lost[vehicle] = level != OK
             self._alarm('lost_device', vehicle, level != OK, 'not driven', t)
@@ -186,8 +188,8 @@ class RunStatus:
     def _planner(self, vehicle: str) -> dict[str, Any]:
         return self.planners.setdefault(vehicle, {
             'running': True, 'stale': False, 'latency_ms': None, 'age_ms': None, 'accepted': 0,
-            'refused': 0, 'plan_time_ms': None, 'fallbacks': 0, 'planner': '',
-            'last_refusal': '', 'tracking': None})
+            'refused': 0, 'of_others': 0, 'plan_time_ms': None, 'fallbacks': 0, 'planner': '',
+            'failure': '', 'last_refusal': '', 'tracking': None})
 
     def _add_run(self, _: int, text: str, values: Mapping[str, str], __: float) -> None:
         self.run, self.reason = text, values.get('reason', '')
@@ -261,6 +263,7 @@ class RunStatus:
             latency_ms=_number(values.get('latency_ms')), age_ms=_number(values.get('age_ms')),
             accepted=int(_number(values.get('accepted')) or 0),
             refused=int(_number(values.get('refused')) or 0),
+            of_others=int(_number(values.get('of_others')) or 0),
             planner=self._planner(vehicle)['planner'] or values.get('planner', ''),
             last_refusal=values.get('last_refusal', ''), tracking=_tracking(values))
         self._alarm('stale_plan', vehicle, level == ERROR, text, t)

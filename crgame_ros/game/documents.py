@@ -38,6 +38,7 @@ OBJECTS_TOPIC = '/scenario/objects'
 EVENTS_TOPIC = '/scenario/events'
 SIGNALS_TOPIC = '/scenario/signals'
 SEATS_TOPIC = '/seats'
+RUN_STATE_TOPIC = '/sim/state'
 # Upper limit of a ROS stamp [ns].
 LARGEST_NUMBER = 2**31 * 10**9
 # The errors of reading an untrusted text, including those of huge numbers and deep nesting.
@@ -52,6 +53,8 @@ class GameDocument:
     The content of `/scenario/game` that other programs need.
 
     :param epoch: counts resets.
+    :param simulation: names the process that simulates: with the epoch, the run; '' in older
+        recordings.
     :param benchmark_id: of the scenario.
     :param title: one displayed line.
     :param scenario_sha256: of the text on `/scenario/xml`.
@@ -75,6 +78,7 @@ class GameDocument:
     """
 
     epoch: int
+    simulation: str
     benchmark_id: str
     title: str
     scenario_sha256: str
@@ -130,7 +134,8 @@ def parse_game_document(text: str) -> GameDocument:
         occupancy, events = content.get('occupancy'), content.get('events') or []
         environment = content.get('environment')
         game = GameDocument(
-            epoch=int(content['epoch']), benchmark_id=str(content.get('benchmark_id', '')),
+            epoch=int(content['epoch']), simulation=str(content.get('simulation', '')),
+            benchmark_id=str(content.get('benchmark_id', '')),
             title=str(content.get('title') or ''),
             scenario_sha256=str(content['scenario_sha256']),
             scheduler=ScenarioScheduler(
@@ -261,6 +266,34 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
     except MALFORMED as error:
         raise InputError(f'is no list of events ({type(error).__name__}: {error})',
                          EVENTS_TOPIC) from error
+
+
+class RunStateDocument(NamedTuple):
+    """
+    The content of `/sim/state` that names a run and tells whether it goes on.
+
+    :param simulation: as in the game document, as is the epoch.
+    :param state: waiting, running, paused or ended.
+    """
+
+    simulation: str
+    epoch: int
+    state: str
+
+
+def parse_run_state(text: str) -> RunStateDocument:
+    """
+    Read `/sim/state`.
+
+    :raises InputError: if it is not what sim_node writes.
+    """
+    try:
+        content = json.loads(text)
+        return RunStateDocument(str(content['simulation']), int(content['epoch']),
+                                str(content['state']))
+    except MALFORMED as error:
+        raise InputError(f'is no state of a run ({type(error).__name__}: {error})',
+                         RUN_STATE_TOPIC) from error
 
 
 def document_entry(event: EventSpec) -> dict[str, Any]:

@@ -70,6 +70,9 @@ class RunRequest:
     :param countdown_s: time from the readiness of all drivers at pages to the start [s]
     :param start_paused: whether every game waits for a start order.
     :param framed_by: origin of the only page that may embed the cockpit's page; empty for none.
+    :param open_topics: whether messages of any program count on every topic, not on those alone
+        that the contract names as open.
+    :param own_orders: whether services answer the run's own nodes alone.
     :param out: folder of the run, instead of runs/<time>_<scenario>.
     """
 
@@ -97,6 +100,8 @@ class RunRequest:
     countdown_s: float = 3.0
     start_paused: bool = False
     framed_by: str = ''
+    open_topics: bool = False
+    own_orders: bool = False
 
     def __post_init__(self) -> None:
         if self.game is None:
@@ -166,6 +171,11 @@ def build_parser(program: str) -> argparse.ArgumentParser:
     add('--namespace', type=_namespace, default='/', metavar='/NAME',
         help='put every node, topic and service of this run there, beside other runs in one ROS '
         'domain')
+    add('--open-topics', action='store_true',
+        help='let other programs publish every topic, for instance a traffic node of your own '
+        '(default: plans, commands of drivers, joysticks, triggers and diagnostics)')
+    add('--own-orders', action='store_true',
+        help='obey the page alone: services such as /sim/stop do not answer other programs')
     add('--out', type=Path, metavar='DIR',
         help="folder for this run's files (default: runs/<time>_<scenario>)")
     add('--no-report', action='store_true',
@@ -220,6 +230,9 @@ def read_drivers(values: Sequence[str]) -> tuple[str | None, tuple[tuple[str, st
 
 
 def _check_opening(request: RunRequest) -> None:
+    if request.open_topics and request.own_orders:
+        raise InputError('would let others publish what orders do', '--own-orders',
+                         'give it without --open-topics')
     if (request.certificate is None) != (request.key is None):
         raise InputError('a certificate and its key belong together', '--certificate',
                          'give --certificate and --key')

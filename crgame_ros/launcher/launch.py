@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A live run from the command line: check it, run it, and convert the recording to a scenario."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 import os
-from pathlib import Path
 import selectors
 import shlex
 import shutil
@@ -14,7 +13,7 @@ import sys
 import time
 from types import FrameType
 
-from crgame_ros.errors import CrgameError
+from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.forked_node import load
@@ -27,9 +26,11 @@ from crgame_ros.ros.environment import (
     free_domain_id,
     network_is_open,
     prepare_environment,
+    PROFILE_VARIABLES,
     require_ros,
 )
 from crgame_ros.ros.namespace_lock import hold_namespace
+from crgame_ros.ros.run_profile import can_believe, own_topics, write_run_profile
 from crgame_ros.ros.shared_memory import remove_stale
 from crgame_ros.traffic.kernel_cache import compile_now, compiling_when_idle
 
@@ -64,7 +65,7 @@ class Graph:
         self._namespace = namespace
         self._selector = selectors.DefaultSelector()
         self._signal: int | None = None
-        self._restarts: dict[str, int] = {}
+        self._given_up: set[str] = set()
         self._died_s: dict[str, list[float]] = {}
         self._specs = list(specs)
         self._nodes: dict[str, NodeProcess] = {}
@@ -128,22 +129,20 @@ class Graph:
         """Report a node that died, and start it again where that is safe."""
         for name, node in list(self._nodes.items()):
             code = node.exit_code()
-            if name == first or code is None or self._restarts.get(name, 0) < 0:
+            if name == first or code is None or name in self._given_up:
                 continue
             cause = cause_of_death(code)
-            count = self._restarts.get(name, 0) + 1
             # Bad input stays bad, so a node that exits with code 2 is not started again.
             now_s = time.monotonic()
             died_s = [at for at in self._died_s.get(name, []) if now_s - at < RESTARTS_S] + [now_s]
             self._died_s[name] = died_s
             if not node.spec.restart or code == 2 or len(died_s) > MAX_RESTARTS:
                 self._say(f'{name} died ({cause}); the others go on')
-                self._restarts[name] = -1
+                self._given_up.add(name)
                 continue
             self._say(f'{name} died ({cause}); starting it again')
-            self._restarts[name] = count
             self._forget(node)
-            self._start(restarted(node.spec, count))
+            self._start(node.spec)
 
     def _welcome(self) -> None:
         """Start the nodes of vehicles that have joined with another game."""
@@ -200,15 +199,6 @@ def cause_of_death(code: int) -> str:
     return f'signal {signal.Signals(-code).name}' if code < 0 else f'exit code {code}'
 
 
-def restarted(spec: NodeSpec, count: int) -> NodeSpec:
-    """Return the spec of a node that is started again: a recorder continues in a new folder."""
-    if spec.executable != 'recorder_node':
-        return spec
-    folder = Path(str(spec.parameters['directory']))
-    name = f'{folder.name.partition("_part")[0]}_part{count + 1}'
-    return replace(spec, parameters={**spec.parameters, 'directory': folder.with_name(name)})
-
-
 def launch(arguments: Sequence[str] | None = None) -> int:
     """
     Run a game from the command line.
@@ -233,7 +223,8 @@ def launch(arguments: Sequence[str] | None = None) -> int:
         finisher = Finisher(plan.folder, print_now, not request.no_report)
         try:
             domain = os.environ['ROS_DOMAIN_ID']
-            with compiling_when_idle(), hold_namespace(domain, request.namespace):
+            with compiling_when_idle(), hold_namespace(domain, request.namespace), \
+                    believing_own_nodes(plan):
                 specs = node_specs(plan)
                 load(shared_modules(specs, plan))
                 graph = Graph(specs, print_now, Roster(plan.roster), finisher, request.namespace)
@@ -259,6 +250,36 @@ def launch(arguments: Sequence[str] | None = None) -> int:
             return 130
         print_now(ENDED_EARLY)
         return 0
+
+
+@contextmanager
+def believing_own_nodes(plan: RunPlan) -> Iterator[None]:
+    """
+    Give the nodes that start meanwhile a profile that keeps the run's topics to themselves.
+
+    :raises InputError: if the request depends on it and there can be none.
+    """
+    request = plan.request
+    if request.open_topics or not can_believe():
+        if request.own_orders:
+            raise InputError('needs Fast DDS without a profile of your own', '--own-orders',
+                             f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')
+        yield
+        return
+    setup = plan.setup
+    write_run_profile(
+        plan.dds_profile, request.namespace,
+        list(own_topics([item.id for item in setup.humans], [item.id for item in setup.avs])),
+        request.own_orders)
+    before = {name: os.environ.get(name) for name in PROFILE_VARIABLES}
+    os.environ |= dict.fromkeys(PROFILE_VARIABLES, str(plan.dds_profile))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
 
 
 def announce(plan: RunPlan) -> None:

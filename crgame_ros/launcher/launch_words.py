@@ -2,67 +2,80 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arguments of `ros2 launch crgame_ros crgame.launch.py`, as words for the launcher."""
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from argparse import Action
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from crgame_ros.errors import InputError
+from crgame_ros.launcher.arguments import build_parser
+
+# What a run of ROS's launch does not do: it plays no recordings into the page.
+_LEFT_OUT = ('help', 'replay')
+_WHERE = 'crgame.launch.py'
 
 
-class LaunchArgument(NamedTuple):
+@dataclass(frozen=True)
+class LaunchArgument:
     """
-    One argument.
+    One argument, made from an option of run.sh. Its default is an empty text: not given.
 
-    :param option: the launcher's option, '' for the game; given once for each value of a list.
+    :param option: of run.sh, '' for the game.
     :param what: its meaning.
-    :param default: as text; an empty value is none.
     :param flag: whether it is true or false.
+    :param several: whether values are separated by commas; the option is given once for each.
     """
 
     option: str
     what: str
-    default: str = ''
-    flag: bool = False
+    flag: bool
+    several: bool
+
+    def words(self, name: str, value: str) -> Iterator[str]:
+        """
+        Yield the words of the command line.
+
+        :raises InputError: if a flag is neither true nor false.
+        """
+        if self.flag:
+            if value.lower() not in ('true', 'false', ''):
+                raise InputError(f'{name} is {value}', _WHERE, 'give true or false')
+            if value.lower() == 'true':
+                yield self.option
+            return
+        for item in value.split(',') if self.several else (value,):
+            if item:
+                yield from (self.option, item) if self.option else (item,)
 
 
-LAUNCH_ARGUMENTS = {
-    'game': LaunchArgument('', 'game file; the cut-in game if it is empty'),
-    'scenario': LaunchArgument('--scenario', "CommonRoad file instead of the game's"),
-    'driver': LaunchArgument('--driver', "driver of the first human's vehicle"),
-    'planners': LaunchArgument('--planner', 'planners of the AVs, separated by commas; one '
-                               'serves all'),
-    'duration': LaunchArgument('--duration', "simulated seconds; the game's if it is empty"),
-    'rate': LaunchArgument('--rate', "simulation rate [Hz]; the game's if it is empty"),
-    'real_time_factor': LaunchArgument('--real-time-factor', 'simulated seconds per second',
-                                       '1.0'),
-    'headless': LaunchArgument('--headless', 'true: without the cockpit', 'false', flag=True),
-    'port': LaunchArgument('--port', "of the cockpit's page", '8080'),
-    'namespace': LaunchArgument('--namespace', 'of every node, topic and service', '/'),
-    'out': LaunchArgument('--out', "folder of the run's files; runs/<time>_<scenario> if it is "
-                          'empty'),
-}
+def _argument(action: Action) -> LaunchArgument:
+    option = action.option_strings[0] if action.option_strings else ''
+    flag, several = action.nargs == 0, isinstance(action.default, list)
+    what = ' '.join(str(action.help).split())
+    notes = ['true or false'] * flag + ['values separated by commas'] * several
+    return LaunchArgument(option, f'{what} [{", ".join(notes)}]' if notes else what, flag,
+                          several)
+
+
+def _name(action: Action) -> str:
+    """Return an option's name in ROS's spelling; the planners have a plural one."""
+    if action.dest in ('game', 'planners'):
+        return action.dest
+    return action.option_strings[0].removeprefix('--').replace('-', '_')
+
+
+LAUNCH_ARGUMENTS = {_name(action): _argument(action)
+                    for action in build_parser('run.sh')._actions if action.dest not in _LEFT_OUT}
 
 
 def launch_words(values: Mapping[str, str]) -> list[str]:
     """
     Return the command line of the launcher.
 
-    :param values: of `LAUNCH_ARGUMENTS`; those left out have their defaults.
+    :param values: of `LAUNCH_ARGUMENTS`; those left out are not given.
     :raises InputError: if an argument is unknown, or a flag is neither true nor false.
     """
     unknown = values.keys() - LAUNCH_ARGUMENTS.keys()
     if unknown:
-        raise InputError(f'there is no argument {min(unknown)}', 'crgame.launch.py',
-                         'see --show-args')
-    words: list[str] = []
-    for name, argument in LAUNCH_ARGUMENTS.items():
-        value = values.get(name, argument.default)
-        if argument.flag:
-            if value.lower() not in ('true', 'false', ''):
-                raise InputError(f'{name} is {value}', 'crgame.launch.py', 'give true or false')
-            words += [argument.option] * (value.lower() == 'true')
-        elif name == 'planners':
-            words += [word for item in value.split(',') if item
-                      for word in (argument.option, item)]
-        elif value:
-            words += [argument.option, value] if argument.option else [value]
-    return words
+        raise InputError(f'there is no argument {min(unknown)}', _WHERE, 'see --show-args')
+    return [word for name, argument in LAUNCH_ARGUMENTS.items()
+            for word in argument.words(name, values.get(name, ''))]

@@ -30,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from crgame_ros.launcher.arguments import parse_arguments
         parse_arguments(['--help'])
     from crgame_ros.launcher.launch import launch
+    from crgame_ros.ros.node_main import end_with_parent
+    end_with_parent()
     signal.signal(signal.SIGINT, before)
     return launch(arguments)
 

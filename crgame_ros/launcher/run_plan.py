@@ -78,6 +78,11 @@ class RunPlan:
         return self.folder / '.private'
 
     @property
+    def dds_profile(self) -> Path:
+        """Return the file of the Fast DDS profile that the run's nodes share."""
+        return self.private / 'fastdds.xml'
+
+    @property
     def bag(self) -> Path:
         """Return the path of the recording."""
         return self.folder / 'bag'

@@ -7,6 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+# Begins the text of a planner that has found no plan; the reason follows.
+BRAKING = 'braking: '
+
 
 def status_text(value: object) -> str:
     """Return a value as text; booleans as `true` and `false`, as in ROS's own tools."""

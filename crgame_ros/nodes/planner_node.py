@@ -13,6 +13,7 @@ from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
 from crgame_ros.messages.plan import Plan
+from crgame_ros.messages.status_values import BRAKING
 from crgame_ros.planner.failure_lines import FailureLines
 from crgame_ros.planner.interface import PlannerContext
 from crgame_ros.planner.manager import PlannerManager, swapped_in
@@ -201,7 +202,7 @@ class PlannerNode(Node):
         self._diagnostics.publish(
             f'planner_node: {self._vehicle_id}',
             DiagnosticStatus.WARN if plan.fallback else DiagnosticStatus.OK,
-            f'braking: {self._manager.last_reason}' if plan.fallback else 'planning',
+            f'{BRAKING}{self._manager.last_reason}' if plan.fallback else 'planning',
             {'k': k, 'plans': statistics.plans, 'fallbacks': statistics.fallbacks,
              'plan_time_ms': f'{statistics.durations_s[-1] * 1e3:.3f}',
              'planner': self._manager.name})

@@ -8,22 +8,28 @@ import math
 from pathlib import Path
 import time
 
-from crgame_ros.errors import CrgameError
-from crgame_ros.game.documents import GAME_TOPIC, parse_game_document
+from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.game.documents import (
+    GAME_TOPIC,
+    GameDocument,
+    parse_game_document,
+    parse_run_state,
+    RUN_STATE_TOPIC,
+)
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.contract import load_contract, Topic
 from crgame_ros.paths import numbered
 from crgame_ros.recording.exceptions import RecordingError
 from crgame_ros.recording.metadata import TopicQos
-from crgame_ros.recording.run_folder import run_folder
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_folder import next_part, run_folder
 from crgame_ros.recording.writer import BagWriter
-from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
+from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, relative
 from crgame_ros.ros.heard_topics import OFFSET, RECORDED
-from crgame_ros.ros.messages import from_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.run_time import GameAwaited, RunTime, TimeCourse
 from crgame_ros.ros.spinning import poll
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -33,12 +39,15 @@ PERIOD_S = 0.01
 REPORT_S = 1.0
 # Ten seconds of the busiest topic fit into the queue, in case the disk stalls.
 QUEUE_DEPTH = 2000
-DIAGNOSTICS_TOPIC = '/diagnostics'
 # After a run's end, the last messages of other nodes are recorded for this long [s].
 DRAIN_S = 0.3
+# A run whose clock moves on by this much after its end was not over [ns].
+GOES_ON_NS = 200_000_000
 # A simulation that is silent for this long has ended or stands still [s].
 SILENCE_S = 2.0
 CLOCK_TOPIC = '/clock'
+# The system clock has been set if it differs by more than this from where it was [ns].
+SET_NS = 100_000_000
 # A run waits for its bag at most this long; until it starts, the bag is reported so often [s].
 AWAITED_S, AGAIN_S = 10.0, 0.2
 
@@ -72,9 +81,12 @@ class RecorderNode(Node):
         self._endpoints = Endpoints(self)
         self._topics: dict[str, RecordedTopic] = {}
         self._writer: BagWriter | None = None
-        self._offset_ns = 0
+        self._offset_ns, self._run = 0, ('', -1)
+        self._ended_run = self._run
         self._ended_s: float | None = None
         self._closed: dict[str, int] | None = None
+        # Simulation time at which the bag was closed [ns].
+        self._closed_ns = 0
         self._game_text = b''
         # Topics with a message in this bag, and whether all of them have been reported.
         self._recorded: set[str] = set()
@@ -88,6 +100,7 @@ class RecorderNode(Node):
         self._held: list[tuple[RecordedTopic, bytes, int, int]] | None = None
         self._early: deque[tuple[RecordedTopic, bytes, int, int]] = deque(maxlen=QUEUE_DEPTH)
         self._awaited = GameAwaited(self, 'nothing is recorded')
+        self._log_clock = LogClock(time.time_ns(), time.monotonic_ns())
         self._subscribe((), ())
 
     def _subscribe(self, humans: tuple[str, ...], avs: tuple[str, ...]) -> None:
@@ -142,7 +155,7 @@ class RecorderNode(Node):
             # The last cycles come just after the end; these come later.
             self._ended_s = None
             self._endpoints.refusals.note(
-                DIAGNOSTICS_TOPIC, f'{DIAGNOSTICS_TOPIC}: the end of a run that goes on')
+                RUN_STATE_TOPIC, f'{RUN_STATE_TOPIC}: the end of a run that goes on')
             return
         self._close()
 
@@ -179,11 +192,15 @@ class RecorderNode(Node):
     def _write_waiting(self, recorded: RecordedTopic) -> None:
         while (taken := recorded.slot.pop_timed()) is not None:
             data, published_ns, received_ns = taken
+            published_ns, received_ns = self._log_clock.times_ns(
+                published_ns, received_ns, time.time_ns(), time.monotonic_ns())
             if recorded.latched:
                 recorded.latest = (data, published_ns, received_ns)
                 if recorded.name == GAME_TOPIC and data != self._game_text:
                     self._begin_bag(data)
                     continue
+                if recorded.name == RUN_STATE_TOPIC:
+                    self._note_end(data)
             elif recorded.name == CLOCK_TOPIC:
                 self._heard_s = time.monotonic()
                 stamp_ns = header_stamp_ns(data)
@@ -191,9 +208,6 @@ class RecorderNode(Node):
                     self._moved_s = self._heard_s
                 self._endpoints.diagnostics.now_ns = stamp_ns
                 self._follow(stamp_ns)
-            elif recorded.name == DIAGNOSTICS_TOPIC and b'sim_node: run' in data \
-                    and b'ended' in data:
-                self._note_end(data)
             self._write(recorded, data, published_ns, received_ns)
 
     def _follow(self, clock_ns: int) -> None:
@@ -205,42 +219,70 @@ class RecorderNode(Node):
             self._held = [] if self._held is None else self._held
             return
         held, self._held = self._held or [], None
-        if course is TimeCourse.BACK and self._game_text:
+        if course is TimeCourse.BACK and self._several_publish(CLOCK_TOPIC):
+            self._endpoints.refusals.note(
+                CLOCK_TOPIC, f'{CLOCK_TOPIC}: earlier times by another program')
+        elif course is TimeCourse.BACK and self._game_text:
             self.get_logger().info('simulation time has jumped back: recording another run')
             self._ended_s = time.monotonic()
+            self._begin_bag(self._game_text, again=True)
+        elif course is TimeCourse.ON and self._writer is None and self._closed is not None \
+                and clock_ns > self._closed_ns + GOES_ON_NS:
+            self.get_logger().warning('the run goes on after its end: recording another part')
+            self._ended_run = '', -1
             self._begin_bag(self._game_text)
         for item in held:
             self._write(*item)
 
+    def _several_publish(self, topic: str) -> bool:
+        """Return whether not only the simulation, or a player of recordings, publishes it."""
+        return self.count_publishers(relative(topic)) > 1
+
     def _note_end(self, data: bytes) -> None:
         """Note the end of the run; a late message may report that of the previous run."""
-        message: DiagnosticArray = deserialize_message(data, DiagnosticArray)
-        if self._ended_s is None and from_time(message.header.stamp) >= self._offset_ns \
-                and any(item.name == 'sim_node: run' and item.message == 'ended'
-                        for item in message.status):
+        try:
+            state = parse_run_state(deserialize_message(data, String).data)
+        except InputError as error:
+            self._endpoints.refusals.note(RUN_STATE_TOPIC, str(error))
+            return
+        run = state.simulation, state.epoch
+        if state.state != 'ended':
+            if run == self._ended_run:
+                # A recording is played again.
+                self._ended_run, self._ended_s = ('', -1), None
+            return
+        self._ended_run = run
+        if self._ended_s is None and run == self._run:
             # Of the clock, only what comes after this tells that the run goes on.
             self._write_waiting(self._topics[CLOCK_TOPIC])
             self._ended_s = time.monotonic()
 
-    def _begin_bag(self, game_data: bytes) -> None:
-        """Open the bag of a new game, and write every latched message received so far."""
-        self._game_text = game_data
+    def _begin_bag(self, game_data: bytes, again: bool = False) -> None:
+        """
+        Open the bag of a new game, and write every latched message received so far.
+
+        :param again: whether the same run is played once more.
+        """
         try:
             # Parsed before the bag is closed: an invalid game must not end the recording.
             game = parse_game_document(deserialize_message(game_data, String).data)
             offset_ns = game.scheduler.clock_offset_ns
-            if offset_ns <= self._offset_ns and self._goes_on:
+            if self._goes_on and (offset_ns <= self._offset_ns
+                                  or self._several_publish(GAME_TOPIC)):
                 self._endpoints.refusals.note(
                     GAME_TOPIC, f'{GAME_TOPIC}: another game of a run that goes on')
                 return
             self._close()
+            self._game_text, self._run = game_data, (game.simulation, game.epoch)
             # Set before the first cycle, so that reports on this recording do not count to the
             # previous run.
             self._endpoints.diagnostics.now_ns = offset_ns
             self._subscribe(tuple(item.id for item in game.humans),
                             tuple(item.id for item in game.avs))
-            self._writer = BagWriter(self._folder_of(game.epoch), now_ns=time.monotonic_ns)
-            self._offset_ns, self._ended_s = offset_ns, None
+            self._writer = BagWriter(self._folder_of(game, again), now_ns=time.monotonic_ns)
+            # This node may come after the end; a recording may also be played again.
+            over = self._run == self._ended_run and not again
+            self._offset_ns, self._ended_s = offset_ns, time.monotonic() if over else None
             self._time = RunTime()
             self._closed = None
             self._recorded.clear()
@@ -251,7 +293,7 @@ class RecorderNode(Node):
                     recorded.name, recorded.topic.type_name,
                     TopicQos(qos.depth, qos.reliability, qos.durability))
             self.get_logger().info(f'recording into {self._writer.folder}')
-            now_ns = time.time_ns()
+            now_ns = self._log_clock.now_ns(time.monotonic_ns())
             for recorded in self._topics.values():
                 if recorded.latest is not None:
                     self._write(recorded, recorded.latest[0], recorded.latest[1], now_ns)
@@ -266,10 +308,20 @@ class RecorderNode(Node):
         return self._writer is not None and self._ended_s is None \
             and time.monotonic() - self._heard_s < SILENCE_S
 
-    def _folder_of(self, epoch: int) -> Path:
-        """Return the bag's folder; a restarted simulation counts its runs from the first again."""
-        wanted = run_folder(self._directory.parent, epoch) / self._directory.name
-        return next(folder for folder in numbered(wanted) if not folder.exists())
+    def _folder_of(self, game: GameDocument, again: bool) -> Path:
+        """
+        Return the bag's folder: a part of an earlier one that holds the beginning of the same run.
+
+        The recorder may have been started again; a restarted simulation counts its runs from the
+        first again.
+        """
+        wanted = run_folder(self._directory.parent, game.epoch) / self._directory.name
+        for folder in numbered(wanted):
+            if not folder.exists():
+                break
+            if game.simulation and not again and _simulation_in(folder) in (game.simulation, None):
+                return next_part(folder)
+        return folder
 
     def _write(self, recorded: RecordedTopic, data: bytes, published_ns: int,
                received_ns: int) -> None:
@@ -298,6 +350,7 @@ class RecorderNode(Node):
         if self._writer is None:
             return
         writer, self._writer = self._writer, None
+        self._closed_ns = self._endpoints.diagnostics.now_ns
         try:
             writer.close()
         except RecordingError as error:
@@ -308,6 +361,50 @@ class RecorderNode(Node):
                             'closed': True}
             self._report(None)
             self.get_logger().info(f'{writer.message_count} messages in {writer.folder}')
+
+
+class LogClock:
+    """
+    The times at which messages are logged, which never go back although the system clock may.
+
+    :param wall_ns: system time now [ns since 1970]
+    :param steady_ns: the steady clock now [ns]
+    """
+
+    def __init__(self, wall_ns: int, steady_ns: int) -> None:
+        self._begun_ns = wall_ns - steady_ns
+        # By how much the system clock has been set since, and the latest time that was logged.
+        self._set_by_ns = self._last_ns = 0
+
+    def now_ns(self, steady_ns: int) -> int:
+        """Return the time now, as if nobody had set the system clock [ns since 1970]."""
+        return self._begun_ns + steady_ns
+
+    def times_ns(self, published_ns: int, received_ns: int, wall_ns: int,
+                 steady_ns: int) -> tuple[int, int]:
+        """
+        Return the times of publication and reception that are to be logged [ns since 1970].
+
+        :param wall_ns: system time now [ns since 1970]
+        :param steady_ns: the steady clock now [ns]
+        """
+        now_ns = self.now_ns(steady_ns)
+        # This process may be interrupted for a moment between two looks at clocks.
+        if abs(wall_ns - now_ns - self._set_by_ns) > SET_NS:
+            self._set_by_ns = wall_ns - now_ns
+        self._last_ns = max(self._last_ns, min(received_ns - self._set_by_ns, now_ns))
+        return min(published_ns - self._set_by_ns, self._last_ns), self._last_ns
+
+
+def _simulation_in(bag: Path) -> str | None:
+    """Return the simulation whose run is in a bag; None if it has not come that far."""
+    try:
+        with BagReader(bag) as reader:
+            for message in reader.decoded([GAME_TOPIC]):
+                return parse_game_document(message.message.data).simulation
+    except InputError:
+        pass
+    return None
 
 
 def main(args: list[str] | None = None) -> None:

@@ -90,7 +90,6 @@ class SimNode(Node):
             if outcome is not Outcome.RESET:
                 return
             self._control.reset_wanted = False
-            self._control.steps_wanted = 0
             before, setup = setup, self._next_setup(setup)
             again = simulation.n > 0 and setup.game == before.game \
                 and not self._control.chosen_anew and self._all_sit(setup)

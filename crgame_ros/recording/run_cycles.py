@@ -73,9 +73,13 @@ def table_of(tables: Sequence[CycleTable], epoch: int | None, reader: BagReader)
     columns = widths.most_common(1)[0][0]
     rows = np.concatenate([table.rows for table in tables if table.columns == columns])
     table = CycleTable(columns, rows)
+    n = table.column('n')
+    if len(np.unique(n)) == len(n):
+        # One run, whose messages a recorder may have logged in disorder after its clock was set.
+        return CycleTable(columns, rows[np.argsort(n)])
     # Where n falls, a restarted simulation began the same epoch again. A piece of a few cycles is
     # not a run, but the start of a recording that was played once more.
-    pieces = np.split(rows, np.flatnonzero(np.diff(table.column('n')) <= 0) + 1)
+    pieces = np.split(rows, np.flatnonzero(np.diff(n) <= 0) + 1)
     runs = [piece for piece in pieces if len(piece) >= _FEW_CYCLES] or pieces
     return CycleTable(columns, runs[-1])
 

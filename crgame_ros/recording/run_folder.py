@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names and finds the folders of the runs of a session, and of a study's participants."""
 
+from itertools import count
 from pathlib import Path
 import re
 
@@ -67,6 +68,12 @@ def parts_of(bag: Path) -> list[Path]:
     family = sorted((path for path in bag.parent.glob(f'{stem}*')
                      if path.is_dir() and _PART.sub('', path.name) == stem), key=_order)
     return family if family[:1] == [bag] else [bag]
+
+
+def next_part(bag: Path) -> Path:
+    """Return the first name for a continuation of a recording that is free."""
+    return next(path for number in count(2)
+                if not (path := bag.with_name(f'{bag.name}_part{number}')).exists())
 
 
 def _order(path: Path) -> tuple[str, int]:

@@ -14,7 +14,7 @@ from crgame_ros.game.documents import EVENTS_TOPIC, parse_events_document
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.joints import vehicles_from_joints
-from crgame_ros.messages.status_values import read_status
+from crgame_ros.messages.status_values import BRAKING, read_status
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
@@ -108,10 +108,10 @@ REPORT_KEYS = frozenset((
     'notices', 'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
     'real_time_ratio', 'time_efficiency', 'precision_ratio'))
 # The engine's counts in a status `sim_node: <av> plans`.
-PLAN_COUNTS = ('requests', 'accepted', 'refused', 'skipped', 'timed_out', 'realigned',
+PLAN_COUNTS = ('requests', 'accepted', 'refused', 'of_others', 'skipped', 'timed_out', 'realigned',
                'steps_without_plan')
-# Prefixes in the status of a planner that braked, and of a tracked AV.
-_BRAKING, _WORST = 'braking: ', 'worst_'
+# Prefix in the status of a tracked AV.
+_WORST = 'worst_'
 
 
 def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | None = None,
@@ -141,6 +141,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
         for message in reader.messages(collected.topics):
             collected.add(message, reader)
         contacts, unknown = _contacts(reader, run, collected.verdicts, collected.fired)
+        planners = {av: collected.planner(av) for av in collected.avs}
         return {
             **metrics.summary().as_dict(),
             'late_steps': late.as_dict(),
@@ -148,7 +149,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             'gaps': int(numbers[-1]) - len(numbers),
             'scenario_steps': None if log is None else
             {'first': int(log.ks[0]), 'last': int(log.ks[-1])},
-            'planners': {av: collected.planner(av) for av in collected.avs},
+            'planners': planners,
             'drivability': {'violations': len(collected.violations),
                             'list': collected.violations},
             'contacts': contacts,
@@ -158,6 +159,8 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             'epoch': run.game.epoch,
             'notices': [*dict.fromkeys((
                 *(() if log is None else log.notices), *reader.notices, *reader.foreign_notices,
+                *(f'/{av}/plan: {entry["of_others"]} plans of other programs than its planner, '
+                  'which were not taken' for av, entry in planners.items() if entry['of_others']),
                 *unknown))]}
 
 
@@ -271,9 +274,9 @@ class _Collector:
         self.view.add(told, (stamp_ns - self._run.game.scheduler.clock_offset_ns) * 1e-9)
         if status.name.startswith('planner_node: ') and values.get('plan_time_ms'):
             self._plan_times_ms[status.name].append(float(values['plan_time_ms']))
-            if status.message.startswith(_BRAKING):
+            if status.message.startswith(BRAKING):
                 reason = first_of_kind(self._first_reasons[status.name],
-                                       status.message.removeprefix(_BRAKING))
+                                       status.message.removeprefix(BRAKING))
                 self._reasons[status.name][reason] += 1
         elif status.name.startswith('sim_node: ') and values.get('age_ms'):
             self._ages_ms[status.name].append(float(values['age_ms']))

@@ -12,6 +12,7 @@ from crgame_ros.messages.cdr import message_header
 from crgame_ros.messages.contract import load_contract, Qos
 from crgame_ros.ros.diagnostics import Diagnostics
 from crgame_ros.ros.message_validator import message_type, MessageValidator, Refusals
+from crgame_ros.ros.sent_message import take_sent
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.callback_groups import CallbackGroup
@@ -68,17 +69,21 @@ class PolledSubscription:
     :param read: converts a serialised message for the owner, or raises InputError.
     :param refuse: called with each unusable message, which is then skipped; without it such
         a message raises InputError.
+    :param sent: whether `publisher` is wanted.
+    :ivar publisher: id of the publisher of the message that was looked at last.
     :ivar wanted: decides by stamp [ns] and frame whether a message is for the owner; others are
         skipped before they are converted. None accepts every message.
     """
 
     def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], Any],
-                 refuse: Callable[[str, str], None] | None) -> None:
+                 refuse: Callable[[str, str], None] | None, sent: bool = False) -> None:
         self.subscription = subscription
+        self.publisher = b''
         self.wanted: Callable[[int, str], bool] | None = None
         self._name = name
         self._read = read
         self._refuse = refuse
+        self._sent = sent
 
     def pop(self) -> Any | None:
         """Remove and return the oldest message (or its bytes, if raw); None without any."""
@@ -87,24 +92,36 @@ class PolledSubscription:
 
     def pop_timed(self) -> tuple[Any, int, int] | None:
         """Return what `pop` does, with the times of publication and reception [ns since 1970]."""
-        subscription = self.subscription
         # The rest of a flood of unusable messages waits.
         for _ in range(MAX_PASSED_OVER):
-            with subscription.handle:
-                taken = subscription.handle.take_message(subscription.msg_type, True)
+            taken = self._take()
             if taken is None:
                 return None
-            data, info = taken
+            data, published_ns, received_ns = taken
             try:
                 if self.wanted is not None and not self.wanted(*message_header(data, self._name)):
                     continue
-                return (self._read(data), int(info['source_timestamp']),
-                        int(info['received_timestamp']))
+                return self._read(data), published_ns, received_ns
             except InputError as error:
                 if self._refuse is None:
                     raise
                 self._refuse(self._name, str(error))
         return None
+
+    def _take(self) -> tuple[bytes, int, int] | None:
+        if self._sent:
+            message = take_sent(self.subscription)
+            if message is None:
+                return None
+            self.publisher = message.publisher
+            return message[:3]
+        handle = self.subscription.handle
+        with handle:
+            taken = handle.take_message(self.subscription.msg_type, True)
+        if taken is None:
+            return None
+        data, info = taken
+        return data, int(info['source_timestamp']), int(info['received_timestamp'])
 
     def latest(self) -> Any | None:
         """Remove all waiting messages and return the newest, None if there is none."""
@@ -155,7 +172,7 @@ class Endpoints:
 
     def polled(self, name: str, vehicle_id: str = '', *, raw: bool = False,
                depth: int | None = None, strict: bool = False,
-               verify: bool = False) -> PolledSubscription:
+               verify: bool = False, sent: bool = False) -> PolledSubscription:
         """
         Create a subscription that the node reads itself.
 
@@ -163,6 +180,7 @@ class Endpoints:
         :param verify: return serialised messages of the topic's type, with unchecked contents.
         :param strict: raise InputError for an unusable message, instead of skipping and counting
             it.
+        :param sent: tell whose message it is.
         """
         topic = self._contract.topic(name)
         profile = qos_profile(topic.qos)
@@ -174,19 +192,25 @@ class Endpoints:
             callback_group=self._polled_group, raw=True)
         read = intake.verify if verify else intake.bound if raw else intake.read
         return PolledSubscription(subscription, intake.name, read,
-                                  None if strict else self.refusals.note)
+                                  None if strict else self.refusals.note, sent)
+
+    def publishers(self, slot: PolledSubscription) -> dict[bytes, str]:
+        """Return the full names of the nodes that publish what is subscribed to, by publisher."""
+        return {bytes(info.endpoint_gid): f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+                for info in self._node.get_publishers_info_by_topic(
+                    slot.subscription.topic_name)}
 
     def release(self, slot: PolledSubscription) -> None:
         """Destroy a subscription."""
         self._node.destroy_subscription(slot.subscription)
 
     def service(self, name: str, callback: Callable[[Any, Any], Any],
-                vehicle_id: str = '') -> Service:
+                vehicle_id: str = '', group: CallbackGroup | None = None) -> Service:
         """Create a service, whose queue holds a burst of calls until they are answered."""
         row = self._contract.services[name]
         return self._node.create_service(
             message_type(row.type_name), relative(name.replace('<av>', vehicle_id)), callback,
-            qos_profile=QoSProfile(depth=SERVICE_DEPTH))
+            qos_profile=QoSProfile(depth=SERVICE_DEPTH), callback_group=group)
 
     def client(self, name: str, vehicle_id: str = '') -> Client:
         """Create a client of a service."""

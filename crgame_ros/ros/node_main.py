@@ -52,24 +52,33 @@ class RunnableNode(Protocol):
         """Release the node's endpoints."""
 
 
-def die_with_parent() -> None:
+def end_with_parent() -> int | None:
     """
-    Ask the kernel to end this process when the one that started the graph dies.
+    Ask the kernel to end this process in good order when the one that started it dies.
 
-    It ends in good order. If that takes too long because something hangs, it ends at once, because
-    no parent is left to end it.
+    This applies only if the parent requested it (`CRGAME_PARENT_PID`): what is started by hand
+    goes on.
 
-    This applies only if the parent requested it (`CRGAME_PARENT_PID`): a node started by hand goes
-    on.
+    :return: the parent's process id if so.
     """
     parent = os.environ.get(PARENT_VARIABLE)
     if parent is None:
-        return
+        return None
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != int(parent):
-        sys.exit(f'the process {parent} that started the graph is gone')
-    if not any(thread.name == _ALONE for thread in threading.enumerate()):
-        threading.Thread(target=_end_alone, args=(int(parent),), name=_ALONE, daemon=True).start()
+        sys.exit(f'the process {parent} that started this one is gone')
+    return int(parent)
+
+
+def die_with_parent() -> None:
+    """
+    End with the parent, as `end_with_parent`, and at once if a good end takes too long.
+
+    If something hangs, no parent is left to end this process.
+    """
+    parent = end_with_parent()
+    if parent is not None and not any(thread.name == _ALONE for thread in threading.enumerate()):
+        threading.Thread(target=_end_alone, args=(parent,), name=_ALONE, daemon=True).start()
 
 
 def _end_alone(parent: int) -> None:

@@ -95,6 +95,7 @@ class AvCounters:
     timed_out: int = 0
     accepted: int = 0
     refused: int = 0
+    of_others: int = 0
     realigned: int = 0
     steps_without_plan: int = 0
     last_refusal: str = ''

@@ -21,19 +21,21 @@ _EXECUTION = ('tracker', 'dynamics', 'perception')
 
 
 def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
-                  real_time_factor: float) -> str:
+                  real_time_factor: float, simulation: str = '') -> str:
     """
     Return the resolved game as JSON (fields as in the contract, `/scenario/game`).
 
     :param epoch: counts resets.
     :param clock_offset_ns: simulation time of n = 0 [ns]
     :param real_time_factor: simulated seconds per wall second.
+    :param simulation: name of the process that simulates, if it is not alone.
     """
     scheduler, game = setup.scheduler, setup.game
     duration = game.duration if math.isfinite(game.duration) else None
     document = {
-        'epoch': epoch, 'title': game.title, 'benchmark_id': setup.loaded.benchmark_id,
-        'scenario_sha256': setup.loaded.sha256, 'dt_ns': round(scheduler.dt_s * 1e9),
+        'epoch': epoch, 'simulation': simulation, 'title': game.title,
+        'benchmark_id': setup.loaded.benchmark_id, 'scenario_sha256': setup.loaded.sha256,
+        'dt_ns': round(scheduler.dt_s * 1e9),
         'dt_c_ns': scheduler.time_step_ns, 'steps_per_tick': scheduler.steps_per_tick,
         'k0': scheduler.k0, 'clock_offset_ns': clock_offset_ns,
         'real_time_factor': real_time_factor, 'seed': game.seed, 'duration': duration,

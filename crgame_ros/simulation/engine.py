@@ -182,6 +182,10 @@ class Simulation:
         """
         return self._av_by_id[av_id].refuse_unasked(stamp_ns)
 
+    def count_other_planner(self, av_id: str) -> None:
+        """Count an answer of a program that is not the AV's planner."""
+        self._av_by_id[av_id].counters.of_others += 1
+
     def refuse_malformed_plan(self, av_id: str, reason: str) -> None:
         """Count a planner's answer that could not be read."""
         self._av_by_id[av_id].refuse_malformed(reason)

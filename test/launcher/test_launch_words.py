@@ -4,9 +4,10 @@
 
 import importlib.util
 from pathlib import Path
+import re
 
 from crgame_ros.errors import InputError
-from crgame_ros.launcher.arguments import parse_arguments, RunRequest
+from crgame_ros.launcher.arguments import build_parser, parse_arguments, RunRequest
 from crgame_ros.launcher.launch_words import LAUNCH_ARGUMENTS, launch_words
 from crgame_ros.launcher.node_specs import node_specs
 from crgame_ros.launcher.run_plan import plan_run
@@ -33,13 +34,27 @@ def test_every_argument_reaches_the_launcher(tmp_path: Path) -> None:
     request = parse_arguments(launch_words({
         'game': 'a.yaml', 'scenario': 'b.xml', 'driver': 'idle', 'planners': 'idm,reactive',
         'duration': '7', 'rate': '50', 'real_time_factor': '2', 'headless': 'true',
-        'port': '9000', 'namespace': 'exp1', 'out': str(tmp_path)}))
+        'port': '9000', 'namespace': 'exp1', 'out': str(tmp_path), 'problem': '7,8',
+        'start_paused': 'true', 'countdown': '1', 'realtime_priority': 'true',
+        'no_report': 'true', 'own_orders': 'true'}))
     assert request == RunRequest(
         game=Path('a.yaml'), scenario=Path('b.xml'), driver='idle',
         planners=('idm', 'reactive'), duration_s=7.0, rate_hz=50.0, real_time_factor=2.0,
-        headless=True, port=9000, namespace='/exp1', out=tmp_path)
+        headless=True, port=9000, namespace='/exp1', out=tmp_path, problems=(7, 8),
+        start_paused=True, countdown_s=1.0, realtime_priority=True, no_report=True,
+        own_orders=True)
+    assert parse_arguments(launch_words({'token': 'true', 'listen': '127.0.0.1'})) == RunRequest(
+        token=True, listen='127.0.0.1')
+    assert parse_arguments(launch_words({'open_cockpit': 'true'})) == RunRequest(open_cockpit=True)
     assert parse_arguments(launch_words({})) == RunRequest()
     assert all(argument.what for argument in LAUNCH_ARGUMENTS.values())
+
+
+def test_every_option_of_a_run_is_an_argument() -> None:
+    """None is forgotten: `--help` lists what `--show-args` does, except for --replay."""
+    options = set(re.findall(r'--[a-z-]+', build_parser('run.sh').format_help().partition(
+        'examples:')[0])) - {'--help', '--replay'}
+    assert {argument.option for argument in LAUNCH_ARGUMENTS.values()} - {''} == options
 
 
 def test_what_is_no_argument_is_refused() -> None:

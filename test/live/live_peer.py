@@ -166,7 +166,7 @@ class Peer:
         """Forget all messages but those that are sent once and then hold."""
         self.listen()
         for name, messages in self.messages.items():
-            if not name.startswith('/scenario/') and name != '/seats':
+            if not name.startswith('/scenario/') and name not in ('/seats', '/sim/state'):
                 messages.clear()
 
     def close(self) -> None:

@@ -80,8 +80,9 @@ def test_pause_freezes_everything_and_step_advances_one_tick(peer: Peer) -> None
     peer.listen_for(QUIET_S)
     assert _counts(peer) == before
     for steps in (1, 2):
-        assert peer.call('/sim/step').success
         goal = paused_n + steps * STEPS_PER_TICK
+        # The answer comes when the step is done.
+        assert peer.call('/sim/step').message == f'at n = {goal}'
         peer.wait_until(lambda goal=goal: peer.n >= goal, f'n = {goal}')
         peer.listen_for(0.3)
         assert peer.n == goal

@@ -149,6 +149,26 @@ def _ask_again(peer: Peer) -> None:
         f'the request of the tick before n = {n}')
 
 
+def _take_over(peer: Peer, rogue: Publisher) -> None:
+    """Answer two requests that the frozen planner leaves open: from then on it is the planner."""
+    for asked in range(2):
+        if asked:
+            # A request that is not answered is repeated after a second.
+            stamp = peer.messages['/<av>/plan_request'][-1].header.stamp
+            while peer.messages['/<av>/plan_request'][-1].header.stamp == stamp:
+                _step(peer)
+                peer.listen_for(0.05)
+        _answer(peer, rogue, lambda states: states)
+    _ask_again(peer)
+    assert 'of another planner: ' in peer.statuses('sim_node: av0 plan refused')[0][0].message
+
+
+def _refusals(peer: Peer) -> list[str]:
+    """Return why plans of the planner were refused."""
+    return [status.message for status, _ in peer.statuses('sim_node: av0 plan refused')
+            if 'of another planner' not in status.message]
+
+
 def _answer(peer: Peer, rogue: Publisher,
             lie: Callable[[NDArray[np.float64]], NDArray[np.float64]], late_ns: int = 0) -> None:
     """Answer the last request for av0 with a plan at constant speed, distorted."""
@@ -163,6 +183,28 @@ def _answer(peer: Peer, rogue: Publisher,
     plan = Plan(from_time(request.header.stamp) + late_ns, lie(states))
     rogue.publish(to_joint_trajectory(plan_to_joints(plan, 'av0', TICK_NS)))
     assert rogue.wait_for_all_acked(RosDuration(seconds=PATIENCE_S))
+
+
+def test_a_second_planner_is_told_of_and_not_followed(run: Run) -> None:
+    """A program that was left over answers each request too: its plans are counted, no more."""
+    launcher, peer = run
+    other = peer.publisher('/<av>/plan', 'av0')
+    sent: set[int] = set()
+
+    def answer() -> bool:
+        for message in peer.messages['/<av>/plan_request']:
+            if from_time(message.header.stamp) not in sent:
+                sent.add(from_time(message.header.stamp))
+                _answer(peer, other, lambda states: states)
+        return int(run.counters()['of_others']) >= 5
+    peer.wait_until(lambda: peer.statuses('sim_node: av0 plans') and answer(), 'its answers')
+    counted = run.counters()
+    assert int(counted['accepted']) >= int(counted['requests']) - int(counted['refused']) - 2
+    assert counted['refused'] == '0'
+    name = f'{peer.node.get_namespace().rstrip("/")}/{peer.node.get_name()}'
+    assert launcher.says(f'/av0/plan: of another planner: {name} answers besides '
+                         '/planner_node_av0')
+    peer.node.destroy_publisher(other)
 
 
 @pytest.mark.exhaustive
@@ -183,17 +225,17 @@ def test_lies_of_a_planner_are_refused_with_the_reason(run: Run) -> None:
                         == peer.messages['/<av>/plan_request'][-1].header.stamp, 'the last answer')
         launcher.freeze('planner_node_av0')
         _ask_again(peer)
+        _take_over(peer, rogue)
         good = _plans(peer)[-1]
         reasons = {**LIES, 'answers no request': lambda states: states}
         for count, (reason, lie) in enumerate(reasons.items(), 1):
             _answer(peer, rogue, lie, TICK_NS // 2 if reason == 'answers no request' else 0)
             # A plan that answers no request leaves the request open for a second.
             (_step if reason == 'answers no request' else _ask_again)(peer)
-            peer.wait_until(lambda count=count: len(peer.statuses('sim_node: av0 plan refused'))
-                            >= count, f'the refusal: {reason}')
-            assert reason in peer.statuses('sim_node: av0 plan refused')[-1][0].message
-        refusals = peer.statuses('sim_node: av0 plan refused')
-        assert len(refusals) == len(reasons)
+            peer.wait_until(lambda count=count: len(_refusals(peer)) >= count,
+                            f'the refusal: {reason}')
+            assert reason in _refusals(peer)[-1]
+        assert len(_refusals(peer)) == len(reasons)
         # Each refusal took a tick, and the AV still follows the plan from before.
         assert _followed(good, peer.states('av0')) >= len(reasons)
         assert peer.states('av0')[-1, 4] > 5.0

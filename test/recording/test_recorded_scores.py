@@ -232,7 +232,7 @@ def test_the_command_tells_the_same_of_the_recording(
     assert main(['score', str(run)]) == 0
     text = capsys.readouterr().out
     for words in ('hv0 (human)', 'av0 (autonomous, idm)', 'nuPlan', 'free drive', 'SM1',
-                  'feasible, 30 transitions', '80.0 % accepted', '2 x # m are missing',
+                  'feasible, 30 transitions', '80.0 % accepted', '2 x 3 m are missing',
                   'age 50 ms', 'tracking', 'lateral 0.25 m', 'm away at the end'):
         assert words in text, words
 

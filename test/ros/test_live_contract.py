@@ -79,7 +79,8 @@ class Case:
 
     def publishers(self, topic: Topic) -> set[Endpoint]:
         """List the publishers that a topic must have."""
-        return self._endpoints(topic, topic.producers, frozenset(), frozenset(
+        executables = tuple(name for name in topic.producers if name != 'external')
+        return self._endpoints(topic, executables, frozenset(), frozenset(
             (name, 'sim_node', av) for av in self.avs for name in (
                 ['/<av>/plan_request'] if av in self.perceiving else ['/<av>/true_request'])))
 

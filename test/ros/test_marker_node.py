@@ -67,7 +67,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launcher, 
     game = write_steady_game(folder)
     # On a busy machine timesync_node's own orders would mix with the test's.
     game.write_text(game.read_text() + 'timing: {frame_skipping: false}\n')
-    with Launcher([game], folder / 'run') as launcher, \
+    with Launcher([game, '--open-topics'], folder / 'run') as launcher, \
             Peer(launcher.domain, *TOPICS) as peer:
         peer.wait_until(lambda: peer.n > 0, 'the first step')
         yield launcher, peer

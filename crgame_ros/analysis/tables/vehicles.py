@@ -29,7 +29,9 @@ HUMAN, UNRECORDED = 'a human drives it', 'not an AV, or not recorded'
 # Keys of `timing.json`, with the meaning of each count.
 COUNTS = {
     'requests': 'plan requests', 'accepted': 'plans that were accepted',
-    'refused': 'plans that were refused', 'skipped': 'requests left out while one was open',
+    'refused': 'plans that were refused',
+    'of_others': 'answers of other programs than its planner',
+    'skipped': 'requests left out while one was open',
     'timed_out': 'requests that were not answered in time',
     'realigned': 'plans that were aligned to where the AV was',
     'steps_without_plan': 'simulation steps without a plan to follow'}
@@ -134,6 +136,11 @@ def _worst_columns() -> list[Column]:
     return columns
 
 
+def _count_name(key: str) -> str:
+    """Return the column of a count."""
+    return f'plans_{key}' if key in ('accepted', 'refused', 'of_others', 'realigned') else key
+
+
 def _planning(run: TableRun) -> Mapping[str, Sequence[Any]]:
     ids = [item.id for item in run.record.log.vehicles]
     planners = {} if run.outcome is None else run.outcome['planners']
@@ -141,7 +148,7 @@ def _planning(run: TableRun) -> Mapping[str, Sequence[Any]]:
     latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s
                  for tally in tallies]
     return {
-        **{f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key:
+        **{_count_name(key):
            [planners.get(name, {}).get(key) for name in ids] for key in COUNTS},
         'fallbacks': [planners.get(name, {}).get('fallback') for name in ids],
         'plans': [None if tally is None else tally.answers for tally in tallies],
@@ -189,8 +196,8 @@ VEHICLE_PARTS = (
                empty='it crossed no other path')), _criticality),
     TablePart(FOLLOWING_COLUMNS, _following),
     TablePart((
-        *(Column(f'plans_{key}' if key in ('accepted', 'refused', 'realigned') else key, INTEGER,
-                 '1', what, variant='as the engine told last', empty=UNRECORDED)
+        *(Column(_count_name(key), INTEGER, '1', what, variant='as the engine told last',
+                 empty=UNRECORDED)
           for key, what in COUNTS.items()),
         Column('fallbacks', INTEGER, '1', 'plans that braked because the planner failed',
                empty=UNRECORDED),

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The services and parameters that control sim_node."""
 
+from collections import deque
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from crgame_ros.driver.source import is_replay
 from crgame_ros.errors import InputError
@@ -18,8 +20,10 @@ from crgame_ros.ros.number_parameters import declare_number
 from crgame_ros.ros.run_ends import AT_END, EXIT, STAY, STAY_IF_CHOSEN
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.task import Future
 
 # Drivers that do not depend on the scenario.
 SCRIPTS = ('keys:', 'joy:')
@@ -37,9 +41,13 @@ class SimControl:
 
     def __init__(self, node: Node) -> None:
         self._node = node
+        # Names this process in /scenario/game, so that a recorder knows whether it goes on.
+        self.simulation = uuid4().hex
         self.paused = False
         self.steps_wanted = 0
         self._stepped = 0
+        # The answers to orders of a step, each given when its step is done.
+        self._steps: deque[Future] = deque()
         self.reset_wanted = False
         self.stop_wanted = False
         # The run has ended, and the node stays for another one.
@@ -62,10 +70,12 @@ class SimControl:
         node.add_on_set_parameters_callback(self._on_parameters)
         node.add_post_set_parameters_callback(self._after_parameters)
         endpoints = Endpoints(node)
+        # Other orders are served while one of a step waits. rclpy keeps groups by weak reference.
+        self._group = ReentrantCallbackGroup()
         for name, callback in (('/sim/start', self._on_start), ('/sim/pause', self._on_pause),
                                ('/sim/step', self._on_step), ('/sim/reset', self._on_reset),
                                ('/sim/stop', self._on_stop)):
-            endpoints.service(name, callback)
+            endpoints.service(name, callback, group=self._group)
         self._chosen = 'game' if self._value('game') or not self._value('scenario') else 'scenario'
         # Files named on the command line are trusted; later orders may come from any DDS peer.
         self._directories = [Path(item).resolve() for item in self._value('scenario_directories')
@@ -168,15 +178,26 @@ class SimControl:
         """Return whether the run is paused and no step of it is ordered."""
         return self.paused and not self.steps_wanted
 
-    def count_step(self, steps_per_tick: int) -> None:
-        """Count down the scenario steps ordered during a pause, each of `steps_per_tick` steps."""
+    def count_step(self, steps_per_tick: int, n: int) -> None:
+        """
+        Count down the scenario steps ordered during a pause, each of `steps_per_tick` steps.
+
+        :param n: the simulation step that has been done.
+        """
         if not (self.paused and self.steps_wanted):
-            self.steps_wanted = self._stepped = 0
+            self.end_steps()
             return
         self._stepped += 1
         if self._stepped == steps_per_tick:
             self._stepped = 0
             self.steps_wanted -= 1
+            self._steps.popleft().set_result(n)
+
+    def end_steps(self) -> None:
+        """Answer the orders of steps that will not be done as such."""
+        self.steps_wanted = self._stepped = 0
+        while self._steps:
+            self._steps.popleft().set_result(None)
 
     def first_game(self) -> Game:
         """
@@ -261,13 +282,17 @@ class SimControl:
         self.paused = True
         return _answer(response, True, 'paused')
 
-    def _on_step(self, _: Any, response: Any) -> Any:
+    async def _on_step(self, _: Any, response: Any) -> Any:
         if self.over:
             return _answer(response, False, OVER)
         if not self.paused:
             return _answer(response, False, 'not paused: call /sim/pause first')
         self.steps_wanted += 1
-        return _answer(response, True, 'advancing by one scenario step')
+        done = Future()
+        self._steps.append(done)
+        n = await done
+        return _answer(response, n is not None, f'at n = {n}' if n is not None else
+                       'not done: the run goes on or is over')
 
     def _on_reset(self, _: Any, response: Any) -> Any:
         self.reset_wanted, self.started = True, False

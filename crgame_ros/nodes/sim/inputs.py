@@ -14,9 +14,11 @@ from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.request_layout import request_head
 from crgame_ros.messages.status_values import read_status, status_truth
+from crgame_ros.planner.registry import EXTERNAL
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints, SHARED_DEPTH
 from crgame_ros.ros.messages import from_time
+from crgame_ros.ros.one_planner import OnePlanner
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.setup import Setup
 from rclpy.node import Node
@@ -58,7 +60,12 @@ class SimInputs:
             endpoints.service('/<av>/planner_run', partial(self._on_planner_run, av.id), av.id)
             for av in setup.avs]
         self._plans = {
-            av.id: endpoints.polled('/<av>/plan', av.id, strict=True, depth=SHARED_DEPTH)
+            av.id: endpoints.polled('/<av>/plan', av.id, strict=True, depth=SHARED_DEPTH,
+                                    sent=True)
+            for av in setup.avs}
+        self._planners = {
+            av.id: OnePlanner(partial(endpoints.publishers, self._plans[av.id]),
+                              own=av.spec.planner != EXTERNAL)
             for av in setup.avs}
         # The requests that planners get instead of the true ones; a plan is checked against them.
         self._perceived = {av.id: endpoints.polled('/<av>/plan_request', av.id, raw=True)
@@ -97,6 +104,14 @@ class SimInputs:
         response.success = True
         response.message = f'{av_id}: planner {"goes" if request.data else "stops"}'
         return response
+
+    def other_planner(self, av_id: str, stamp_ns: int) -> str | None:
+        """
+        Return why the plan that is being read is none of the planner that an AV follows.
+
+        :param stamp_ns: of the request that it answers [ns]
+        """
+        return self._planners[av_id].refusal(self._plans[av_id].publisher, stamp_ns)
 
     def pop_plan(self, av_id: str) -> JointSeries | None:
         """

@@ -156,13 +156,14 @@ class LiveRun:
             if 'recorder_node' in self._control.companions else None
         self._outputs.publish_documents(
             self._epoch, self.simulation.scheduler.clock_offset_ns,
-            self._control.real_time_factor)
+            self._control.real_time_factor, self._control.simulation)
         self._publish_seats()
         result = self.simulation.begin()
         if self._epoch:
             self._settle()
         outcome = self._wait_for_companions(result, heard)
         if outcome is not None:
+            self._control.end_steps()
             self._reason = self._reason or outcome.reason(self._stop.requested)
             self._state.publish('ended', self._reason)
             return outcome
@@ -182,6 +183,7 @@ class LiveRun:
             self._reason = self._reason or outcome.reason(self._stop.requested)
             return outcome
         finally:
+            self._control.end_steps()
             gc.enable()
             gc.unfreeze()
             self._outputs.publish_rows()
@@ -273,11 +275,21 @@ class LiveRun:
         self._reason = f'drivability of {vehicle_id}'
 
     def _answers(self, av_id: str, stamp_ns: int) -> bool:
-        """Return whether a plan answers a request; any number of others is refused."""
+        """
+        Return whether a plan answers a request, and is of the AV's planner.
+
+        Any number of others is refused.
+        """
         reason = self.simulation.unasked_plan(av_id, stamp_ns)
         if reason is not None:
             self._refuse(av_id, reason)
-        return reason is None
+            return False
+        other = self._inputs.other_planner(av_id, stamp_ns)
+        if other is not None:
+            self.simulation.count_other_planner(av_id)
+            self._diagnostics.refusal(av_id, other)
+            complain(self._node, 'plan', f'/{av_id}/plan: {other}')
+        return other is None
 
     def _refuse(self, av_id: str, reason: str) -> None:
         """Report a refused answer of an AV's planner."""
@@ -388,7 +400,7 @@ class LiveRun:
             self._at_tick(result)
         if not result.tick or simulation.scheduler.steps_per_tick == 1:
             self._report(result.n)
-        self._control.count_step(simulation.scheduler.steps_per_tick)
+        self._control.count_step(simulation.scheduler.steps_per_tick, result.n)
         if outputs.rows.full:
             outputs.publish_rows()
         busy_s = (time.monotonic_ns() - start_ns) / NS_PER_S

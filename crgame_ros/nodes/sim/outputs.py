@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The messages of sim_node: built once for a game, refilled at every step."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import json
 import math
 import time
 
-from crgame_ros.game.documents import events_document, objects_document
+from crgame_ros.game.documents import events_document, objects_document, RUN_STATE_TOPIC
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.game.task_documents import log_document, LOG_TOPIC, state_document, STATE_TOPIC
@@ -108,7 +108,8 @@ class SimOutputs:
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
             '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
-            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', STATE_TOPIC)}
+            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', STATE_TOPIC,
+            RUN_STATE_TOPIC)}
         self._task_log = endpoints.publisher(LOG_TOPIC)
         self._diagnostics = endpoints.diagnostics
         # With perception, its node builds the plan request from the true one.
@@ -120,7 +121,7 @@ class SimOutputs:
         self._request_messages: dict[str, SeriesMessage] = {}
         self._vehicles = [VehicleOutputs(endpoints, vehicle) for vehicle in setup.vehicle_ids]
         self.frames_skipped = False
-        self._epoch = 0
+        self._simulation, self._epoch = '', 0
         self._lights = TrafficLights(setup.loaded.scenario)
         self._light_states: dict[int, str] | None = None
         self._object_lights: dict[str, int] = {}
@@ -143,10 +144,15 @@ class SimOutputs:
             MultiArrayDimension(label='cycles'),
             MultiArrayDimension(label=','.join(self.rows.columns), size=width, stride=width)]
 
-    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float) -> None:
-        """Publish what describes the run: scenario, game and objects."""
+    def publish_documents(self, epoch: int, clock_offset_ns: int, factor: float,
+                          simulation: str) -> None:
+        """
+        Publish what describes the run: scenario, game and objects.
+
+        :param simulation: name of this process.
+        """
         setup = self._setup
-        self._epoch = epoch
+        self._simulation, self._epoch = simulation, epoch
         self._vehicle_lights = None
         texts = {'/scenario/xml': setup.loaded.xml_text,
                  '/scenario/objects': objects_document(setup.descriptions),
@@ -154,9 +160,14 @@ class SimOutputs:
                  STATE_TOPIC: state_document(epoch, (), ()),
                  '/scenario/game': game_document(
                      setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
-                     real_time_factor=factor)}
+                     real_time_factor=factor, simulation=simulation)}
         for name, text in texts.items():
             self._latched[name].publish(String(data=text))
+
+    def publish_state(self, values: Mapping[str, object]) -> None:
+        """Publish whether the run waits, goes on, stands still or is over."""
+        self._latched[RUN_STATE_TOPIC].publish(String(data=json.dumps(
+            {'simulation': self._simulation, 'epoch': self._epoch, **values})))
 
     def publish_seats(self, seats: str, drivers: str) -> None:
         """Publish the present drivers of the seats, and all drivers so far."""

@@ -35,7 +35,7 @@ NEWCOMERS_NS = 3 * NS_PER_S
 
 class RunState:
     """
-    The state of a run: waiting, running, paused or ended.
+    The state of a run: waiting, running, paused or ended; on /sim/state and /diagnostics.
 
     :param outputs: of the run.
     :param simulation: the source of the world shown.
@@ -60,15 +60,17 @@ class RunState:
 
         :param reason: why the run has ended.
         """
-        now_ns, news = time.monotonic_ns(), (
-            state, reason, self._control.awaited, self._control.countdown_s)
-        if news != self._told or now_ns - self._told_ns > NS_PER_S:
-            self._told, self._told_ns = news, now_ns
-            self._diagnostics.run_state(state, {
-                'real_time_factor': self._control.real_time_factor, 'reason': reason,
-                'stays': self._control.stays and reason != SIGNAL,
-                'awaited': ','.join(self._control.awaited),
-                'countdown_s': self._control.countdown_s})
+        control, now_ns = self._control, time.monotonic_ns()
+        news = (state, reason, control.awaited, control.countdown_s)
+        if news == self._told and now_ns - self._told_ns <= NS_PER_S:
+            return
+        values = {'real_time_factor': control.real_time_factor, 'reason': reason,
+                  'stays': control.stays and reason != SIGNAL,
+                  'awaited': ','.join(control.awaited), 'countdown_s': control.countdown_s}
+        self._diagnostics.run_state(state, values)
+        if news != self._told:
+            self._outputs.publish_state({'state': state, **values})
+        self._told, self._told_ns = news, now_ns
 
     def stand(self) -> None:
         """Note that the run stands still and that the present subscribers have seen its world."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the timing of a trial: table I and the input latency against bounds."""
+"""Checks how a trial ran: table I, the input latency and its planners against bounds."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -18,6 +18,7 @@ class TimingBounds:
     :param resets: of drift resets.
     :param gaps: of cycles that were not recorded.
     :param input_delay_s: of the median delay from the hand to the answer at the page [s]
+    :param plans_of_others: of plans of other programs than the AVs' planners.
     """
 
     max_cumulative_error_s: float = 0.1
@@ -26,6 +27,7 @@ class TimingBounds:
     resets: float = 0.0
     gaps: float = 0.0
     input_delay_s: float = 0.1
+    plans_of_others: float = 0.0
 
     def as_dict(self) -> dict[str, float]:
         """Return their JSON form."""
@@ -40,7 +42,8 @@ _WORDS = {
     'real_time_ratio_final': ('real-time ratio', '', 1.0, 3),
     'resets': ('drift resets', '', 1.0, 0),
     'gaps': ('cycles not recorded', '', 1.0, 0),
-    'input_delay_s': ('input delay', 'ms', 1e3, 0)}
+    'input_delay_s': ('input delay', 'ms', 1e3, 0),
+    'plans_of_others': ("plans of other programs than the AVs' planners", '', 1.0, 0)}
 
 
 def timing_faults(row: Mapping[str, Any], bounds: TimingBounds = BOUNDS) -> list[str]:

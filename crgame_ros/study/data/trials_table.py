@@ -111,6 +111,8 @@ _TIMING = (
         ('screen_width_m', NUMBER, 'm', 'width of the screen, as was told'),
         ('eye_distance_m', NUMBER, 'm', 'of the eyes from the screen, as was told'),
         ('view_rate_hz', NUMBER, 'Hz', 'pictures a second, median'))),
+    Column('plans_of_others', INTEGER, '1', 'answers of other programs to the requests for plans',
+           variant='all AVs', empty='not recorded'),
     Column('view_changes', INTEGER, '1', 'how often the view was changed',
            empty='not recorded'),
     flag_column('timing_flag', 'whether its timing is beyond a bound'),
@@ -206,11 +208,15 @@ class TrialsTable:
         seat = attempt.trial.condition.settings.seat
         vehicle = seat or (humans[0] if humans else None)
         told = run.row('runs')
-        measures = run.row('vehicles', id=vehicle)
+        vehicles = run.table('vehicles').to_pylist()
+        measures: dict[str, Any] = next((row for row in vehicles if row['id'] == vehicle), {})
+        of_others = [row['plans_of_others'] for row in vehicles
+                     if row['plans_of_others'] is not None]
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
                 'av_planner': '+'.join(dict.fromkeys(summary['planners'].values())),
                 **task_values(run.table('detection_scores').to_pylist(),
                               run.table('take_over_requests').to_pylist()),
+                'plans_of_others': sum(of_others) if of_others else None,
                 **_view(summary.get('views', {}).get(vehicle, ())),
                 'input_delay_s': _seconds(summary['input_delay_ms'].get(vehicle)),
                 'link_delay_s': _seconds(summary['round_trip_ms'].get(vehicle)),

@@ -210,6 +210,8 @@ export {};
  * @property {number|null} age_ms
  * @property {number} accepted
  * @property {number} refused
+ * @property {number} of_others plans of other programs than its planner
+ * @property {string} failure why it braked last
  * @property {number|null} plan_time_ms
  * @property {number|null} fallbacks
  * @property {string} planner

@@ -145,6 +145,8 @@ function makeRow(av, connection) {
       setText(refusal, [
         (planner.plan_time_ms ?? 0) > 0 ? `plans in ${fixed(planner.plan_time_ms, 1)} ms` : '',
         why ? `last refused: ${why}` : '',
+        planner.failure ? `last braked: ${oneLine(planner.failure)}` : '',
+        planner.of_others ? `another program answers as well (${planner.of_others} plans)` : '',
       ].filter(Boolean).join(', '));
       setText(tracking, trackingText(planner.tracking));
       const { perception, world } = window.crgame;

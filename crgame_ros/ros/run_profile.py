@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A Fast DDS profile with which a run's nodes take the run's own topics from each other alone.
+
+The nodes' readers of these topics are in a DDS partition whose name only they know. Their writers
+are in it and in the default one as well, so that every program of the domain can listen. Fast DDS
+compares partitions when it matches a writer with a reader, so a message costs nothing more.
+"""
+
+from collections.abc import Collection, Iterator
+import copy
+import os
+from pathlib import Path
+import secrets
+from xml.etree import ElementTree
+
+from crgame_ros.messages.contract import load_contract, Topic
+from crgame_ros.ros.environment import loopback_profile, network_is_open, PROFILE_VARIABLES
+
+FAST_DDS = 'rmw_fastrtps_cpp'
+EXTERNAL = 'external'
+# What every program may publish, unless the run obeys its own nodes alone.
+ORDER_TOPICS = ('/seats/order', '/trigger')
+# A game that is chosen later may have vehicles with these numbers.
+NUMBERS = range(16)
+_NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
+# Profiles of these names apply to all services: requests are read by the first, written by the
+# second.
+_SERVICE, _CLIENT = 'service', 'client'
+
+
+def can_believe() -> bool:
+    """Return whether a profile can be given: with Fast DDS, and without a profile of the user."""
+    given = {os.environ[name] for name in PROFILE_VARIABLES if os.environ.get(name)}
+    return os.environ.get('RMW_IMPLEMENTATION', FAST_DDS) == FAST_DDS \
+        and given <= {str(loopback_profile())}
+
+
+def own_topics(humans: Collection[str], avs: Collection[str]) -> Iterator[str]:
+    """Yield the names of the topics that only a run's own nodes publish, and read."""
+    humans = sorted({*humans, *(f'hv{number}' for number in NUMBERS)})
+    avs = sorted({*avs, *(f'av{number}' for number in NUMBERS)})
+    for topic in load_contract().topics.values():
+        if _is_own(topic):
+            yield from topic.names(humans, avs)
+
+
+def _is_own(topic: Topic) -> bool:
+    return EXTERNAL not in topic.producers and set(topic.consumers) != {EXTERNAL}
+
+
+def write_run_profile(path: Path, namespace: str, topics: Collection[str],
+                      own_orders: bool = False) -> None:
+    """
+    Write the profile of one run, which begins with the default one.
+
+    :param path: of the file, which only its owner may read.
+    :param namespace: of the run's nodes.
+    :param topics: that the nodes take from each other alone.
+    :param own_orders: whether this holds for orders as well: services, and ORDER_TOPICS.
+    """
+    ElementTree.register_namespace('', _NAMESPACE)
+    tree = ElementTree.parse(loopback_profile())
+    profiles = tree.getroot()[0]
+    writer = next(item for item in profiles if item.tag.endswith('}data_writer'))
+    if network_is_open():
+        for item in list(profiles):
+            if item is not writer:
+                profiles.remove(item)
+    key = secrets.token_urlsafe(16)
+    inside, both = key, f';{key}'
+    named = (*topics, *(ORDER_TOPICS if own_orders else ()))
+    names = [(f'{namespace.rstrip("/")}{topic}', inside) for topic in named]
+    if own_orders:
+        names += [(_SERVICE, inside), (_CLIENT, both)]
+    for name, reads in names:
+        reader = ElementTree.Element(f'{{{_NAMESPACE}}}data_reader')
+        for element, partitions in ((reader, reads), (copy.deepcopy(writer), both)):
+            element.attrib.clear()
+            element.set('profile_name', name)
+            element.append(_partitions(partitions))
+            profiles.append(element)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(descriptor, 'wb') as file:
+        tree.write(file, 'utf-8', xml_declaration=True)
+
+
+def _partitions(value: str) -> ElementTree.Element:
+    """Return the property of an endpoint that is in these partitions, separated by `;`."""
+    policy = ElementTree.Element(f'{{{_NAMESPACE}}}propertiesPolicy')
+    item = policy
+    for name in ('properties', 'property'):
+        item = ElementTree.SubElement(item, f'{{{_NAMESPACE}}}{name}')
+    for name, text in (('name', 'partitions'), ('value', value)):
+        ElementTree.SubElement(item, f'{{{_NAMESPACE}}}{name}').text = text
+    return policy
