@@ -145,7 +145,7 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
 
 
 def _add_offline(parser: argparse.ArgumentParser) -> None:
-    from crgame_ros.launcher.arguments import PROBLEM_HELP
+    from crgame_ros.launcher.arguments import OPTION_HELP, PROBLEM_HELP
     parser.description = ('Run a game on a virtual clock, planners in lockstep. The same inputs '
                           'give the same state hash on every run.')
     add = parser.add_argument
@@ -153,6 +153,7 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
         'package (default: cut_in)')
     add('--scenario', type=Path, help='CommonRoad file instead of a game')
     add('--planner', help='planner of all AVs')
+    add('--option', action='append', default=[], metavar='KEY=VALUE', help=OPTION_HELP)
     add('--problem', type=int, action='append', default=[], metavar='ID', help=PROBLEM_HELP)
     add('--driver', help='driver of the first human: keys:FILE, joy:FILE, replay:BAG, idle')
     add('--duration', type=float, metavar='S', help='simulated seconds')
@@ -178,7 +179,7 @@ def _trigger(text: str) -> tuple[str, float]:
 
 def _offline(values: argparse.Namespace) -> int:
     from crgame_ros.analysis.outcome_line import tell_outcome
-    from crgame_ros.launcher.arguments import RunRequest
+    from crgame_ros.launcher.arguments import read_options, RunRequest
     from crgame_ros.launcher.run_plan import effective_setup, naming
     from crgame_ros.python_interface.offline_runs import drive
     from crgame_ros.recording.export import prepare_folder
@@ -186,7 +187,8 @@ def _offline(values: argparse.Namespace) -> int:
         raise InputError(f'is {values.latency}', '--latency', 'give 0 or more steps')
     request = RunRequest(game=values.game, scenario=values.scenario, driver=values.driver,
                          duration_s=values.duration, problems=tuple(values.problem),
-                         planners=(values.planner,) if values.planner else ())
+                         planners=(values.planner,) if values.planner else (),
+                         options=read_options(values.option))
     setup = effective_setup(request)
     for notice in setup.notices:
         print(f'note: {notice}', file=sys.stderr)

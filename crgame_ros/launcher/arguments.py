@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 import re
+from typing import Any
 
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
@@ -22,6 +23,8 @@ participants; --scenario alone works on any CommonRoad file: you are placed near
 planning problem becomes an AV, recorded obstacles are replayed. In an exported run its human is
 replayed as well, and you are placed only with --driver."""
 _NAMED_DRIVER = re.compile(r'(hv[0-9]{1,3})=(.+)')
+OPTION_HELP = ('option of the planners, as under `options` of an AV in a game file; may be given '
+               'again')
 PROBLEM_HELP = ('planning problem that becomes an AV, if the game names no AVs; may be repeated '
                 '(default: all; of several with the same start the first)')
 EPILOG = """\
@@ -51,6 +54,7 @@ class RunRequest:
     :param scenario: CommonRoad file instead of the game's.
     :param driver: driver source of the first human.
     :param planners: planners of the AVs in their order; a single one serves all.
+    :param options: of the planners of all AVs, by name; they go before those of the game.
     :param problems: planning problems that become AVs, where the game names none. If empty, all of
         them do; of several that start on one spot, only the first.
     :param duration_s: simulated time [s]
@@ -100,6 +104,7 @@ class RunRequest:
     countdown_s: float = 3.0
     start_paused: bool = False
     framed_by: str = ''
+    options: tuple[tuple[str, Any], ...] = ()
     open_topics: bool = False
     own_orders: bool = False
 
@@ -131,6 +136,8 @@ def build_parser(program: str) -> argparse.ArgumentParser:
         help="driver of the first human's vehicle, or that of hvN; may be given again")
     add('--planner', action='append', default=[], metavar='NAME', dest='planners',
         help='planner of the AVs; give it again for the next AV')
+    add('--option', action='append', default=[], metavar='KEY=VALUE', dest='options',
+        help=OPTION_HELP)
     add('--problem', action='append', type=int, default=[], metavar='ID', dest='problems',
         help=PROBLEM_HELP)
     add('--duration', type=_positive, metavar='S', dest='duration_s',
@@ -191,6 +198,7 @@ def parse_arguments(arguments: Sequence[str], program: str = 'run.sh') -> RunReq
     """
     values = vars(build_parser(program).parse_args(list(arguments)))
     values['planners'] = tuple(values['planners'])
+    values['options'] = read_options(values['options'])
     values['problems'] = tuple(values['problems'])
     values['driver'], values['drivers'] = read_drivers(values['drivers'])
     request = RunRequest(**values)
@@ -227,6 +235,24 @@ def read_drivers(values: Sequence[str]) -> tuple[str | None, tuple[tuple[str, st
         else:
             named[match[1]] = match[2]
     return first, tuple(named.items())
+
+
+def read_options(values: Sequence[str]) -> tuple[tuple[str, Any], ...]:
+    """
+    Read the values of `--option`.
+
+    :param values: KEY=VALUE, where a value is written as in a game file.
+    :raises InputError: if one is not of this form.
+    """
+    # --help works without any package.
+    from crgame_ros.yaml_text import parse_yaml
+    found: dict[str, Any] = {}
+    for text in values:
+        key, equals, value = text.partition('=')
+        if not key or not equals:
+            raise InputError(f'is "{text[:60]}"', '--option', 'give KEY=VALUE')
+        found[key] = parse_yaml(value, f'--option {key}', 'give a value as in a game file')
+    return tuple(found.items())
 
 
 def _check_opening(request: RunRequest) -> None:

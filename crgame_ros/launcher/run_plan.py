@@ -10,6 +10,7 @@ from errno import ENOTDIR
 import os
 from pathlib import Path
 import shutil
+from typing import Any
 
 from crgame_ros.cockpit.access import check_address
 from crgame_ros.cockpit.exposure import check_certificate
@@ -162,7 +163,8 @@ def effective_setup(request: RunRequest, game: Game | None = None) -> Setup:
         else:
             recorded = read_recorded_game(bag, other_planners=bool(request.planners))
             setup = build_setup(_with_limits(recorded.game, request), recorded.loaded)
-        setup = with_replayed_events(with_planners(setup, request.planners))
+        setup = with_replayed_events(with_planners(
+            setup, request.planners, dict(request.options)))
     notices = [*setup.notices, *replay_notices(setup)]
     if bag is not None:
         notices.append(f'{bag}: this is the game of the recording')
@@ -270,8 +272,14 @@ def _check_swaps(setup: Setup) -> None:
             create_planner(event.action.planner, event.action.options)
 
 
-def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
-    """Return the setup with its resolved AVs in the game, with the requested planners."""
+def with_planners(setup: Setup, planners: tuple[str, ...],
+                  options: Mapping[str, Any] | None = None) -> Setup:
+    """
+    Return the setup with its resolved AVs in the game, with the requested planners.
+
+    :param planners: one for each AV, one for all, or none: those of the game.
+    :param options: of all planners, before those of the game.
+    """
     if len(planners) > 1 and len(planners) != len(setup.avs):
         raise InputError(f'{len(planners)} planners for {len(setup.avs)} AVs', '--planner',
                          'give one for all, or one for each')
@@ -282,6 +290,8 @@ def with_planners(setup: Setup, planners: tuple[str, ...]) -> Setup:
             name = planners[index if len(planners) > 1 else 0]
             spec = replace(spec, planner=name,
                            options=spec.options if name == spec.planner else {})
+        if options:
+            spec = replace(spec, options={**spec.options, **options})
         avs.append(replace(av, spec=spec))
     game = replace(setup.game, avs=tuple(av.spec for av in avs))
     return replace(setup, game=game, avs=tuple(avs))

@@ -158,7 +158,8 @@ class PlannerNode(Node):
         gc.disable()
         if manager.failure is None:
             self.get_logger().info(f'{self._vehicle_id}: planner {name} is ready')
-        self._failures = FailureLines(self._vehicle_id, self.get_logger().error)
+        self._failures = FailureLines(self._vehicle_id, self.get_logger().error,
+                                      game.scheduler.time_step_s)
         self._failures.note(manager)
         self._apply_events()
 
@@ -182,8 +183,7 @@ class PlannerNode(Node):
             self._prepare(self._scenario)
         self._diagnostics.now_ns = request.stamp_ns
         plan = self._manager.plan(request)
-        if plan.fallback:
-            self._failures.note(self._manager)
+        self._failures.note(self._manager)
         series = plan_to_joints(plan, self._vehicle_id, self._game.scheduler.time_step_ns)
         self._message = SeriesMessage.for_series(series, self._message)
         self._plans.publish(self._message.fill(series))

@@ -148,7 +148,7 @@ class PlannerSeat:
             setup.game.drivability.road)
         self.manager = PlannerManager(
             context, av.spec.planner, av.spec.options, setup.game.events, clock_s)
-        self._failures = FailureLines(av.id, say)
+        self._failures = FailureLines(av.id, say, setup.scheduler.time_step_s)
         self._failures.note(self.manager)
         self.perception: Perception | None = None
         if av.spec.perception is not None:
@@ -171,8 +171,7 @@ class PlannerSeat:
             request = self.perception.perceive(request)
             self._simulation.request_perceived(self.id, request)
         plan = self.manager.plan(self._reader.read(request))
-        if plan.fallback:
-            self._failures.note(self.manager)
+        self._failures.note(self.manager)
         series = plan_to_joints(plan, self.id, self._simulation.scheduler.time_step_ns)
         n = self._simulation.n
         self._due.append((n + (self._latency if n else 0), series))

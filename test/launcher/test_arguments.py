@@ -6,6 +6,7 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import cockpit_host, parse_arguments, RunRequest
+from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.paths import default_game
 import pytest
 
@@ -104,3 +105,22 @@ def test_games_of_the_package_have_names_and_scenarios_need_no_option(tmp_path: 
     assert parse_arguments(['games/mine.yaml']).game == Path('games/mine.yaml')
     with pytest.raises(InputError, match='neither a file nor one of the games .*cut_in, '):
         parse_arguments(['nothing_like_it'])
+
+
+def test_options_of_planners_are_written_as_in_a_game() -> None:
+    """Numbers, lists and texts; what is no option is refused with its text."""
+    request = parse_arguments(['--option', 'v0=12.5', '--option', 'levels=[1, 2]',
+                               '--option', 'name=a=b'])
+    assert dict(request.options) == {'v0': 12.5, 'levels': [1, 2], 'name': 'a=b'}
+    with pytest.raises(InputError, match='--option: is "v0"; give KEY=VALUE'):
+        parse_arguments(['--option', 'v0'])
+    with pytest.raises(InputError, match='--option v0'):
+        parse_arguments(['--option', 'v0=[1'])
+
+
+@pytest.mark.slow
+def test_options_reach_the_planners_before_those_of_the_game(project_root: Path) -> None:
+    """An option that the planner does not have is refused as one of a game file is."""
+    game = project_root / 'scenarios' / 'cut_in.yaml'
+    setup = effective_setup(parse_arguments([str(game), '--option', 'v0=12.5']))
+    assert [av.spec.options['v0'] for av in setup.avs] == [12.5]

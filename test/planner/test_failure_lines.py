@@ -68,3 +68,27 @@ def test_kinds_without_end_share_a_line() -> None:
     minute = EachMinute()
     told = [minute.line(f'kind {i}', str(i)) for i in range(1000)]
     assert len([line for line in told if line is not None]) == each_minute.MOST_KINDS + 1
+
+
+def test_a_slow_planner_is_told_of_with_its_time() -> None:
+    """Once its median answer takes longer than a scenario step; one long answer is none."""
+    manager = PlannerManager(support.context(support.plain(), support.problem(10.0)), 'idm', {})
+    said: list[str] = []
+    lines = FailureLines('av0', said.append, 0.1)
+    for took_s in (1.5, 0.02, 0.02, 0.02, 0.02, 1.5, 1.5):
+        manager.statistics.durations_s.append(took_s)
+        lines.note(manager)
+    assert said == []
+    for _ in range(3):
+        manager.statistics.durations_s.append(1.5)
+        lines.note(manager)
+    assert said == ['av0: planner idm is slow: 1.50 s for a plan, a scenario step is 0.1 s']
+
+
+def test_requests_without_an_answer_are_told_of() -> None:
+    """Of an external planner nothing else is known."""
+    said: list[str] = []
+    lines = FailureLines('av0', said.append)
+    for timed_out in (0, 0, 2, 2, 3):
+        lines.wait(timed_out, 1.0)
+    assert said == ['av0: its planner is slow or gone: no answer in 1 s, to 2 requests so far']

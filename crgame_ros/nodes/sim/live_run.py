@@ -24,6 +24,7 @@ from crgame_ros.ros.heard_topics import HeardTopics
 from crgame_ros.ros.node_main import StopFlag
 from crgame_ros.ros.seats import SeatSpells
 from crgame_ros.ros.spinning import serve
+from crgame_ros.simulation.autonomous_vehicle import BUSY_TIMEOUT_S
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.late_step import Phase
@@ -422,3 +423,5 @@ class LiveRun:
         if not self._diagnostics.publish_next() and n >= self._report_n:
             self._report_n = n + self._second
             self._diagnostics.begin()
+            for av in self.simulation.avs:
+                self._failures[av.setup.id].wait(av.counters.timed_out, BUSY_TIMEOUT_S)
