@@ -24,9 +24,9 @@ class ExternalPlanner(Node):
         super().__init__('external_planner')
         self.av, self.lanes, self.desired = self.declare_parameter('vehicle', 'av0').value, {}, 8.0
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.create_subscription(String, '/scenario/xml', self.on_scenario, latched)
-        self.create_subscription(JointTrajectory, f'/{self.av}/plan_request', self.on_request, 1)
-        self.plans = self.create_publisher(JointTrajectory, f'/{self.av}/plan', 1)
+        self.create_subscription(String, 'scenario/xml', self.on_scenario, latched)
+        self.create_subscription(JointTrajectory, f'{self.av}/plan_request', self.on_request, 1)
+        self.plans = self.create_publisher(JointTrajectory, f'{self.av}/plan', 1)
 
     def on_scenario(self, message: String) -> None:
         """Take the centre lines: the direction at points at most 2 m apart."""

@@ -26,7 +26,7 @@ THIRD_PARTY = {
     'commonroad_dc': ('commonroad-drivability-checker', None),
     'evdev': ('evdev-binary', 'python3-evdev'),
     'lxml': ('lxml', 'python3-lxml'),
-    'lz4': ('lz4', 'python3-lz4'),
+    'lz4': ('lz4', None),
     'markdown_it': ('markdown-it-py', None),
     'matplotlib': ('matplotlib', 'python3-matplotlib'),
     'mcap': ('mcap', None),

@@ -118,7 +118,7 @@ class Access:
         """
         if self.invitations is not None:
             return self.invitations.rights(cookie)
-        return ALL_RIGHTS if self.knows(cookie) else None
+        return ALL_RIGHTS if self.token is None or _same(cookie, cookie_for(self.token)) else None
 
     def exchange(self, token: str, cookie: str | None) -> str:
         """
@@ -129,16 +129,35 @@ class Access:
         """
         if self.invitations is not None:
             return self.invitations.exchange(token, cookie)
-        if self.token is None or not self.knows(token):
+        if self.token is None or not _same(token, self.token):
             raise InputError(WITH_TOKEN)
-        return self.token
+        return cookie_for(self.token)
 
-    def knows(self, token: str | None) -> bool:
-        """Return whether a token is the right one, in constant time."""
-        if self.token is None:
-            return True
-        given = (token or '').encode('utf-8', 'surrogatepass')
-        return hmac.compare_digest(given, self.token.encode())
+
+def cookie_name(port: int, tls: bool, page: str = '') -> str:
+    """
+    Return the name of a server's cookie.
+
+    Browsers send a cookie of 127.0.0.1 to every port of it, so each server has a name of its own.
+    Over TLS no other site, and no page without TLS, can set it (RFC 6265bis, `__Host-`).
+
+    :param page: which one, where a server has several.
+    """
+    return f'{"__Host-" if tls else ""}crgame-{f"{page}-" if page else ""}{port}'
+
+
+def cookie_for(token: str) -> str:
+    """
+    Return the value that a browser has instead of a token.
+
+    Other servers of this machine see it, and cannot learn the token from it.
+    """
+    return hmac.new(token.encode(), b'cookie', 'sha256').hexdigest()
+
+
+def _same(given: str | None, right: str) -> bool:
+    """Compare secrets in constant time."""
+    return hmac.compare_digest((given or '').encode('utf-8', 'surrogatepass'), right.encode())
 
 
 def is_own_origin(origin: str | None, host: str) -> bool:

@@ -37,6 +37,7 @@ class Doorkeeper:
         """Record that a request has arrived."""
         if transport in self._open:
             self._open[transport].requests += 1
+            self._open[transport].spoke = True
 
     def ends(self, transport: asyncio.BaseTransport | None) -> None:
         """Record that a request has been answered."""
@@ -47,10 +48,21 @@ class Doorkeeper:
             watched.patience_s = NEXT_REQUEST_S
 
     def lets_in(self, transport: asyncio.BaseTransport, watched: '_Watched') -> bool:
-        """Count a connection and return True, or return False if there are too many."""
-        if len(self._open) >= MAX_CONNECTIONS \
-                or self._of_address[watched.address] >= MAX_OF_ADDRESS:
-            return False
+        """
+        Count a connection and return True, or return False if there are too many.
+
+        A connection without a request makes room, first one that has never had any.
+        """
+        address = None if len(self._open) >= MAX_CONNECTIONS else watched.address
+        if address is None or self._of_address[address] >= MAX_OF_ADDRESS:
+            idle = [(each.spoke, each.idle_since_s, number) for number, each in enumerate(
+                self._open.values()) if not each.requests and address in (None, each.address)]
+            if not idle:
+                return False
+            oldest = list(self._open)[min(idle)[2]]
+            self.forget(oldest, self._open[oldest])
+            if isinstance(oldest, asyncio.Transport):
+                oldest.abort()
         self._of_address[watched.address] += 1
         self._open[transport] = watched
         return True
@@ -73,7 +85,7 @@ class _Watched(asyncio.Protocol):
         self._refused = False
         self._timer: asyncio.TimerHandle | None = None
         self.address = ''
-        self.requests = 0
+        self.requests, self.spoke = 0, False
         self.idle_since_s = 0.0
         self.patience_s = FIRST_REQUEST_S
 

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 
 from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
-from crgame_ros.cockpit.access import Access, is_own_origin
+from crgame_ros.cockpit.access import Access, cookie_name, is_own_origin
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.doorkeeper import Doorkeeper
 from crgame_ros.cockpit.hub import Hub
@@ -137,7 +137,7 @@ async def _answer(access: Access, request: web.Request,
     refusal = _refusal(access, request, sockname[1])
     if refusal:
         return web.Response(status=403, text=f'{refusal}\n')
-    name = f'crgame-{sockname[1]}'
+    name = cookie_name(sockname[1], access.tls is not None)
     cookie = request.cookies.get(name)
     if access.asks and request.path == '/' and 'token' in request.query:
         try:

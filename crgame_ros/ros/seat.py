@@ -106,7 +106,8 @@ class Seat:
         if (source or GAME) != self.source:
             self.passed_over += 1
             return False
-        if stamp_ns < self._clock_offset_ns:
+        # Without a stamp, as from `ros2 topic pub`, a command is meant for now.
+        if 0 < stamp_ns < self._clock_offset_ns:
             self.outdated += 1
             return False
         return True

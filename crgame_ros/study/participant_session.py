@@ -3,7 +3,6 @@
 """A participant's session: finished items, the next item, and resuming after any end."""
 
 from collections.abc import Callable, Mapping
-from enum import StrEnum
 from pathlib import Path
 import time
 from types import TracebackType
@@ -14,27 +13,9 @@ from crgame_ros.study.file import Page, Questions, StudyFile
 from crgame_ros.study.pages import questionnaire_name
 from crgame_ros.study.question import check_answers, Question
 from crgame_ros.study.questionnaire import load_questionnaire
-from crgame_ros.study.session_journal import SessionJournal
+from crgame_ros.study.session_journal import SessionEvent, SessionJournal
 from crgame_ros.study.session_script import Fields, PracticeDrives, session_of, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
-
-
-class SessionEvent(StrEnum):
-    """The kinds of journal entries."""
-
-    BEGUN = 'begun'
-    OPENED = 'opened'
-    STARTED = 'started'
-    FINISHED = 'finished'
-    ABORTED = 'aborted'
-    SKIPPED = 'skipped'
-    REPEATED = 'repeated'
-    PRACTISED = 'practised'
-    NOTE = 'note'
-    MARKER = 'marker'
-    LANGUAGE = 'language'
-    HELD = 'held'
-    ENDED = 'ended'
 
 
 class ParticipantSession:

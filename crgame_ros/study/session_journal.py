@@ -4,8 +4,10 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from enum import StrEnum
 import fcntl
 import json
+import math
 import os
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +17,53 @@ from crgame_ros.errors import InputError
 from crgame_ros.whole_file import sync_folder
 
 JOURNAL = 'journal.jsonl'
+
+
+class SessionEvent(StrEnum):
+    """The kinds of journal entries."""
+
+    BEGUN = 'begun'
+    OPENED = 'opened'
+    STARTED = 'started'
+    FINISHED = 'finished'
+    ABORTED = 'aborted'
+    SKIPPED = 'skipped'
+    REPEATED = 'repeated'
+    PRACTISED = 'practised'
+    NOTE = 'note'
+    MARKER = 'marker'
+    LANGUAGE = 'language'
+    HELD = 'held'
+    ENDED = 'ended'
+
+
+# Entries about an item of the session, which they name.
+_OF_AN_ITEM = frozenset((
+    SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED, SessionEvent.SKIPPED,
+    SessionEvent.REPEATED, SessionEvent.PRACTISED))
+# Types of what an entry may have.
+_TYPES = {'item': str, 'attempt': int, 'answers': dict, 'software': dict}
+
+
+def read_entry(line: str | bytes) -> dict[str, Any]:
+    """
+    Read a line of a journal.
+
+    :raises ValueError: if it is no entry with its time, and its item if it needs one.
+    """
+    try:
+        entry = json.loads(line)
+        if not isinstance(entry['entry'], str) or isinstance(entry['at'], bool) \
+                or not math.isfinite(entry['at']):
+            raise ValueError('kind or time')
+    except (LookupError, TypeError, RecursionError, OverflowError) as error:
+        raise ValueError(f'is no entry ({error})') from error
+    if entry['entry'] in _OF_AN_ITEM and 'item' not in entry:
+        raise ValueError('has no item')
+    for name, kind in _TYPES.items():
+        if name in entry and (not isinstance(entry[name], kind) or entry[name] is True):
+            raise ValueError(f'{name} is no {kind.__name__}')
+    return dict(entry)
 
 
 class SessionJournal:
@@ -81,22 +130,27 @@ class SessionJournal:
             os.fsync(self._file.fileno())
         for line in whole.splitlines():
             with suppress(ValueError):
-                entry = json.loads(line)
-                if isinstance(entry, dict):
-                    yield entry
+                yield read_entry(line)
 
 
 def read_journal(folder: Path) -> list[dict[str, Any]]:
-    """Read a participant's entries, also while a process adds some."""
+    """
+    Read a participant's entries, also while a process adds some.
+
+    :raises InputError: if the file cannot be read.
+    """
     try:
         lines = (folder / JOURNAL).read_bytes().splitlines(keepends=True)
     except FileNotFoundError:
         return []
+    except OSError as error:
+        raise InputError(f'cannot be read ({error.strerror})', str(folder / JOURNAL),
+                         'put back the file, or leave out its participant') from error
     entries = []
     for line in lines:
         with suppress(ValueError):
-            if line.endswith(b'\n') and isinstance(entry := json.loads(line), dict):
-                entries.append(entry)
+            if line.endswith(b'\n'):
+                entries.append(read_entry(line))
     return entries
 
 

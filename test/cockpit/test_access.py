@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Access control: addresses, names, origins, tokens."""
 
-from crgame_ros.cockpit.access import Access, is_loopback, is_own_origin
+from crgame_ros.cockpit.access import Access, cookie_name, is_loopback, is_own_origin
+from crgame_ros.cockpit.rights import ALL_RIGHTS
 from crgame_ros.errors import InputError
 import pytest
 
@@ -43,10 +44,23 @@ def test_the_address_carries_the_token() -> None:
 
 
 @pytest.mark.parametrize('token, known', [
-    (TOKEN, True), (TOKEN[:-1], False), (TOKEN + 'x', False), ('', False), (None, False),
-    ('\ud800é', False)], ids=['right', 'short', 'long', 'empty', 'none', 'no text'])
-def test_only_the_right_token_is_known(token: str | None, known: bool) -> None:
-    assert OPEN.knows(token) is known
+    (TOKEN, True), (TOKEN[:-1], False), (TOKEN + 'x', False), ('', False),
+    ('\ud800é', False)], ids=['right', 'short', 'long', 'empty', 'no text'])
+def test_only_the_right_token_is_known(token: str, known: bool) -> None:
+    try:
+        cookie = OPEN.exchange(token, None)
+    except InputError:
+        assert not known
+    else:
+        assert known
+        # The cookie goes to every server of this machine: it is not the token.
+        assert cookie != TOKEN and OPEN.rights(cookie) == ALL_RIGHTS
+    assert OPEN.rights(token) is None
+
+
+def test_a_cookie_is_named_after_its_server() -> None:
+    assert cookie_name(8080, tls=False) == 'crgame-8080'
+    assert cookie_name(8443, tls=True, page='desk') == '__Host-crgame-desk-8443'
 
 
 @pytest.mark.parametrize('host, allowed', [

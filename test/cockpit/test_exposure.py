@@ -78,8 +78,9 @@ async def test_a_link_lets_one_browser_in_over_tls(tmp_path: Path) -> None:
                             allow_redirects=False) as answer:
             assert (answer.status, answer.headers['Location']) == (303, '/')
             cookie = answer.headers['Set-Cookie']
-            for word in ('HttpOnly', 'Secure', 'SameSite=Strict'):
+            for word in ('HttpOnly', 'Secure', 'SameSite=Strict', 'Path=/'):
                 assert word in cookie
+            assert cookie.startswith('__Host-crgame-') and 'Domain' not in cookie
         async with anna.get(f'{access.url}', ssl=anna.trusted) as answer:
             assert answer.status == 200
         # The driver's own link admits the driver again; others get the reason of the refusal.
@@ -228,6 +229,23 @@ async def test_connections_that_ask_nothing_are_ended_and_bounded(
         await joined.send_json({'type': 'ping', 't': 1})
         await next_text(joined, 'pong')
         assert (await get(running.port, '/'))[0] == 200
+        await joined.close()
+
+
+@in_loop
+async def test_those_who_say_nothing_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many sockets of an address idle, its next browser is let in at once."""
+    monkeypatch.setattr(doorkeeper, 'MAX_OF_ADDRESS', 10)
+    async with cockpit() as running:
+        joined = await running.join()
+        await next_text(joined, 'hello')
+        idle = [await asyncio.open_connection(HOST, running.port) for _ in range(30)]
+        assert (await get(running.port, '/'))[0] == 200
+        # The page was silent longer, but it is in the middle of a request.
+        await joined.send_json({'type': 'ping', 't': 1})
+        await next_text(joined, 'pong')
+        for _, writer in idle:
+            writer.close()
         await joined.close()
 
 

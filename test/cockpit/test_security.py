@@ -26,6 +26,7 @@ from cockpit_support import (
     raw_request,
     wait_until,
 )
+from crgame_ros.cockpit.access import cookie_for
 from crgame_ros.cockpit.session import MAX_MALFORMED
 import pytest
 
@@ -73,7 +74,7 @@ async def test_without_the_token_nothing_is_served_and_the_token_is_not_told() -
     async with cockpit(token=TOKEN) as running:
         cookie = f'Cookie: crgame-{running.port}='
         for headers in ((), (cookie,), (cookie + TOKEN[:-1],), (cookie + TOKEN + 'x',),
-                        ('Cookie: crgame=' + TOKEN,)):
+                        (cookie + TOKEN,), ('Cookie: crgame=' + cookie_for(TOKEN),)):
             for target in ('/', '/?token=', '/?token=wrong', '/static/js/main.js', '/plotly.js',
                            '/api/scenarios', f'/api/scenarios?token={TOKEN}', '/ws', '/none'):
                 status, answer = await get(running.port, target, *headers)
@@ -99,6 +100,7 @@ async def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
         async with running.http.get(url, allow_redirects=False) as answer:
             cookie = answer.headers['Set-Cookie']
             assert 'HttpOnly' in cookie and 'SameSite=Strict' in cookie
+            assert cookie.startswith(f'crgame-{running.port}=') and TOKEN not in cookie
             assert answer.headers['Cache-Control'] == 'no-store'
         async with running.http.get(f'{running.address}/plotly.js') as answer:
             assert answer.status == 200

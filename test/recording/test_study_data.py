@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data of a study: its tables hold all actions and answers, however the program ends."""
 
+from collections.abc import Callable
 import csv
 import hashlib
 import json
@@ -309,6 +310,41 @@ def test_what_a_killed_recorder_has_left_is_finished(copied: Path) -> None:
     assert row['problem'] is None and 0.5 < row['duration_s'] < DURATION_S
     assert (run / FINISHED_MARK).exists() and list(run.glob('*.xml'))
     assert row['scenario'].endswith('.xml') and (copied / row['scenario']).is_file()
+
+
+@pytest.mark.parametrize('spoil', [
+    lambda path: path.write_bytes(b''), lambda path: path.unlink(),
+    lambda path: path.write_bytes(path.read_bytes()[:-30] + bytes(30))],
+    ids=['empty', 'gone', 'zeros'])
+@pytest.mark.parametrize('name', ['run.json', 'vehicles.parquet', 'files.sha256'])
+def test_a_damaged_cache_is_made_anew(copied: Path, name: str,
+                                      spoil: Callable[[Path], object]) -> None:
+    before = digests(copied / 'data')
+    spoil(sorted((copied / 'data' / '.runs').glob(f'*/{name}'))[0])
+    assert main(['study', 'data', str(copied)]) == 0
+    assert digests(copied / 'data') == before
+
+
+@pytest.mark.parametrize('line', [
+    '{"entry": "finished", "at": 1e9}', '{"entry": "skipped", "at": 1e9, "item": 7}',
+    '{"entry": "repeated", "at": 1e400, "item": "x"}', '[]', '{"entry": "started", "at": 1}',
+    '{"entry": "finished", "at": 1, "item": "x", "attempt": "1"}'])
+def test_a_line_that_is_no_entry_is_passed_over(copied: Path, line: str) -> None:
+    journal = copied / 'participants' / 'P01' / JOURNAL
+    before = (copied / 'data' / 'trials.csv').read_bytes()
+    with journal.open('a') as stream:
+        stream.write(line + '\n')
+    assert main(['study', 'data', str(copied)]) == 0
+    assert (copied / 'data' / 'trials.csv').read_bytes() == before
+
+
+def test_a_journal_that_is_a_folder_is_said_in_one_line(
+        copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    journal = copied / 'participants' / 'P01' / JOURNAL
+    journal.unlink()
+    journal.mkdir()
+    assert main(['study', 'data', str(copied)]) == 2
+    assert f'{journal}: cannot be read' in capsys.readouterr().err
 
 
 def test_what_cannot_be_measured_is_told(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -193,6 +193,14 @@ def test_what_makes_no_command_is_counted(table: Table) -> None:
     assert (table.human.outdated, table.human.malformed) == (1, 2)
 
 
+def test_a_command_without_a_stamp_is_meant_for_now(table: Table) -> None:
+    """As `ros2 topic pub` sends it."""
+    _heard(table, RELEASED)
+    table.commands.publish(to_joy(FULL, 0, GAME))
+    wait_until(lambda: table.human.command(0, 0.01, 20.0) == FULL, 'the command')
+    assert table.human.outdated == 0
+
+
 def test_a_recording_drives_by_the_step(table: Table) -> None:
     """
     Row n counts in cycle n, however late it is; a taken seat is given back to row n.

@@ -188,12 +188,13 @@ def test_a_participant_is_in_one_process_and_one_plan(tmp_path: Path) -> None:
 def test_what_was_said_comes_back_as_it_was(tmp_path: Path) -> None:
     text = '<script>"it\'s"</script>,\n\r\t\u2028😀' + 'ä' * 10_000
     with SessionJournal(tmp_path) as journal:
-        journal.add({'entry': 'note', 'text': text})
+        journal.add({'entry': 'note', 'at': 1.0, 'text': text})
     assert read_journal(tmp_path)[0]['text'] == text
     with (tmp_path / JOURNAL).open('ab') as file:
-        file.write(b'not json\n' + json.dumps({'entry': 'note', 'text': 'x'}).encode() + b'\n[')
+        later = json.dumps({'entry': 'note', 'at': 2.0, 'text': 'x'})
+        file.write(b'not json\n' + later.encode() + b'\n[')
     assert [entry['text'] for entry in read_journal(tmp_path)] == [text, 'x']
     with SessionJournal(tmp_path) as journal:
         assert [entry['text'] for entry in journal.entries] == [text, 'x']
-        journal.add({'entry': 'note', 'text': 'y'})
+        journal.add({'entry': 'note', 'at': 3.0, 'text': 'y'})
     assert [entry['text'] for entry in read_journal(tmp_path)] == [text, 'x', 'y']

@@ -15,7 +15,7 @@ from urllib.parse import quote
 import zipfile
 
 from aiohttp import ClientError, ClientSession, hdrs, web, WSMsgType
-from crgame_ros.cockpit.access import new_token
+from crgame_ros.cockpit.access import cookie_for, cookie_name, new_token
 from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.library_routes import (
     Answer,
@@ -58,7 +58,7 @@ class _Replay:
 
     @property
     def headers(self) -> dict[str, str]:
-        return {hdrs.COOKIE: f'crgame-{self.port}={self.token}'}
+        return {hdrs.COOKIE: f'{cookie_name(self.port, tls=False)}={cookie_for(self.token)}'}
 
 
 class RunReplays:

@@ -10,8 +10,7 @@ from typing import Any, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import StudyFile
-from crgame_ros.study.participant_session import SessionEvent
-from crgame_ros.study.session_journal import read_journal
+from crgame_ros.study.session_journal import read_journal, SessionEvent
 from crgame_ros.study.session_script import session_of, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
@@ -226,9 +225,7 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     :return: None if the participant has not begun.
     :raises InputError: if it is of another study.
     """
-    entries = tuple(entry for entry in read_journal(folder)
-                    if isinstance(entry.get('entry'), str)
-                    and isinstance(entry.get('at'), int | float))
+    entries = tuple(read_journal(folder))
     begun = next((entry for entry in entries if entry['entry'] == SessionEvent.BEGUN), None)
     if begun is None:
         return None

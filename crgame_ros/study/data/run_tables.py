@@ -22,6 +22,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 SUMMARY = 'run.json'
+# Names the other files of an entry with their hashes; whatever has been damaged is made anew.
+DIGESTS = 'files.sha256'
 _PIECE = 1 << 20
 
 
@@ -75,7 +77,7 @@ class RunTablesCache:
         key = _key(run, name)
         self._used.add(key)
         folder = self._folder / key
-        if not (folder / SUMMARY).exists():
+        if not _is_whole(folder):
             self._measure(run, name, folder, progress)
         return RunTables(key, folder, json.loads((folder / SUMMARY).read_text('utf-8')))
 
@@ -98,6 +100,7 @@ class RunTablesCache:
                 pq.write_table(rows, part / f'{table}.parquet', compression='zstd')
             text = json.dumps(_summary(tabulated), indent=1, ensure_ascii=False)
             (part / SUMMARY).write_text(text + '\n', encoding='utf-8')
+            (part / DIGESTS).write_text(_digests(part), encoding='utf-8')
             shutil.rmtree(folder, ignore_errors=True)
             part.rename(folder)
         except OSError as error:
@@ -105,6 +108,19 @@ class RunTablesCache:
                              'make room, or make the folder writable') from error
         finally:
             shutil.rmtree(part, ignore_errors=True)
+
+
+def _digests(folder: Path) -> str:
+    """Return the names and hashes of an entry's files, as sha256sum writes them."""
+    return ''.join(f'{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n'
+                   for path in sorted(folder.iterdir()) if path.name != DIGESTS)
+
+
+def _is_whole(folder: Path) -> bool:
+    try:
+        return (folder / DIGESTS).read_text(encoding='utf-8') == _digests(folder)
+    except (OSError, ValueError):
+        return False
 
 
 def _summary(run: TableRun) -> dict[str, Any]:
@@ -136,7 +152,11 @@ def _key(run: Path, name: str) -> str:
     for bag in bags_of(run):
         for file in sorted(bag.iterdir()):
             digest.update(f'{bag.name}/{file.name}\n'.encode())
-            with file.open('rb') as stream:
-                while piece := stream.read(_PIECE):
-                    digest.update(piece)
+            try:
+                with file.open('rb') as stream:
+                    while piece := stream.read(_PIECE):
+                        digest.update(piece)
+            except OSError as error:
+                raise InputError(f'cannot be read ({error.strerror})', str(file),
+                                 'put it back, or leave out the run') from error
     return digest.hexdigest()[:32]

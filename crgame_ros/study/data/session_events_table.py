@@ -9,7 +9,7 @@ from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDecl
 from crgame_ros.study.data.participant_record import ParticipantRecord, TrialAttempt
 from crgame_ros.study.data.run_tables import RunTables
 from crgame_ros.study.data.trials_table import PARTICIPANT, utc, WALL
-from crgame_ros.study.participant_session import SessionEvent
+from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 

@@ -30,8 +30,7 @@ from crgame_ros.study.data.study_row_table import (
 )
 from crgame_ros.study.data.trials_table import PARTICIPANT, TrialsTable, utc, WALL
 from crgame_ros.study.file import StudyFile
-from crgame_ros.study.participant_session import SessionEvent
-from crgame_ros.study.session_journal import JOURNAL
+from crgame_ros.study.session_journal import JOURNAL, SessionEvent
 from crgame_ros.study.session_script import Fields
 import pyarrow as pa
 

@@ -10,7 +10,8 @@ from typing import Any, Protocol
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.study.drive_state import DrivePhase, DriveState
 from crgame_ros.study.file import Break, Page
-from crgame_ros.study.participant_session import ParticipantSession, SessionEvent
+from crgame_ros.study.participant_session import ParticipantSession
+from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 

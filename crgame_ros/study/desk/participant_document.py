@@ -11,7 +11,6 @@ from crgame_ros.study.desk.page_markdown import read_tree
 from crgame_ros.study.drive_state import DrivePhase
 from crgame_ros.study.file import Break, DeviceCheck, Page, Questions
 from crgame_ros.study.pages import questionnaire_name
-from crgame_ros.study.participant_session import SessionEvent
 from crgame_ros.study.question import (
     ChoiceQuestion,
     LikertQuestion,
@@ -21,6 +20,7 @@ from crgame_ros.study.question import (
     TextQuestion,
 )
 from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.session_journal import SessionEvent
 from crgame_ros.study.session_script import Fields, PracticeDrives, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 

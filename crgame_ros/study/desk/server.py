@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 from aiohttp import hdrs, web, WSCloseCode, WSMsgType
 from aiohttp.typedefs import Handler
-from crgame_ros.cockpit.access import Access, is_loopback
+from crgame_ros.cockpit.access import Access, cookie_name, is_loopback
 from crgame_ros.cockpit.client import Client, TokenBucket
 from crgame_ros.cockpit.doorkeeper import Doorkeeper
 from crgame_ros.cockpit.invitations import Invitations
@@ -162,7 +162,7 @@ def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> w
     sockets: set[DeskSocket] = set()
     numbers = count(1)
     app = web.Application(middlewares=[
-        guard(access, keeper, lambda request: _is_experimenter(request, experimenters)
+        guard(access, keeper, lambda request: _is_experimenter(request, access, experimenters)
               or (request.path == '/experimenter' and 'token' in request.query))])
     app[KEEPER], app[ACCESS] = keeper, access
     app.cleanup_ctx.append(_telling(pages))
@@ -171,7 +171,7 @@ def create_desk_app(desk: Desk, access: Access, experimenters: Invitations) -> w
 
     def connector(*, experimenter: bool) -> Handler:
         async def connect(request: web.Request) -> web.StreamResponse:
-            if experimenter and not _is_experimenter(request, experimenters):
+            if experimenter and not _is_experimenter(request, access, experimenters):
                 return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
             if len(sockets) >= MAX_PAGES:
                 return web.Response(status=503, text='Too many pages are open.\n')
@@ -226,12 +226,12 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
     async def experimenter(request: web.Request) -> web.Response:
         if 'token' in request.query:
             return _exchange(request, access, experimenters)
-        if not _is_experimenter(request, experimenters):
+        if not _is_experimenter(request, access, experimenters):
             return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
         return file_answer(request, table['/experimenter'])
 
     async def journal(request: web.Request) -> web.Response:
-        if not _is_experimenter(request, experimenters):
+        if not _is_experimenter(request, access, experimenters):
             return web.Response(status=403, text=f'{_ONLY_EXPERIMENTER}\n')
         lines = ''.join(f'{json.dumps(entry)}\n' for entry in desk.session.journal.entries)
         name = f'{desk.session.study.name}_{desk.session.participant}.jsonl'
@@ -264,7 +264,7 @@ def _read_files() -> Mapping[str, PageFile]:
 
 
 def _exchange(request: web.Request, access: Access, experimenters: Invitations) -> web.Response:
-    name = _cookie_name(request)
+    name = _cookie_name(request, access)
     try:
         cookie = experimenters.exchange(request.query['token'], request.cookies.get(name))
     except InputError:
@@ -277,13 +277,13 @@ def _exchange(request: web.Request, access: Access, experimenters: Invitations) 
     return answer
 
 
-def _is_experimenter(request: web.Request, experimenters: Invitations) -> bool:
-    return experimenters.rights(request.cookies.get(_cookie_name(request))) is not None
+def _is_experimenter(request: web.Request, access: Access, experimenters: Invitations) -> bool:
+    return experimenters.rights(request.cookies.get(_cookie_name(request, access))) is not None
 
 
-def _cookie_name(request: web.Request) -> str:
+def _cookie_name(request: web.Request, access: Access) -> str:
     sockname = request.get_extra_info('sockname')
-    return f'crgame-desk-{sockname[1]}' if sockname else 'crgame-desk'
+    return cookie_name(sockname[1] if sockname else 0, access.tls is not None, 'desk')
 
 
 def _frames(request: web.Request, desk: Desk) -> str:
