@@ -38,9 +38,13 @@ class InputProbe(OdometryProbe):
         return None if found is None else found[1] - sent_s
 
 
-def input_latency(folder: Path, turns: int) -> None:
-    """Measure and print input to odometry."""
-    graph = LiveGraph(folder / 'input', ['--driver', 'joy', '--duration', '100000'])
+def input_latency(folder: Path, turns: int, *arguments: str) -> None:
+    """
+    Measure and print input to odometry.
+
+    :param arguments: of the launcher.
+    """
+    graph = LiveGraph(folder / 'input', ['--driver', 'joy', '--duration', '100000', *arguments])
     control = RemoteControl()
     try:
         control.wait_until_running()
@@ -66,7 +70,8 @@ def input_latency(folder: Path, turns: int) -> None:
         control.close()
         graph.kill()
     p50, p99, worst = np.percentile(times, [50, 99, 100])
-    print(f'{"input to odometry":34}{p50:9.2f}{p99:9.2f}{worst:9.2f}  p50 <= 6, p99 <= 11    '
+    what = ' '.join(('input to odometry', *arguments))
+    print(f'{what:34}{p50:9.2f}{p99:9.2f}{worst:9.2f}  p50 <= 6, p99 <= 11    '
           f'({len(times)} turns, {lost} unanswered)')
 
 
@@ -94,7 +99,9 @@ def main() -> None:
     values = parser.parse_args()
     print(f'{"[ms]":34}{"p50":>9}{"p99":>9}{"worst":>9}  wanted')
     with tempfile.TemporaryDirectory() as name:
-        input_latency(Path(name), values.turns)
+        # With open topics no reader of the run compares partitions.
+        for arguments in ((), ('--open-topics',)):
+            input_latency(Path(name, *arguments), values.turns, *arguments)
         plan_latency(Path(name), values.game, values.duration)
 
 

@@ -207,7 +207,7 @@ def _offline(values: argparse.Namespace) -> int:
     if values.out is not None:
         for notice in run.exported(values.out)[1]:
             print(f'note: {notice}', file=sys.stderr)
-    return tell_outcome(say, run.outcome, run.usual_criticality)
+    return tell_outcome(say, run.outcome, run.usual_criticality, scores=run.drive_scores)
 
 
 def _convert(values: argparse.Namespace) -> int:

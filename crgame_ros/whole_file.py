@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writing files that are complete or absent, even if the process or the machine stops."""
 
+import glob
 import os
 from pathlib import Path
 
@@ -12,7 +13,7 @@ def write_whole(content: bytes, path: Path) -> None:
 
     :raises OSError: if it cannot be written; an existing file is unchanged.
     """
-    temporary = path.with_name(f'.{path.name}.{os.getpid()}.part')
+    temporary = part_of(path)
     try:
         with temporary.open('wb') as stream:
             stream.write(content)
@@ -22,6 +23,19 @@ def write_whole(content: bytes, path: Path) -> None:
         sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def part_of(path: Path) -> Path:
+    """
+    Return the name under which this process writes a file before it is whole.
+
+    What killed processes have left of the same file is removed.
+    """
+    for left in path.parent.glob(f'.{glob.escape(path.name)}.*.part'):
+        pid = left.name.split('.')[-2]
+        if pid.isdecimal() and not Path('/proc', pid).exists():
+            left.unlink(missing_ok=True)
+    return path.with_name(f'.{path.name}.{os.getpid()}.part')
 
 
 def sync_folder(folder: Path) -> None:

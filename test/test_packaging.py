@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 NODES = ('sim_node', 'driver_node', 'planner_node', 'drivability_node', 'criticality_node',
          'timesync_node', 'recorder_node', 'marker_node', 'cockpit_node',
          'perception_node', 'traffic_node', 'map_node')
-DATA = ('launch', 'config', 'scenarios', 'msg_defs')
+DATA = ('launch', 'config', 'examples', 'scenarios', 'msg_defs')
 PINS = ('requirements.txt', 'requirements-planners.txt')
 # Modules of ROS packages whose name is no ROS package's.
 # Without uv, wherever this machine has it.
@@ -63,7 +63,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     copied = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
                    'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
                    'requirements.txt', 'requirements-planners.txt', 'LICENSE',
-                   *(name for name in ('launch', 'scenarios') if (ROOT / name).is_dir()))
+                   *(name for name in ('examples', 'launch', 'scenarios') if (ROOT / name).is_dir()))
     # As in a tree where the page has been checked.
     foreign = copied / 'test' / 'page' / 'node_modules' / 'somebody'
     foreign.mkdir(parents=True)

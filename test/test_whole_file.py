@@ -4,6 +4,7 @@
 
 import os
 from pathlib import Path
+import subprocess
 import time
 
 from crgame_ros.recording.writer import BagWriter
@@ -66,3 +67,15 @@ def test_a_journal_is_found_again(
         synced.clear()
         journal.add({'entry': 'begun'})
         assert [name for name, _ in synced] == [JOURNAL]
+
+
+def test_what_a_killed_process_has_left_is_removed(tmp_path: Path) -> None:
+    """Not what is of another file, or of a process that still writes it."""
+    killed = subprocess.Popen(['true'])
+    killed.wait()
+    left, other, written = (tmp_path / name for name in (
+        f'.a.txt.{killed.pid}.part', f'.b.txt.{killed.pid}.part', f'.a.txt.{os.getppid()}.part'))
+    for path in (left, other, written):
+        path.touch()
+    write_whole(b'new', tmp_path / 'a.txt')
+    assert [path.exists() for path in (left, other, written)] == [False, True, True]

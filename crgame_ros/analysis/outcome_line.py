@@ -2,18 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run in one line, and the AVs whose planners never drove; the same for live and offline."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
-from crgame_ros.timing.metrics import SLOW
+from crgame_ros.analysis.scores.vehicle import VehicleScores
+from crgame_ros.timing.metrics import slowness
 
 # Exit code of a run in which no plan of some planner was driven.
 NO_PLANS = 3
 
 
 def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, Any],
-                 criticality: Criticality | None, name: str = '') -> int:
+                 criticality: Criticality | None, name: str = '',
+                 scores: Sequence[VehicleScores] = ()) -> int:
     """
     Tell of a run, as the last lines about it.
 
@@ -23,13 +25,14 @@ def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, Any],
     failed = undriven(outcome)
     for line in failed:
         say(f'error: {line}')
-    say(name + outcome_line(outcome, criticality))
+    say(name + outcome_line(outcome, criticality, scores))
     return NO_PLANS if failed else 0
 
 
-def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = None) -> str:
+def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = None,
+                 scores: Sequence[VehicleScores] = ()) -> str:
     """
-    Return contacts, least TTC, driven plans and the real-time ratio of a run.
+    Return contacts, least TTC, driven plans, scores and the real-time ratio of a run.
 
     :param outcome: content of `timing.json`, or result of `offline_outcome`.
     """
@@ -45,10 +48,12 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
     if due:
         driven = sum(_driven(entry) for entry in outcome['planners'].values())
         parts.append(f'{driven} of {_counted(due, "plan")} accepted')
+    scored = [f'{each.vehicle_id} {each.nuplan.score:.2f}' for each in scores
+              if each.nuplan is not None]
+    if scored:
+        parts.append(f'nuPlan score {", ".join(scored)}')
     if (ratio := outcome.get('real_time_ratio')) is not None:
-        slow = ' (slower than real time: the machine is too busy or too slow)'
-        parts.append(f'real-time ratio {ratio["final"]:.3f}'
-                     + (slow if ratio['final'] < SLOW else ''))
+        parts.append(slowness(ratio['final']) or f'real-time ratio {ratio["final"]:.3f}')
     return ', '.join(parts)
 
 

@@ -16,7 +16,7 @@ from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
 
 if TYPE_CHECKING:  # It takes a second to import.
-    from crgame_ros.analysis.criticality.criticality import Criticality
+    from crgame_ros.analysis.report.run import ReportRun
     from crgame_ros.recording.finish import FinishedRecording
 
 LOOK_S = 0.5
@@ -38,7 +38,7 @@ class Finisher:
         self._say = say
         self._reports = reports
         self._finished: list[FinishedRecording] = []
-        self._criticality: dict[Path, Criticality | None] = {}
+        self._measured: dict[Path, ReportRun | None] = {}
         self._process: subprocess.Popen[str] | None = None
         self._codes: dict[Path, int] = {}
         self._folder = session
@@ -90,7 +90,7 @@ class Finisher:
         try:
             with writing(self._say, 'still writing the report; once more leaves it out'):
                 for each in self._finished:
-                    self._criticality[each.bag.parent] = write_run_report(each, self._say)
+                    self._measured[each.bag.parent] = write_run_report(each, self._say)
         except KeyboardInterrupt:
             self._say(f'no report; `crgame report {self._session}` writes it')
 
@@ -108,8 +108,10 @@ class Finisher:
             except (OSError, ValueError):
                 # What kept it from being written has been told.
                 continue
-            code = tell_outcome(self._say, timing, self._criticality.get(folder),
-                                f'{folder.name}: ') or code
+            run = self._measured.get(folder)
+            code = tell_outcome(self._say, timing, None if run is None else run.criticality,
+                                f'{folder.name}: ', () if run is None else run.scores.vehicles
+                                ) or code
         return code
 
     def _start(self, folder: Path) -> None:

@@ -3,7 +3,7 @@
 """A live run from the command line: check it, run it, and convert the recording to a scenario."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 import os
 import selectors
 import shlex
@@ -214,26 +214,25 @@ def launch(arguments: Sequence[str] | None = None) -> int:
             return serve_replay(request.replay, request.listen or '127.0.0.1', request.port,
                                 new_token() if request.token else None, say=print_now)
         require_ros()
-        plan = plan_run(request)
-        if plan.setup.game.traffic is not None:
-            compile_now()
-        announce(plan)
-        # Killed processes leave 4 MB each.
-        remove_stale()
-        finisher = Finisher(plan.folder, print_now, not request.no_report)
-        try:
-            domain = os.environ['ROS_DOMAIN_ID']
-            with compiling_when_idle(), hold_namespace(domain, request.namespace), \
-                    believing_own_nodes(plan):
+        prepare_environment()
+        domain = os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
+        with ExitStack() as holding:
+            # Held before anything is written: a second simulation leaves no folder.
+            holding.enter_context(hold_namespace(domain, request.namespace))
+            plan = plan_run(request)
+            holding.callback(clear, plan)
+            if plan.setup.game.traffic is not None:
+                compile_now()
+            announce(plan)
+            # Killed processes leave 4 MB each.
+            remove_stale()
+            finisher = Finisher(plan.folder, print_now, not request.no_report)
+            with compiling_when_idle(), believing_own_nodes(plan):
                 specs = node_specs(plan)
                 load(shared_modules(specs, plan))
                 graph = Graph(specs, print_now, Roster(plan.roster), finisher, request.namespace)
                 began = True
                 code = graph.run()
-        finally:
-            shutil.rmtree(plan.private, ignore_errors=True)
-            plan.roster.unlink(missing_ok=True)
-            plan.claim.unlink(missing_ok=True)
         with writing(print_now):
             code = max(code, finisher.finish_all(graph.was_asked_to_end))
         finisher.write_reports()
@@ -250,6 +249,13 @@ def launch(arguments: Sequence[str] | None = None) -> int:
             return 130
         print_now(ENDED_EARLY)
         return 0
+
+
+def clear(plan: RunPlan) -> None:
+    """Remove what only a run that goes on has in its folder."""
+    shutil.rmtree(plan.private, ignore_errors=True)
+    plan.roster.unlink(missing_ok=True)
+    plan.claim.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -283,9 +289,7 @@ def believing_own_nodes(plan: RunPlan) -> Iterator[None]:
 
 
 def announce(plan: RunPlan) -> None:
-    """Print the plan of the run, and set the DDS domain."""
-    prepare_environment()
-    os.environ.setdefault('ROS_DOMAIN_ID', str(free_domain_id()))
+    """Print the plan of the run."""
     setup = plan.setup
     drivers = ', '.join(f'{human.id} driven by {setup.game.humans[index].driver}'
                         for index, human in enumerate(setup.humans))

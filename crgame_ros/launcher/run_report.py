@@ -10,14 +10,14 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.recording.progress import Progress
 
 if TYPE_CHECKING:  # It takes a second to import.
-    from crgame_ros.analysis.criticality.criticality import Criticality
+    from crgame_ros.analysis.report.run import ReportRun
     from crgame_ros.recording.finish import FinishedRecording
 
 
 def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object],
-                     progress: bool = True) -> 'Criticality | None':
+                     progress: bool = True) -> 'ReportRun | None':
     """
-    Write the report of a run beside its recording, and return the run's criticality.
+    Write the report of a run beside its recording, and return the run with its measures.
 
     A failure is only reported, because it must not harm the run.
 
@@ -45,4 +45,4 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
         say(f'error: no report: {type(error).__name__}: {error}')
         return None
     say(f'  {path} ({time.monotonic() - began_s:.1f} s)')
-    return run.criticality
+    return run

@@ -20,6 +20,7 @@ from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.contract import load_contract, Topic
 from crgame_ros.paths import numbered
 from crgame_ros.recording.exceptions import RecordingError
+from crgame_ros.recording.log_clock import LogClock
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_folder import next_part, run_folder
@@ -46,8 +47,8 @@ GOES_ON_NS = 200_000_000
 # A simulation that is silent for this long has ended or stands still [s].
 SILENCE_S = 2.0
 CLOCK_TOPIC = '/clock'
-# The system clock has been set if it differs by more than this from where it was [ns].
-SET_NS = 100_000_000
+# Simulation and epoch of no run.
+NO_RUN = ('', -1)
 # A run waits for its bag at most this long; until it starts, the bag is reported so often [s].
 AWAITED_S, AGAIN_S = 10.0, 0.2
 
@@ -81,8 +82,8 @@ class RecorderNode(Node):
         self._endpoints = Endpoints(self)
         self._topics: dict[str, RecordedTopic] = {}
         self._writer: BagWriter | None = None
-        self._offset_ns, self._run = 0, ('', -1)
-        self._ended_run = self._run
+        # The run whose bag is open or was last, and the one whose end was heard last.
+        self._offset_ns, self._run, self._ended_run = 0, NO_RUN, NO_RUN
         self._ended_s: float | None = None
         self._closed: dict[str, int] | None = None
         # Simulation time at which the bag was closed [ns].
@@ -229,7 +230,7 @@ class RecorderNode(Node):
         elif course is TimeCourse.ON and self._writer is None and self._closed is not None \
                 and clock_ns > self._closed_ns + GOES_ON_NS:
             self.get_logger().warning('the run goes on after its end: recording another part')
-            self._ended_run = '', -1
+            self._ended_run = NO_RUN
             self._begin_bag(self._game_text)
         for item in held:
             self._write(*item)
@@ -249,7 +250,7 @@ class RecorderNode(Node):
         if state.state != 'ended':
             if run == self._ended_run:
                 # A recording is played again.
-                self._ended_run, self._ended_s = ('', -1), None
+                self._ended_run, self._ended_s = NO_RUN, None
             return
         self._ended_run = run
         if self._ended_s is None and run == self._run:
@@ -361,39 +362,6 @@ class RecorderNode(Node):
                             'closed': True}
             self._report(None)
             self.get_logger().info(f'{writer.message_count} messages in {writer.folder}')
-
-
-class LogClock:
-    """
-    The times at which messages are logged, which never go back although the system clock may.
-
-    :param wall_ns: system time now [ns since 1970]
-    :param steady_ns: the steady clock now [ns]
-    """
-
-    def __init__(self, wall_ns: int, steady_ns: int) -> None:
-        self._begun_ns = wall_ns - steady_ns
-        # By how much the system clock has been set since, and the latest time that was logged.
-        self._set_by_ns = self._last_ns = 0
-
-    def now_ns(self, steady_ns: int) -> int:
-        """Return the time now, as if nobody had set the system clock [ns since 1970]."""
-        return self._begun_ns + steady_ns
-
-    def times_ns(self, published_ns: int, received_ns: int, wall_ns: int,
-                 steady_ns: int) -> tuple[int, int]:
-        """
-        Return the times of publication and reception that are to be logged [ns since 1970].
-
-        :param wall_ns: system time now [ns since 1970]
-        :param steady_ns: the steady clock now [ns]
-        """
-        now_ns = self.now_ns(steady_ns)
-        # This process may be interrupted for a moment between two looks at clocks.
-        if abs(wall_ns - now_ns - self._set_by_ns) > SET_NS:
-            self._set_by_ns = wall_ns - now_ns
-        self._last_ns = max(self._last_ns, min(received_ns - self._set_by_ns, now_ns))
-        return min(published_ns - self._set_by_ns, self._last_ns), self._last_ns
 
 
 def _simulation_in(bag: Path) -> str | None:

@@ -15,7 +15,7 @@ from crgame_ros.ros.spinning import poll
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.timing.frame_skipping import FrameSkipping
 from crgame_ros.timing.late_steps import LateSteps
-from crgame_ros.timing.metrics import SLOW, TimingMetrics
+from crgame_ros.timing.metrics import slowness, TimingMetrics
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_msgs.msg import Bool
@@ -106,9 +106,9 @@ class TimesyncNode(Node):
         values = summary.as_dict()
         ratios = values.pop('real_time_ratio')
         values.update({f'real_time_ratio_{key}': value for key, value in ratios.items()})
-        if ratios['final'] < SLOW and metrics.cycles * metrics.dt_s > SETTLED_S:
-            complain(self, 'slow', f'slower than real time (ratio {ratios["final"]:.2f}): the '
-                     'machine is too busy or too slow for this game')
+        slow = slowness(ratios['final'])
+        if slow is not None and metrics.cycles * metrics.dt_s > SETTLED_S:
+            complain(self, 'slow', slow)
         values['frame_skipping'] = self._skipping.active
         values['frame_skip_orders'] = self._skipping.orders
         values['late_steps'] = self._late.count

@@ -149,6 +149,12 @@ class Run(ABC):
         from crgame_ros.analysis.criticality.recorded import measure_log
         return measure_log(self.log)
 
+    @cached_property
+    def drive_scores(self) -> 'tuple[VehicleScores, ...]':
+        """Score its drives without CommonRoad's tools; empty where they cannot be scored."""
+        from crgame_ros.analysis.scores.scored_drives import scores_of
+        return scores_of(self.record, {}, drives_only=True).vehicles
+
     def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':
         """
         Measure how critical it was, by vehicle (docs/criticality.md).

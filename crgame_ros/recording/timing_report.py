@@ -28,7 +28,7 @@ from crgame_ros.recording.storage import BagMessage
 from crgame_ros.recording.view_periods import SeatSound, ViewPeriods
 from crgame_ros.simulation.contacts import Contact, find_contacts, Motions
 from crgame_ros.timing.late_steps import LateSteps
-from crgame_ros.timing.metrics import TimingMetrics
+from crgame_ros.timing.metrics import slowness, TimingMetrics
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
 from numpy.typing import NDArray
@@ -142,8 +142,9 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             collected.add(message, reader)
         contacts, unknown = _contacts(reader, run, collected.verdicts, collected.fired)
         planners = {av: collected.planner(av) for av in collected.avs}
+        summary = metrics.summary().as_dict()
         return {
-            **metrics.summary().as_dict(),
+            **summary,
             'late_steps': late.as_dict(),
             # The first row belongs to the step to n = 1.
             'gaps': int(numbers[-1]) - len(numbers),
@@ -161,7 +162,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
                 *(() if log is None else log.notices), *reader.notices, *reader.foreign_notices,
                 *(f'/{av}/plan: {entry["of_others"]} plans of other programs than its planner, '
                   'which were not taken' for av, entry in planners.items() if entry['of_others']),
-                *unknown))]}
+                *unknown, *filter(None, [slowness(summary['real_time_ratio']['final'])])))]}
 
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None,

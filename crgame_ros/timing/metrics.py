@@ -24,6 +24,12 @@ BINS_PER_DECADE = 100
 SLOW = 0.95
 
 
+def slowness(ratio: float) -> str | None:
+    """Return what is said of a run with this real-time ratio; None if it is fast enough."""
+    return None if ratio >= SLOW else (
+        f'slower than real time (ratio {ratio:.2f}): the machine is too busy or too slow for it')
+
+
 class LogHistogram:
     """
     Counts of durations in bins of equal ratio, 100 per decade from 10 ns to 1000 s.

@@ -7,11 +7,11 @@ import csv
 from dataclasses import dataclass, field
 import io
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 from crgame_ros.errors import InputError, short
+from crgame_ros.whole_file import part_of
 import numpy as np
 from numpy.typing import NDArray
 
@@ -166,7 +166,7 @@ def write_whole(path: Path, text: str) -> None:
 
     :raises InputError: if it cannot be written.
     """
-    part = path.with_name(f'.{path.name}.{os.getpid()}.part')
+    part = part_of(path)
     try:
         try:
             part.write_text(text, encoding='utf-8', newline='')

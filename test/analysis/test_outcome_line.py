@@ -25,8 +25,8 @@ def outcome(contacts: int = 0, ratio: float | None = None, **planners: Any) -> d
     (outcome(1, 1.0, av0=planner(61, 60, 10)),
      '1 contact, 50 of 60 plans accepted, real-time ratio 1.000'),
     (outcome(2, 0.29, av0=planner(2, 1), av1=planner(5, 2, None, 1, timed_out=1)),
-     '2 contacts, 3 of 5 plans accepted, real-time ratio 0.290 '
-     '(slower than real time: the machine is too busy or too slow)'),
+     '2 contacts, 3 of 5 plans accepted, '
+     'slower than real time (ratio 0.29): the machine is too busy or too slow for it'),
 ])
 def test_a_run_in_one_line(found: dict[str, Any], line: str) -> None:
     assert outcome_line(found) == line

@@ -60,15 +60,18 @@ def test_plans_and_planner() -> None:
     _take(status, 'sim_node: av0 plans', 2, 'no plan: braking', {
         'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
         'latency_ms': '10.0', 'age_ms': '', 'last_refusal': 'late'}, 3.0)
+    _take(status, 'planner_node: av0', 1, 'braking: ValueError: no path', {
+        'plan_time_ms': '9.5', 'fallbacks': '2', 'planner': 'reactive'}, 3.0)
     _take(status, 'planner_node: av0', 0, 'planning', {
         'plan_time_ms': '4.5', 'fallbacks': '2', 'planner': 'reactive'}, 3.0)
     _take(status, 'sim_node: av0 plans', 2, 'no plan: braking', {
-        'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1',
+        'planner': 'idm', 'running': 'True', 'accepted': '7', 'refused': '1', 'of_others': '3',
         'latency_ms': '10.0', 'age_ms': '', 'last_refusal': 'late'}, 4.0)
     assert status.document()['planners']['av0'] == {
         'running': True, 'stale': True, 'latency_ms': 10.0, 'age_ms': None, 'accepted': 7,
         'refused': 1, 'plan_time_ms': 4.5, 'fallbacks': 2.0, 'planner': 'reactive',
-        'last_refusal': 'late', 'tracking': None}
+        'last_refusal': 'late', 'tracking': None, 'of_others': 3,
+        'failure': 'ValueError: no path'}
     assert _kinds(status) == ['stale_plan:av0']
 
 

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 import json
-import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -36,6 +35,7 @@ from crgame_ros.analysis.tables.writer import (
 )
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder, write_text
+from crgame_ros.whole_file import part_of
 import pyarrow as pa
 
 _LARGEST_PACKAGE = 10_000_000
@@ -69,7 +69,7 @@ class TableFolder:
             if (out / file).exists() and file not in self._earlier:
                 raise InputError('a file that is no exported table is there already',
                                  str(out / file), 'name another folder')
-        self._parts = {table.name: out / f'.{self._names[table.name]}.{os.getpid()}.part'
+        self._parts = {table.name: part_of(out / self._names[table.name])
                        for table in declarations}
         self.writers: dict[str, TableWriter] = {}
 

@@ -46,8 +46,10 @@ class SimControl:
         self.paused = False
         self.steps_wanted = 0
         self._stepped = 0
-        # The answers to orders of a step, each given when its step is done.
-        self._steps: deque[Future] = deque()
+        # Whether the run has begun: before that, an order of a step waits for participants.
+        self.begun = False
+        # The answers to orders of a step, each given when its step is done; None: given before.
+        self._steps: deque[Future | None] = deque()
         self.reset_wanted = False
         self.stop_wanted = False
         # The run has ended, and the node stays for another one.
@@ -191,13 +193,17 @@ class SimControl:
         if self._stepped == steps_per_tick:
             self._stepped = 0
             self.steps_wanted -= 1
-            self._steps.popleft().set_result(n)
+            done = self._steps.popleft()
+            if done is not None:
+                done.set_result(n)
 
     def end_steps(self) -> None:
         """Answer the orders of steps that will not be done as such."""
         self.steps_wanted = self._stepped = 0
         while self._steps:
-            self._steps.popleft().set_result(None)
+            done = self._steps.popleft()
+            if done is not None:
+                done.set_result(None)
 
     def first_game(self) -> Game:
         """
@@ -288,6 +294,9 @@ class SimControl:
         if not self.paused:
             return _answer(response, False, 'not paused: call /sim/pause first')
         self.steps_wanted += 1
+        if not self.begun:
+            self._steps.append(None)
+            return _answer(response, True, 'once the run begins')
         done = Future()
         self._steps.append(done)
         n = await done

@@ -179,11 +179,13 @@ class LiveRun:
             self._controller.start(now_ns)
             self._controller.resume(now_ns, self._control.real_time_factor)
             self._inputs.restart_timeout(now_ns)
+            self._control.begun = True
             with self._watch:
                 outcome = self._loop()
             self._reason = self._reason or outcome.reason(self._stop.requested)
             return outcome
         finally:
+            self._control.begun = False
             self._control.end_steps()
             gc.enable()
             gc.unfreeze()
