@@ -63,7 +63,8 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     copied = _copy(tmp_path_factory.mktemp('source'), 'crgame_ros', 'resource', 'config',
                    'msg_defs', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
                    'requirements.txt', 'requirements-planners.txt', 'LICENSE',
-                   *(name for name in ('examples', 'launch', 'scenarios') if (ROOT / name).is_dir()))
+                   *(name for name in ('examples', 'launch', 'scenarios')
+                     if (ROOT / name).is_dir()))
     # As in a tree where the page has been checked.
     foreign = copied / 'test' / 'page' / 'node_modules' / 'somebody'
     foreign.mkdir(parents=True)
