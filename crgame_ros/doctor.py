@@ -21,7 +21,7 @@ from crgame_ros.paths import share_directory
 from crgame_ros.registry import PACKAGES, planner_packages_install
 from crgame_ros.ros.environment import (
     free_domain_id,
-    loopback_profile,
+    is_loopback_profile,
     network_is_open,
     prepare_environment,
     PROFILE_VARIABLES,
@@ -213,19 +213,11 @@ def check_profile() -> Check:
     if 'fastrtps' not in middleware:
         return Check('network', 'warn', f'{middleware} does not read the loopback profile',
                      'export RMW_IMPLEMENTATION=rmw_fastrtps_cpp')
-    profiles = {os.environ.get(name) for name in PROFILE_VARIABLES} - {None, ''}
-    if profiles and all(map(_is_ours, profiles)):
+    profiles = {os.environ[name] for name in PROFILE_VARIABLES if os.environ.get(name)}
+    if profiles and all(map(is_loopback_profile, profiles)):
         return Check('network', 'ok', 'loopback only')
     return Check('network', 'warn', f'a profile of your own: {", ".join(map(str, profiles))}',
                  f'unset {" ".join(PROFILE_VARIABLES)} to take the loopback profile')
-
-
-def _is_ours(profile: str | None) -> bool:
-    """Return whether a profile is that of the package, or of another copy of it."""
-    try:
-        return Path(profile or '').read_bytes() == loopback_profile().read_bytes()
-    except OSError:
-        return False
 
 
 def check_devices(directory: Path = Path('/dev/input')) -> Check:

@@ -17,7 +17,8 @@ def test_a_run_ends_without_lines_about_leaked_objects() -> None:
         [sys.executable, '-m', 'crgame_ros.cli', 'offline', str(default_game()), '--planner',
          'reactive', '--duration', '1'], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0
-    assert re.fullmatch(r'0 contacts, (least TTC [0-9.]+ s, )?10 of 10 plans accepted\n',
+    assert re.fullmatch(r'0 contacts, (least TTC [0-9.]+ s, )?10 of 10 plans accepted, '
+                        r'nuPlan score hv0 [0-9.]+, av0 [0-9.]+\n',
                         done.stderr)
     assert json.loads(done.stdout)['planners']['av0']['accepted'] > 0
 
@@ -37,4 +38,4 @@ def test_a_run_whose_planner_always_fails_ends_with_a_code_and_the_reason(tmp_pa
     assert f'  File "{tmp_path / "bad.py"}", line 8, in setup' in lines
     assert lines[-2].startswith('error: av0: no plan of its planner was driven: setup failed: '
                                 'KeyError')
-    assert lines[-1] == '0 contacts, 0 of 10 plans accepted'
+    assert lines[-1].startswith('0 contacts, 0 of 10 plans accepted, nuPlan score hv0 ')

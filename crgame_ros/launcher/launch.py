@@ -267,6 +267,9 @@ def believing_own_nodes(plan: RunPlan) -> Iterator[None]:
     """
     request = plan.request
     if request.open_topics or not can_believe():
+        if not request.open_topics:
+            print_now('note: with another middleware, or a Fast DDS profile of your own, messages '
+                      'of other programs count on every topic')
         if request.own_orders:
             raise InputError('needs Fast DDS without a profile of your own', '--own-orders',
                              f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')

@@ -31,6 +31,14 @@ def loopback_profile() -> Path:
     return config_directory() / 'fastdds_loopback.xml'
 
 
+def is_loopback_profile(path: str) -> bool:
+    """Return whether a Fast DDS profile is that of the package, or of another copy of it."""
+    try:
+        return Path(path).read_bytes() == loopback_profile().read_bytes()
+    except OSError:
+        return False
+
+
 def network_is_open() -> bool:
     """Return whether the user lets ROS traffic leave this machine."""
     return os.environ.get(OPEN_NETWORK) == '1'

@@ -16,7 +16,12 @@ import secrets
 from xml.etree import ElementTree
 
 from crgame_ros.messages.contract import load_contract, Topic
-from crgame_ros.ros.environment import loopback_profile, network_is_open, PROFILE_VARIABLES
+from crgame_ros.ros.environment import (
+    is_loopback_profile,
+    loopback_profile,
+    network_is_open,
+    PROFILE_VARIABLES,
+)
 
 FAST_DDS = 'rmw_fastrtps_cpp'
 EXTERNAL = 'external'
@@ -32,9 +37,9 @@ _SERVICE, _CLIENT = 'service', 'client'
 
 def can_believe() -> bool:
     """Return whether a profile can be given: with Fast DDS, and without a profile of the user."""
-    given = {os.environ[name] for name in PROFILE_VARIABLES if os.environ.get(name)}
+    given = [os.environ[name] for name in PROFILE_VARIABLES if os.environ.get(name)]
     return os.environ.get('RMW_IMPLEMENTATION', FAST_DDS) == FAST_DDS \
-        and given <= {str(loopback_profile())}
+        and all(map(is_loopback_profile, given))
 
 
 def own_topics(humans: Collection[str], avs: Collection[str]) -> Iterator[str]:

@@ -86,7 +86,7 @@ def plans_of_report(report: Mapping[str, Any] | None) -> dict[str, PlanRecord]:
     :param report: from `recording.timing_report` or `offline_outcome`; None if there is none.
     """
     return {} if report is None else {
-        av: PlanRecord({name: entry[name] for name in _COUNTS}, entry['fallback'],
+        av: PlanRecord({name: entry.get(name) for name in _COUNTS}, entry['fallback'],
                        entry['fallback_reasons'] or {}, entry['last_refusal'],
                        {name: entry[name] for name in ('latency_ms', 'plan_time_ms', 'age_ms')},
                        entry['worst_tracking_errors'])
