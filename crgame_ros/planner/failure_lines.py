@@ -13,8 +13,8 @@ if TYPE_CHECKING:  # sim_node tells of refusals and has no planner.
     from crgame_ros.planner.manager import PlannerManager
 
 
-# A planner is slow if it takes longer than a scenario step, in the median of so many answers.
-RECENT = 5
+# A planner is slow if it takes longer than so many scenario steps: the median of so many answers.
+SLOW_STEPS, RECENT = 2, 5
 
 
 class FailureLines:
@@ -36,7 +36,7 @@ class FailureLines:
     def note(self, manager: 'PlannerManager') -> None:
         """Tell what is new after a setup or an answer."""
         recent = manager.statistics.durations_s[-RECENT:]
-        if len(recent) == RECENT and (took_s := median(recent)) > self._step_s:
+        if len(recent) == RECENT and (took_s := median(recent)) > SLOW_STEPS * self._step_s:
             self._tell(f'planner {manager.name} is slow',
                        f'{took_s:.2f} s for a plan, a scenario step is {self._step_s:g} s')
         failure = manager.statistics.failure
