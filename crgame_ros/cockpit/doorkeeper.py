@@ -27,7 +27,7 @@ class Doorkeeper:
 
     def __init__(self) -> None:
         self._of_address: Counter[str] = Counter()
-        self._open: dict[asyncio.BaseTransport, _Watched] = {}
+        self._open: dict[asyncio.Transport, _Watched] = {}
 
     def watched(self, make: Callable[[], asyncio.Protocol]) -> Callable[[], asyncio.Protocol]:
         """Return a factory of watched protocols."""
@@ -47,27 +47,26 @@ class Doorkeeper:
             watched.idle_since_s = asyncio.get_running_loop().time()
             watched.patience_s = NEXT_REQUEST_S
 
-    def lets_in(self, transport: asyncio.BaseTransport, watched: '_Watched') -> bool:
+    def lets_in(self, transport: asyncio.Transport, watched: '_Watched') -> bool:
         """
         Count a connection and return True, or return False if there are too many.
 
         A connection without a request makes room, first one that has never had any.
         """
-        address = None if len(self._open) >= MAX_CONNECTIONS else watched.address
-        if address is None or self._of_address[address] >= MAX_OF_ADDRESS:
-            idle = [(each.spoke, each.idle_since_s, number) for number, each in enumerate(
-                self._open.values()) if not each.requests and address in (None, each.address)]
+        crowded = self._of_address[watched.address] >= MAX_OF_ADDRESS
+        if crowded or len(self._open) >= MAX_CONNECTIONS:
+            idle = {each: item for each, item in self._open.items() if not item.requests
+                    and (not crowded or item.address == watched.address)}
             if not idle:
                 return False
-            oldest = list(self._open)[min(idle)[2]]
-            self.forget(oldest, self._open[oldest])
-            if isinstance(oldest, asyncio.Transport):
-                oldest.abort()
+            oldest = min(idle, key=lambda each: (idle[each].spoke, idle[each].idle_since_s))
+            self.forget(oldest, idle[oldest])
+            oldest.abort()
         self._of_address[watched.address] += 1
         self._open[transport] = watched
         return True
 
-    def forget(self, transport: asyncio.BaseTransport, watched: '_Watched') -> None:
+    def forget(self, transport: asyncio.Transport, watched: '_Watched') -> None:
         """Record that a connection has ended."""
         if self._open.pop(transport, None) is not None:
             self._of_address[watched.address] -= 1

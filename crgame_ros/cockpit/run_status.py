@@ -118,12 +118,13 @@ class RunStatus:
             self._add_plans(vehicle, level, text, values, t)
         elif node == 'planner_node':
             # An event may have changed the planner that the game names.
-            self._planner(vehicle).update(
+            planner = self._planner(vehicle)
+            planner.update(
                 planner=values.get('planner', ''),
                 plan_time_ms=_number(values.get('plan_time_ms')),
-                fallbacks=_number(values.get('fallbacks')),
-                failure=text.removeprefix(BRAKING) if text.startswith(BRAKING) else
-                self._planner(vehicle)['failure'])
+                fallbacks=_number(values.get('fallbacks')))
+            if text.startswith(BRAKING):
+                planner['failure'] = text.removeprefix(BRAKING)
         elif node == 'sim_node' and rest == 'seat':
             self.seats_lost[vehicle] = level != OK
             self._alarm('lost_device', vehicle, level != OK, 'not driven', t)

@@ -266,19 +266,20 @@ def believing_own_nodes(plan: RunPlan) -> Iterator[None]:
     :raises InputError: if the request depends on it and there can be none.
     """
     request = plan.request
-    if request.open_topics or not can_believe():
+    believes = can_believe()
+    if request.own_orders and not believes:
+        raise InputError('needs Fast DDS without a profile of your own', '--own-orders',
+                         f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')
+    if request.open_topics or not believes:
         if not request.open_topics:
             print_now('note: with another middleware, or a Fast DDS profile of your own, messages '
                       'of other programs count on every topic')
-        if request.own_orders:
-            raise InputError('needs Fast DDS without a profile of your own', '--own-orders',
-                             f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')
         yield
         return
     setup = plan.setup
     write_run_profile(
         plan.dds_profile, request.namespace,
-        list(own_topics([item.id for item in setup.humans], [item.id for item in setup.avs])),
+        own_topics([item.id for item in setup.humans], [item.id for item in setup.avs]),
         request.own_orders)
     before = {name: os.environ.get(name) for name in PROFILE_VARIABLES}
     os.environ |= dict.fromkeys(PROFILE_VARIABLES, str(plan.dds_profile))

@@ -14,6 +14,8 @@ from crgame_ros.paths import share_directory
 from crgame_ros.yaml_text import read_yaml
 
 PLACEHOLDERS = ('<hv>', '<av>', '<v>')
+# Stands for programs that are not of this package, among producers and consumers.
+EXTERNAL = 'external'
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Topic:
 
     :param name: with a placeholder <hv>, <av> or <v> for a vehicle's id.
     :param type_name: package/msg/Type.
-    :param producers: nodes that publish it.
+    :param producers: nodes that publish it; `external` stands for others.
     :param consumers: nodes that subscribe to it; `external` stands for others.
     :param record: whether the recorder records it.
     :param rate: nominal rate [Hz], or a description.
@@ -60,6 +62,11 @@ class Topic:
     def available(self) -> bool:
         """Return whether the topic is available; only an optional one may not be."""
         return not self.optional or find_spec(self.type_name.partition('/')[0]) is not None
+
+    @property
+    def is_own(self) -> bool:
+        """Return whether only the nodes of this package publish it, for each other too."""
+        return EXTERNAL not in self.producers and set(self.consumers) != {EXTERNAL}
 
     @property
     def placeholder(self) -> str | None:

@@ -8,14 +8,14 @@ are in it and in the default one as well, so that every program of the domain ca
 compares partitions when it matches a writer with a reader, so a message costs nothing more.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 import copy
 import os
 from pathlib import Path
 import secrets
 from xml.etree import ElementTree
 
-from crgame_ros.messages.contract import load_contract, Topic
+from crgame_ros.messages.contract import load_contract
 from crgame_ros.ros.environment import (
     is_loopback_profile,
     loopback_profile,
@@ -24,7 +24,6 @@ from crgame_ros.ros.environment import (
 )
 
 FAST_DDS = 'rmw_fastrtps_cpp'
-EXTERNAL = 'external'
 # What every program may publish, unless the run obeys its own nodes alone.
 ORDER_TOPICS = ('/seats/order', '/trigger')
 # A game that is chosen later may have vehicles with these numbers.
@@ -47,15 +46,11 @@ def own_topics(humans: Collection[str], avs: Collection[str]) -> Iterator[str]:
     humans = sorted({*humans, *(f'hv{number}' for number in NUMBERS)})
     avs = sorted({*avs, *(f'av{number}' for number in NUMBERS)})
     for topic in load_contract().topics.values():
-        if _is_own(topic):
+        if topic.is_own:
             yield from topic.names(humans, avs)
 
 
-def _is_own(topic: Topic) -> bool:
-    return EXTERNAL not in topic.producers and set(topic.consumers) != {EXTERNAL}
-
-
-def write_run_profile(path: Path, namespace: str, topics: Collection[str],
+def write_run_profile(path: Path, namespace: str, topics: Iterable[str],
                       own_orders: bool = False) -> None:
     """
     Write the profile of one run, which begins with the default one.

@@ -10,8 +10,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+from crgame_ros import whole_file
 from crgame_ros.errors import InputError, short
-from crgame_ros.whole_file import part_of
 import numpy as np
 from numpy.typing import NDArray
 
@@ -166,13 +166,8 @@ def write_whole(path: Path, text: str) -> None:
 
     :raises InputError: if it cannot be written.
     """
-    part = part_of(path)
     try:
-        try:
-            part.write_text(text, encoding='utf-8', newline='')
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
+        whole_file.write_whole(text.encode(), path)
     except OSError as error:
         raise InputError(f'cannot write it ({error.strerror})', str(path),
                          'choose another place') from error

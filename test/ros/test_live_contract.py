@@ -79,19 +79,17 @@ class Case:
 
     def publishers(self, topic: Topic) -> set[Endpoint]:
         """List the publishers that a topic must have."""
-        executables = tuple(name for name in topic.producers if name != 'external')
-        return self._endpoints(topic, executables, frozenset(), frozenset(
+        return self._endpoints(topic, topic.producers, frozenset(), frozenset(
             (name, 'sim_node', av) for av in self.avs for name in (
                 ['/<av>/plan_request'] if av in self.perceiving else ['/<av>/true_request'])))
 
     def subscriptions(self, topic: Topic) -> set[Endpoint]:
         """List the subscriptions that a topic must have."""
-        executables = tuple(name for name in topic.consumers if name != 'external')
         perfect = set(self.avs) - set(self.perceiving)
         idle = {(name, node, av) for name, node in ONLY_WITH_PERCEPTION for av in perfect}
         if not self.engines:
             idle.add(('/traffic/agents', 'sim_node', ''))
-        return self._endpoints(topic, executables, ONLY_WITH_A_MOTOR | OPTIONAL - self.used,
+        return self._endpoints(topic, topic.consumers, ONLY_WITH_A_MOTOR | OPTIONAL - self.used,
                                frozenset(idle))
 
     def _endpoints(self, topic: Topic, executables: tuple[str, ...],
@@ -100,7 +98,7 @@ class Case:
         found = set()
         for name in topic.names(self.humans, self.avs):
             vehicle = name.split('/')[1] if topic.placeholder else ''
-            for executable in executables:
+            for executable in sorted({*executables} - {'external'}):
                 pair = (topic.name, executable)
                 # Only a human's violation may end the run.
                 idle = pair == ONLY_WITH_DRIVABILITY_STOP and vehicle not in self.humans

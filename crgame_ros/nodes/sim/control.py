@@ -44,12 +44,12 @@ class SimControl:
         # Names this process in /scenario/game, so that a recorder knows whether it goes on.
         self.simulation = uuid4().hex
         self.paused = False
-        self.steps_wanted = 0
-        self._stepped = 0
         # Whether the run has begun: before that, an order of a step waits for participants.
         self.begun = False
-        # The answers to orders of a step, each given when its step is done; None: given before.
+        # The scenario steps ordered during a pause, each with the answer that is given when it is
+        # done (None: given before), and the simulation steps of the first that are done.
         self._steps: deque[Future | None] = deque()
+        self._stepped = 0
         self.reset_wanted = False
         self.stop_wanted = False
         # The run has ended, and the node stays for another one.
@@ -178,7 +178,7 @@ class SimControl:
     @property
     def stands_still(self) -> bool:
         """Return whether the run is paused and no step of it is ordered."""
-        return self.paused and not self.steps_wanted
+        return self.paused and not self._steps
 
     def count_step(self, steps_per_tick: int, n: int) -> None:
         """
@@ -186,24 +186,24 @@ class SimControl:
 
         :param n: the simulation step that has been done.
         """
-        if not (self.paused and self.steps_wanted):
+        if not (self.paused and self._steps):
             self.end_steps()
             return
         self._stepped += 1
         if self._stepped == steps_per_tick:
-            self._stepped = 0
-            self.steps_wanted -= 1
-            done = self._steps.popleft()
-            if done is not None:
-                done.set_result(n)
+            self._end_step(n)
 
     def end_steps(self) -> None:
         """Answer the orders of steps that will not be done as such."""
-        self.steps_wanted = self._stepped = 0
         while self._steps:
-            done = self._steps.popleft()
-            if done is not None:
-                done.set_result(None)
+            self._end_step(None)
+
+    def _end_step(self, n: int | None) -> None:
+        """Answer the first order of a step; n: None if it was not done."""
+        self._stepped = 0
+        done = self._steps.popleft()
+        if done is not None:
+            done.set_result(n)
 
     def first_game(self) -> Game:
         """
@@ -293,7 +293,6 @@ class SimControl:
             return _answer(response, False, OVER)
         if not self.paused:
             return _answer(response, False, 'not paused: call /sim/pause first')
-        self.steps_wanted += 1
         if not self.begun:
             self._steps.append(None)
             return _answer(response, True, 'once the run begins')

@@ -46,13 +46,6 @@ class RunTables:
         """Read one of its tables."""
         return pq.read_table(self.folder / f'{name}.parquet')
 
-    def row(self, name: str, **equal: Any) -> dict[str, Any]:
-        """Return the first row of a table with these values; empty without one."""
-        for row in self.table(name).to_pylist():
-            if all(row[column] == value for column, value in equal.items()):
-                return dict(row)
-        return {}
-
 
 class RunTablesCache:
     """

@@ -207,7 +207,7 @@ class TrialsTable:
         humans = list(summary['humans'])
         seat = attempt.trial.condition.settings.seat
         vehicle = seat or (humans[0] if humans else None)
-        told = run.row('runs')
+        told = run.table('runs').to_pylist()[0]
         vehicles = run.table('vehicles').to_pylist()
         measures: dict[str, Any] = next((row for row in vehicles if row['id'] == vehicle), {})
         of_others = [row['plans_of_others'] for row in vehicles
