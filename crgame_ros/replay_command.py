@@ -3,7 +3,8 @@
 """The command `crgame replay`: a repetition of the recorded human against other planners."""
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 import gc
 import json
 from pathlib import Path
@@ -59,6 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def replay(values: argparse.Namespace) -> int:
     """Replay against every planner, write the runs and print the comparison."""
     from crgame_ros.analysis.criticality.recorded import measure_log
+    from crgame_ros.analysis.outcome_line import tell_outcome
+    from crgame_ros.analysis.scores.scored_drives import scores_of
     from crgame_ros.planner.registry import planner_class
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_trajectories import read_trajectories
@@ -74,7 +77,12 @@ def replay(values: argparse.Namespace) -> int:
     found: list[dict[str, Any]] = [
         {'planner': 'recorded', 'criticality': measure_log(recorded).as_dict()}]
     folder, runs = drive(values, bag, recorded)
+    # A run's last line, to be told after the table.
+    outcomes: list[Callable[[], int]] = []
     for alternative in runs:
+        scores = scores_of(alternative.record, {}, drives_only=True).vehicles
+        outcomes.append(partial(tell_outcome, _say, alternative.outcome, alternative.criticality,
+                                f'{alternative.planner}: ', scores))
         found.append(alternative.as_dict())
         # Written after each, so that a failure loses none of the others.
         (folder / 'comparison.json').write_text(
@@ -83,8 +91,8 @@ def replay(values: argparse.Namespace) -> int:
     # end.
     gc.collect()
     print('\n'.join(_table(found)))
-    print(f'files are in {folder}')
-    return 0
+    print(f'files are in {folder}', flush=True)
+    return max(tell() for tell in outcomes)
 
 
 def _check(values: argparse.Namespace) -> None:
@@ -112,8 +120,9 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
 
     def runs() -> Iterator['Alternative']:
         for name, setup in setups.items():
-            print(f'driving against {name} …', file=sys.stderr, flush=True)
-            alternative = drive_against(name, setup, recorded, values.latency, traces)
+            _say(f'driving against {name} …')
+            alternative = drive_against(name, setup, recorded, values.latency, traces,
+                                        say=_say)
             write_scenario(alternative.log, folder / f'{_file_name(name, setups)}.xml')
             yield alternative
 
@@ -123,6 +132,7 @@ def _offline(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories')
 def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') -> _Runs:
     """Replay against each planner in real time, one graph after the other."""
     from crgame_ros.analysis.counterfactual import driven_live
+    from crgame_ros.analysis.outcome_line import NO_PLANS
     folder = _make_folder(values.out, values.run)
     duration_s = (len(recorded.ks) - 1) * recorded.game.scheduler.time_step_s
 
@@ -133,12 +143,16 @@ def _live(values: argparse.Namespace, bag: Path, recorded: 'RunTrajectories') ->
                 sys.executable, '-m', 'crgame_ros.launcher.main', '--driver', f'replay:{bag}',
                 '--planner', name, '--duration', repr(duration_s), '--out', str(run),
                 *(['--headless'] if values.headless else [])], stdin=subprocess.DEVNULL)
-            if done.returncode:
+            if done.returncode not in (0, NO_PLANS):
                 raise CrgameError(f'the run against {name} ended with {done.returncode}; '
                                   f'what it said is above, its files are in {run}')
             yield driven_live(name, run, recorded)
 
     return folder, runs()
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _make_folder(out: Path | None, run: Path) -> Path:

@@ -2,25 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Repeats a recorded human against another planner, and compares the result to the recording."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import time
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.outcome_line import accepted_ratio
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
+from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_trajectories import (
-    read_trajectories,
-    RunTrajectories,
-    trajectories_of,
-)
+from crgame_ros.recording.run_record import read_run_record, run_record_of, RunRecord
+from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
-from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
 import numpy as np
@@ -36,28 +36,35 @@ class Alternative:
     A run of a recorded human against a planner.
 
     :param planner: its name, as given by the user.
-    :param log: the run on the scenario's grid.
+    :param record: the run: its motion on the scenario's grid, commands and events.
+    :param outcome: of the run: content of `timing.json`, or result of `offline_outcome`.
     :param criticality: measured in this run.
     :param human_differs_s: first time at which a human's pose differs from the recording; None:
         never [s]
     :param others_differ_s: first time at which the pose of an object that is not driven differs:
         objects that react to the AV change the scene, and the human's inputs may no longer fit
         it; None: never [s]
-    :param accepted_ratio: by AV, the share of its planner's answers that were accepted and are
-        no fallback; None where it is unknown.
-    :param contacts: the first contact of each pair, as entries of `timing.json`; None where they
-        are unknown.
     :param result: result of an offline run; None for a live one.
     """
 
     planner: str
-    log: RunTrajectories
+    record: RunRecord
+    outcome: Mapping[str, Any]
     criticality: Criticality
     human_differs_s: float | None
     others_differ_s: float | None
-    accepted_ratio: Mapping[str, float | None]
-    contacts: Sequence[Mapping[str, Any]] | None
     result: OfflineResult | None = None
+
+    @property
+    def log(self) -> RunTrajectories:
+        """Return the motion of all vehicles and objects, at the scenario's time steps."""
+        return self.record.log
+
+    @property
+    def contacts(self) -> Sequence[Mapping[str, Any]] | None:
+        """Return the first contact of each pair as in `timing.json`; None if unknown."""
+        found: Sequence[Mapping[str, Any]] | None = self.outcome['contacts']
+        return found
 
     @property
     def state_hash(self) -> str | None:
@@ -69,13 +76,16 @@ class Alternative:
         return {
             'planner': self.planner, 'state_hash': self.state_hash,
             'human_differs_s': self.human_differs_s, 'others_differ_s': self.others_differ_s,
-            'accepted_ratio': self.accepted_ratio, 'contacts': self.contacts,
+            'accepted_ratio': {av: accepted_ratio(entry)
+                               for av, entry in self.outcome['planners'].items()},
+            'contacts': self.contacts,
             'criticality': self.criticality.as_dict()}
 
 
 def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency_steps: int = 0,
                   traces: Mapping[str, FloatArray] | None = None,
-                  inputs: RecordedInputs | None = None) -> Alternative:
+                  inputs: RecordedInputs | None = None,
+                  say: Callable[[str], object] = lambda _: None) -> Alternative:
     """
     Drive a recorded human against the planner of a setup, for as long as was recorded.
 
@@ -88,14 +98,14 @@ def drive_against(planner: str, setup: Setup, recorded: RunTrajectories, latency
     :param traces: recorded states by vehicle (`recorded_states`), which the humans follow instead
         of being driven by inputs; an AV that a human had taken over then follows its planner.
     :param inputs: inputs of the humans; None for those of the recording that the setup names.
+    :param say: called with each text about a planner that fails, and about progress.
     :raises InputError: if the recording's inputs cannot be used in the setup.
     """
-    result = _drive_inputs(setup, latency_steps, inputs) if traces is None \
-        else _drive_trajectory(setup, latency_steps, traces)
-    return _compare(
-        planner, trajectories_of(result), recorded,
-        {av: record.accepted_ratio for av, record in result.planners.items()},
-        [item.as_dict() for item in contacts_of(result)], result)
+    drive = partial(run_offline, setup, latency_steps=latency_steps, clock_s=time.perf_counter,
+                    say=say, progress=Progress(say, f'driving against {planner}'))
+    result = _drive_inputs(drive, setup, inputs) if traces is None \
+        else _drive_trajectory(drive, setup, traces)
+    return _compare(planner, run_record_of(result), offline_outcome(result), recorded, result)
 
 
 def driven_live(planner: str, folder: Path, recorded: RunTrajectories) -> Alternative:
@@ -105,45 +115,35 @@ def driven_live(planner: str, folder: Path, recorded: RunTrajectories) -> Altern
     :raises InputError: if its recording cannot be used.
     """
     bag = recording_in(folder)
-    log = read_trajectories(bag)
-    report = timing_report(bag, log=log)
-    return _compare(planner, log, recorded, {
-        av: None if told['accepted'] is None or not told['plans'] else
-        max(0, told['accepted'] - (told['fallback'] or 0)) / told['plans']
-        for av, told in report['planners'].items()}, report['contacts'])
+    record = read_run_record(bag)
+    return _compare(planner, record, timing_report(bag, log=record.log), recorded)
 
 
-def _drive_inputs(setup: Setup, latency_steps: int,
+def _drive_inputs(drive: Callable[..., OfflineResult], setup: Setup,
                   inputs: RecordedInputs | None) -> OfflineResult:
     drivers, intervals_s = inputs or recorded_inputs(setup)
     if intervals_s is None:
         raise InputError('no vehicle in it is driven by a recording', 'driver', 'give replay:BAG')
-    return run_offline(setup, duration_s=len(intervals_s) * setup.scheduler.dt_s,
-                       latency_steps=latency_steps, drivers=drivers, intervals_s=intervals_s,
-                       clock_s=time.perf_counter)
+    return drive(duration_s=len(intervals_s) * setup.scheduler.dt_s, drivers=drivers,
+                 intervals_s=intervals_s)
 
 
-def _drive_trajectory(setup: Setup, latency_steps: int,
+def _drive_trajectory(drive: Callable[..., OfflineResult], setup: Setup,
                       traces: Mapping[str, FloatArray]) -> OfflineResult:
     humans = {human.id: traces[human.id] for human in setup.humans}
     steps = min(map(len, humans.values())) - 1
-    return run_offline(setup, duration_s=steps * setup.scheduler.dt_s,
-                       latency_steps=latency_steps, traces=humans,
-                       drivers={human: IdleDriver() for human in humans},
-                       clock_s=time.perf_counter)
+    return drive(duration_s=steps * setup.scheduler.dt_s, traces=humans,
+                 drivers={human: IdleDriver() for human in humans})
 
 
-def _compare(planner: str, log: RunTrajectories, recorded: RunTrajectories,
-             accepted_ratio: Mapping[str, float | None],
-             contacts: Sequence[Mapping[str, Any]] | None,
-             result: OfflineResult | None = None) -> Alternative:
-    humans = len(recorded.game.humans)
+def _compare(planner: str, record: RunRecord, outcome: Mapping[str, Any],
+             recorded: RunTrajectories, result: OfflineResult | None = None) -> Alternative:
+    log, humans = record.log, len(recorded.game.humans)
     return Alternative(
-        planner, log, measure_log(log),
+        planner, record, outcome, measure_log(log),
         _differs_s(log, recorded, log.published_states[:, :humans, :3],
                    recorded.published_states[:, :humans, :3]),
-        _differs_s(log, recorded, log.object_poses, recorded.object_poses),
-        accepted_ratio, contacts, result)
+        _differs_s(log, recorded, log.object_poses, recorded.object_poses), result)
 
 
 def _differs_s(log: RunTrajectories, recorded: RunTrajectories, found: NDArray[np.float64],

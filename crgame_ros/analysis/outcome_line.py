@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run in one line, and the AVs whose planners never drove; the same for live and offline."""
+"""A run in one line, and the AVs whose planners never drove; alike live, offline and replayed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -62,6 +62,17 @@ def undriven(outcome: Mapping[str, Any]) -> list[str]:
     return [f'{av}: no plan of its planner was driven: {_why(entry)}'
             for av, entry in outcome['planners'].items()
             if entry['requests'] and not _driven(entry)]
+
+
+def accepted_ratio(entry: Mapping[str, Any]) -> float | None:
+    """
+    Return the share of a planner's answers that were accepted and are no fallback.
+
+    :param entry: of an AV in `timing.json`.
+    :return: None where it is unknown.
+    """
+    known = entry['accepted'] is not None and entry['plans']
+    return _driven(entry) / entry['plans'] if known else None
 
 
 def _driven(entry: Mapping[str, Any]) -> int:

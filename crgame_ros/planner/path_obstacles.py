@@ -172,7 +172,8 @@ class ObstacleProjector:
         distance = np.hypot(origin[:, 0, None] - line[None, :, 0],
                             origin[:, 1, None] - line[None, :, 1])
         limit = reach + self._radii + corridor.half_width + corridor.aside + 6.0
-        nearest = np.where(present.any(axis=0), distance.min(axis=1), np.inf)
+        # An ego far beyond the path's end has no part of it, and no obstacle, near it.
+        nearest = np.where(present.any(axis=0), distance.min(axis=1, initial=np.inf), np.inf)
         return np.flatnonzero(nearest < limit)
 
 

@@ -110,6 +110,15 @@ class _Planner(package.ReactivePlanner):
         return found
 
 
+def _off(position: PathPosition, length: float) -> str:
+    """Tell on which side of a path a vehicle is, and how far."""
+    if position.s > length:
+        return f'{position.s - length:.0f} m beyond the end of'
+    if position.s < 0.0:
+        return f'{-position.s:.0f} m before the start of'
+    return f'{abs(position.d):.0f} m beside'
+
+
 class ReactiveCore:
     """
     The package's planner on a driving path, for one request after the other.
@@ -154,8 +163,8 @@ class ReactiveCore:
             self._clearance.update(request, self._steps + 1)
         system = self._system
         if not system.cartesian_point_inside_projection_domain(ego.x, ego.y):
-            raise PlanningError(f'the vehicle is {abs(position.d):.0f} m beside its path, too far '
-                                "for the package's coordinates")
+            raise PlanningError(f'the vehicle is {_off(position, driving.path.length)} its path, '
+                                "too far for the package's coordinates")
         here = system.convert_to_curvilinear_coords(ego.x, ego.y)
         heading = float(np.interp(here[0], system.ref_pos, system.ref_theta))
         # The package compares headings without wrapping them.

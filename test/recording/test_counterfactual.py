@@ -5,8 +5,10 @@
 from collections.abc import Callable
 import json
 from pathlib import Path
+import re
 from typing import Any
 
+from crgame_ros.analysis.outcome_line import NO_PLANS
 from crgame_ros.cli import main
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
@@ -40,6 +42,21 @@ class Standing(ConstantVelocityPlanner):
 
     def plan(self, request):
         return replace(braking_plan(request, None, self.vehicle), fallback=False)
+'''
+FAILING_PLANNER = '''
+from crgame_ros import Planner
+
+
+class Failing(Planner):
+    """Knows no way."""
+
+    name = 'failing'
+
+    def setup(self, context):
+        pass
+
+    def plan(self, request):
+        raise ValueError('no way')
 '''
 PLANNERS = {'cut_in': 'idm', 'occluded_pedestrian': 'idm', 'dense_merge': 'idm'}
 
@@ -80,7 +97,11 @@ def test_the_same_human_against_the_same_planner_and_another(
     own = PLANNERS[name]
     assert main(['replay', str(folder), '--planner', own, '--planner', 'own.py:Mine',
                  '--out', 'out']) == 0
-    text = capsys.readouterr().out
+    text, told = capsys.readouterr()
+    own_line, other_line = told.splitlines()[-2:]
+    assert own_line.startswith(f'{own}: ') and other_line.startswith('own.py:Mine: ')
+    assert all(re.search(r'80 of 80 plans accepted, nuPlan score hv0 [0-9.]+, av0', line)
+               for line in (own_line, other_line))
     recorded, same, other = json.loads(Path('out/comparison.json').read_text())
     assert same['state_hash'] == result.state_hash != other['state_hash']
     assert same['human_differs_s'] is same['others_differ_s'] is other['human_differs_s'] is None
@@ -94,6 +115,23 @@ def test_the_same_human_against_the_same_planner_and_another(
     for file in ('idm.xml', 'own_py_Mine.xml'):
         written = load_scenario(Path('out') / file).scenario
         assert len(written.dynamic_obstacles) >= 2
+
+
+@pytest.mark.slow
+def test_a_planner_that_fails_is_told_of_and_costs_the_others_nothing(
+        record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, _ = record('cut_in')
+    (tmp_path / 'failing.py').write_text(FAILING_PLANNER)
+    failing = f'{tmp_path / "failing.py"}:Failing'
+    assert main(['replay', str(folder), '--planner', failing, '--planner', 'idm',
+                 '--out', str(tmp_path / 'out')]) == NO_PLANS
+    *_, error, own_line, other_line = told = capsys.readouterr().err.splitlines()
+    assert f'  File "{tmp_path / "failing.py"}", line 14, in plan' in told
+    assert error == 'error: av0: no plan of its planner was driven: ValueError: no way'
+    assert own_line.startswith(f'{failing}: ') and '0 of 80 plans' in own_line
+    assert other_line.startswith('idm: ') and '80 of 80 plans' in other_line
+    _, fails, drives = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert (fails['accepted_ratio'], drives['accepted_ratio']) == ({'av0': 0.0}, {'av0': 1.0})
 
 
 @pytest.mark.exhaustive

@@ -58,7 +58,7 @@ def test_jump_and_gap_are_found(idm: MultiAvRun, moved: float) -> None:
     states = idm.run.log.vehicle_states.copy()
     states[40, 2, :2] += moved
     log: RunTrajectories = replace(idm.run.log, vehicle_states=states)
-    run = replace(idm, run=replace(idm.run, log=log))
+    run = replace(idm, run=replace(idm.run, record=replace(idm.run.record, log=log)))
     assert 'one time line without a jump' in _unmet(run)
 
 
@@ -74,7 +74,8 @@ def test_step_and_speed(idm: MultiAvRun) -> None:
 
 def test_contact_is_found(idm: MultiAvRun) -> None:
     """Contacts are told with both names."""
-    touched = replace(idm, run=replace(idm.run, contacts=[{'vehicle': 'av1', 'with': 'av0'}]))
+    outcome = {**idm.run.outcome, 'contacts': [{'vehicle': 'av1', 'with': 'av0'}]}
+    touched = replace(idm, run=replace(idm.run, outcome=outcome))
     judged = judge_multi_av([('x', touched)])
     assert [each.line for each in judged if not each.is_met] == [
         'UNMET: two AVs, x: no contact: av1 with av0']
