@@ -13,6 +13,7 @@ import warnings
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.python_interface.games import as_path, FileName
+from crgame_ros.python_interface.named import Named
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
@@ -29,6 +30,9 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.tables.table_run import TableRun
     from crgame_ros.recording.recorded_plans import RecordedPlan
     import pyarrow as pa
+
+# In messages.
+VEHICLE = 'driven vehicle'
 
 
 class Run(ABC):
@@ -117,11 +121,10 @@ class Run(ABC):
         """
         Return the rear-axle states (K, 8) of a driven vehicle, columns as in `StateColumn`.
 
-        :raises KeyError: if it is not in the run.
+        :raises KeyError: if it is not in the run; it tells which are.
         """
-        if vehicle_id not in self.vehicles:
-            raise KeyError(vehicle_id)
-        return self.log.vehicle_states[:, self.vehicles.index(vehicle_id)]
+        columns = Named(VEHICLE, ((name, at) for at, name in enumerate(self.vehicles)))
+        return self.log.vehicle_states[:, columns[vehicle_id]]
 
     @property
     def _offline(self) -> Mapping[str, Any] | None:
@@ -165,7 +168,7 @@ class Run(ABC):
         thresholds.check()
         found = self.usual_criticality if thresholds == USUAL else measure_log(
             self.log, thresholds)
-        return {each.vehicle_id: each for each in found.report()}
+        return Named(VEHICLE, ((each.vehicle_id, each) for each in found.report()))
 
     def behaviour(self, requests: Collection[str] = ()) -> 'dict[str, DriverBehaviour]':
         """
@@ -177,8 +180,8 @@ class Run(ABC):
         from crgame_ros.analysis.behaviour.driver import measure_behaviour
         from crgame_ros.analysis.run_measures import check_requests
         check_requests(self.record, requests)
-        return {each.vehicle_id: each
-                for each in measure_behaviour(self.record, requests=requests)}
+        return Named(VEHICLE, ((each.vehicle_id, each) for each in measure_behaviour(
+            self.record, requests=requests)))
 
     def scores(self, expert: 'Run | None' = None) -> 'dict[str, VehicleScores]':
         """
@@ -191,7 +194,7 @@ class Run(ABC):
         from crgame_ros.analysis.scores.scored_run import score_run
         measure = None if expert is None else expert_of_run(expert.log, self.log, expert.name)
         found = score_run(self.record, expert=measure, plans=self.answers)
-        return {each.vehicle_id: each for each in found.vehicles}
+        return Named(VEHICLE, ((each.vehicle_id, each) for each in found.vehicles))
 
     def tables(self, scores: bool = True) -> 'dict[str, pa.Table]':
         """
@@ -200,7 +203,7 @@ class Run(ABC):
         :param scores: whether vehicles are scored, which takes most of the time.
         """
         from crgame_ros.analysis.tables.run_tables import tables_of
-        return tables_of([self.tabulated(scores)])
+        return Named('table', tables_of([self.tabulated(scores)]))
 
     def tabulated(self, scores: bool = True) -> 'TableRun':
         """Return the run in the form for tables."""

@@ -11,6 +11,7 @@ from crgame_ros.errors import InputError
 from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import argument_names, FileName
+from crgame_ros.python_interface.named import Named
 from crgame_ros.python_interface.offline_runs import OfflineRun
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.python_interface.recorded_runs import as_run
@@ -42,7 +43,7 @@ class ReplayedRun(OfflineRun):
         return self.alternative.others_differ_s
 
 
-class Replays(dict[str, ReplayedRun]):
+class Replays(Named[ReplayedRun]):
     """
     Runs by the names of their planners, in the requested order.
 
@@ -50,7 +51,7 @@ class Replays(dict[str, ReplayedRun]):
     """
 
     def __init__(self, recorded: Run) -> None:
-        super().__init__()
+        super().__init__('planner')
         self.recorded = recorded
 
     def _repr_html_(self) -> str:

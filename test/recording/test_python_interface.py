@@ -6,6 +6,7 @@ import ast
 from dataclasses import replace
 import json
 from pathlib import Path
+import pickle
 import re
 import subprocess
 import sys
@@ -220,6 +221,21 @@ def test_what_cannot_be_used_is_an_input_error(arguments: dict[str, Any], said: 
     with pytest.raises(crgame_ros.InputError) as caught:
         crgame_ros.run(**{'game': CUT_IN, 'duration_s': 0.2, **arguments})
     assert said in str(caught.value) and len(str(caught.value).splitlines()) == 1
+
+
+def test_a_wrong_name_is_answered_with_those_that_there_are(run: OfflineRun) -> None:
+    replays = crgame_ros.replay(run, 'idm')
+    for look, said in (
+            (lambda: run.states_of('av9'), "no driven vehicle 'av9'; there are: hv0, av0"),
+            (lambda: run.criticality()['hv1'], "no driven vehicle 'hv1'; there are: hv0, av0"),
+            (lambda: run.behaviour()['hv1'], "no driven vehicle 'hv1'; there are: hv0, av0"),
+            (lambda: run.scores()[0], 'no driven vehicle 0; there are: hv0, av0'),
+            (lambda: run.tables(scores=False)['state'], "no table 'state'; there are: runs, "),
+            (lambda: replays['reactive'], "no planner 'reactive'; there are: idm")):
+        with pytest.raises(KeyError, match=re.escape(said)):
+            look()
+    assert run.criticality().get('hv1') is None
+    assert pickle.loads(pickle.dumps(run.criticality())) == run.criticality()
 
 
 def test_refusals_of_what_is_made_of_runs(run: OfflineRun, tmp_path: Path) -> None:
