@@ -45,6 +45,7 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
     :param dashboard: port of Dask's page, on the loopback; None for no page.
     :return: a `distributed.Client`.
     :raises InputError: if the scheduler does not answer.
+    :raises CrgameError: if a worker process ended while it started.
     """
     require_dask()
     import dask
@@ -71,12 +72,17 @@ def dask_client(scheduler: str | None, workers: int, dashboard: int | None) -> I
         'distributed.worker.preload': [PRELOAD],
         'distributed.admin.large-graph-warning-threshold': '1 GB'}
     with dask.config.set(settings):
-        cluster = LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, host='127.0.0.1',
-            # The scheduler serves its health page in any case: on the loopback only, at any port.
-            dashboard_address=f'127.0.0.1:{dashboard or 0}', worker_dashboard_address=None,
-            scheduler_kwargs={'dashboard': dashboard is not None},
-            security=Security.temporary(), silence_logs=logging.CRITICAL, memory_limit=0)
+        try:
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, host='127.0.0.1',
+                # The scheduler serves its health page in any case: on the loopback, at any port.
+                dashboard_address=f'127.0.0.1:{dashboard or 0}', worker_dashboard_address=None,
+                scheduler_kwargs={'dashboard': dashboard is not None},
+                security=Security.temporary(), silence_logs=logging.CRITICAL, memory_limit=0)
+        except (OSError, RuntimeError) as error:
+            raise CrgameError(f'the {workers} worker processes did not start ({error}): give the '
+                              'command again, with fewer --workers if it happens again') \
+                from error
         with cluster, Client(cluster, set_as_default=False) as client:
             yield client
 

@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Dask runs what it is sent: only the one that started it may send."""
 
+from pathlib import Path
 import socket
 import ssl
 from urllib.parse import urlparse
 
+from crgame_ros.errors import CrgameError
+from crgame_ros.evaluation import dask_cluster
 from crgame_ros.evaluation.dask_cluster import dask_client
+import psutil
 import pytest
 
 
@@ -32,6 +36,18 @@ def test_a_stranger_on_this_machine_reaches_neither_scheduler_nor_worker() -> No
                 # With TLS 1.3 the refusal comes after the handshake.
                 encrypted.recv(1)
                 raise AssertionError('a stranger got an answer')
+
+
+def test_a_worker_that_ends_at_its_start_is_told_in_a_line(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a worker loads kills it, as another process might."""
+    (tmp_path / 'deadly.py').write_text('import os\n\nos.kill(os.getpid(), 9)\n')
+    monkeypatch.setattr(dask_cluster, 'PRELOAD', str(tmp_path / 'deadly.py'))
+    with pytest.raises(CrgameError, match=r'the 1 worker processes did not start .*--workers'), \
+            dask_client(None, 1, None):
+        raise AssertionError('it started')
+    assert not any('spawn_main' in ' '.join(child.cmdline())
+                   for child in psutil.Process().children(recursive=True))
 
 
 def _all_of(connection: socket.socket) -> bytes:
