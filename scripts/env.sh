@@ -37,12 +37,23 @@ print("%d.%d" % sys.version_info[:2], getattr(sys, "_base_executable", sys.execu
     return 2
 }
 
-# Print the prefix of the sourced Jazzy that has rclpy for the chosen Python.
-_crgame_sourced_ros() {
+# Whether an installed Jazzy is sourced, and not the wheels of an environment.
+_crgame_installed_ros() {
     local entry
     [[ ${ROS_DISTRO:-} == jazzy ]] || return 1
     for entry in ${AMENT_PREFIX_PATH//:/ }; do
-        [[ ! -d $entry/lib/python$version/site-packages/rclpy ]] || return 0
+        [[ ! -e $entry/share/rclpy || -e $entry/pyvenv.cfg ]] || return 0
+    done
+    return 1
+}
+
+# Whether the sourced Jazzy has rclpy for the chosen Python.
+_crgame_sourced_ros() {
+    local entry
+    _crgame_installed_ros || return 1
+    for entry in ${AMENT_PREFIX_PATH//:/ }; do
+        [[ ! -d $entry/lib/python$version/site-packages/rclpy || -e $entry/pyvenv.cfg ]] ||
+            return 0
     done
     _crgame_say "the sourced ROS 2 Jazzy has no rclpy for Python $version: taking ROS from wheels"
     return 1
@@ -82,7 +93,7 @@ _crgame_export_wheels() {
     for libraries in "$venv"/lib/python*/site-packages/ros_*.libs "$venv/lib"; do
         _crgame_prepend LD_LIBRARY_PATH "$libraries"
     done
-    export _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 RMW_IMPLEMENTATION=rmw_fastrtps_cpp
+    export ROS_DISTRO=jazzy _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 RMW_IMPLEMENTATION=rmw_fastrtps_cpp
 }
 
 _crgame_export_network() {
@@ -103,7 +114,7 @@ _crgame_main() {
     local root venv ros=wheels wanted python='' version='' pins
     root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P) || return 1
     venv=$root/.venv
-    if [[ ${ROS_DISTRO:-} == jazzy || -n ${PYTHON:-} || ! -x $venv/bin/python ]]; then
+    if [[ -n ${PYTHON:-} || ! -x $venv/bin/python ]] || _crgame_installed_ros; then
         _crgame_choose_python || return
         ! _crgame_sourced_ros || ros=jazzy venv=$root/.venv-jazzy
         [[ ! -e $venv/stamp || -e $venv/bin/python$version ]] || venv+=-$version

@@ -66,7 +66,7 @@ install() {
 pins=$root/requirements.txt
 [[ ${CRGAME_DEVELOP:-} != 1 ]] || pins=$root/requirements-dev.txt
 # The lines of a package with its hashes are one for sed and grep.
-sed -e ':a' -e '/\\$/{N;ba}' "$pins" | grep -v "$without" >"$venv/requirements.txt"
+sed -e ':a' -e '/\\$/{N;s/\\\n//;ba}' "$pins" | grep -v "$without" >"$venv/requirements.txt"
 # A line for each large download, not one for each of a hundred packages.
 install -r "$venv/requirements.txt" 2> >(grep -v '^ [-+~] ' >&2) || fail "$unreachable"
 # 45 MB that are never used: ROS headers, as nothing is compiled against them, and tests of packages.

@@ -288,6 +288,8 @@ def test_env_sets_the_environment_once(tmp_path: Path) -> None:
     assert values['FASTDDS_DEFAULT_PROFILES_FILE'] == profile
     assert values['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     assert values['RMW_IMPLEMENTATION'] == 'rmw_fastrtps_cpp'
+    # Named for the tools of ROS, which makes no installed Jazzy of the wheels.
+    assert values['ROS_DISTRO'] == 'jazzy'
     assert values['PYTHONPATH'] == str(tree)
     assert values['MPLBACKEND'] == 'Agg'
     assert values['OMP_NUM_THREADS'] == values['OPENBLAS_NUM_THREADS'] == '1'
@@ -317,6 +319,28 @@ def test_env_keeps_another_ros_apart(tmp_path: Path) -> None:
     assert str(other) not in done.stdout
     assert ':/mine ' in done.stdout
     assert ':/lib/mine' in done.stdout
+
+
+def test_env_takes_an_installed_jazzy_and_no_wheels_of_another_checkout(tmp_path: Path) -> None:
+    trees = [_stamped(tmp_path / name) for name in ('one', 'two')]
+    jazzy = tmp_path / 'jazzy'
+    package = Path('lib', f'python{sys.version_info.major}.{sys.version_info.minor}',
+                   'site-packages', 'rclpy')
+    for tree in (*(tree / '.venv' for tree in trees), jazzy):
+        (tree / package).mkdir(parents=True, exist_ok=True)
+        (tree / 'share' / 'rclpy').mkdir(parents=True)
+    for tree in trees:
+        (tree / '.venv' / 'pyvenv.cfg').touch()
+    (trees[1] / '.venv' / 'bin' / package.parts[1]).symlink_to(sys.executable)
+    (trees[1] / '.venv-jazzy').symlink_to('.venv')
+    again = f'source "{trees[1]}/scripts/env.sh"; echo "$CRGAME_PYTHON $AMENT_PREFIX_PATH"'
+    # PYTHON has the shell look for a ROS for that Python again.
+    for python in ({}, {'PYTHON': sys.executable}):
+        done = _source(trees[0], again, **python)
+        assert done.stdout == f'{trees[1]}/.venv/bin/python {trees[1]}/.venv\n', done.stderr
+        done = _source(trees[1], again, ROS_DISTRO='jazzy', AMENT_PREFIX_PATH=str(jazzy), **python)
+        assert done.stdout == f'{trees[1]}/.venv-jazzy/bin/python {jazzy}\n', done.stderr
+        assert not done.stderr
 
 
 def test_env_refuses_other_pythons(tmp_path: Path) -> None:
@@ -396,6 +420,30 @@ def test_ctrl_c_while_packages_are_installed_is_one_line(tmp_path: Path) -> None
         os.killpg(process.pid, signal.SIGINT)
         assert process.stderr.read() == 'crgame: stopped; the next start goes on from here\n'
     assert process.returncode == 130
+
+
+@pytest.mark.parametrize('ros', ['wheels', 'jazzy'])
+def test_an_installed_jazzy_takes_the_place_of_its_wheels_alone(tmp_path: Path, ros: str) -> None:
+    """All other packages are installed, each line with its version and hashes."""
+    tree = _copy(tmp_path, 'scripts/make_venv.sh', *PINS)
+    uv = tmp_path / 'programs' / 'uv'
+    uv.parent.mkdir()
+    # Ends where the packages would be installed.
+    uv.write_text('#!/bin/sh\ncase "$*" in pip*) exit 1;; esac\n')
+    uv.chmod(0o755)
+    done = subprocess.run(
+        [tree / 'scripts' / 'make_venv.sh', tree / '.venv', sys.executable, ros, 'none'],
+        env=os.environ | {'PATH': f'{uv.parent}:{os.environ["PATH"]}'}, capture_output=True,
+        text=True)
+    assert done.returncode == 1 and 'the packages are not installed' in done.stderr
+    wanted = re.findall(r'^\w\S+==\S+', (ROOT / 'requirements.txt').read_text(), re.MULTILINE)
+    if ros == 'jazzy':
+        wanted = [pin for pin in wanted if not pin.startswith('ros-')]
+    lines = (tree / '.venv' / 'requirements.txt').read_text().splitlines()
+    lines = [line for line in lines if line and not line.startswith('#')]
+    assert [line.split()[0] for line in lines] == wanted
+    assert all(re.fullmatch(r'[^#]+==\S+( ;[^#]+?)?(\s+--hash=sha256:[0-9a-f]{64})+', line)
+               for line in lines)
 
 
 def test_help_needs_no_environment(tmp_path: Path) -> None:

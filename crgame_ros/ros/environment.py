@@ -91,6 +91,8 @@ def prepare_environment() -> None:
     if prefix is not None:
         _prepend('AMENT_PREFIX_PATH', str(prefix))
         os.environ.setdefault('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp')
+        # ROS tools that are started from here ask for it.
+        os.environ['ROS_DISTRO'] = 'jazzy'
     if network_is_open():
         return
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
