@@ -56,7 +56,7 @@ class FailureLines:
         """
         if timed_out > self._timed_out:
             self._tell('its planner is slow or gone',
-                       f'no answer in {limit_s:g} s, to {timed_out} requests so far')
+                       f'no answer in {limit_s:g} s, requests so far without one: {timed_out}')
         self._timed_out = timed_out
 
     def refuse(self, reason: str | None) -> None:

@@ -127,7 +127,7 @@ def _too_fast(states: NDArray[np.float64]) -> NDArray[np.float64]:
 LIES: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     'x of state 3 is nan': _with_nan,
     'the first state is 5.00 m from the vehicle': _elsewhere,
-    'jump of 3.00 m at state 5': _with_jump,
+    'jump of 3.00 m from where its speed leads in 0.1 s at state 5': _with_jump,
     'm/s beyond the limit': _too_fast,
 }
 

@@ -91,4 +91,5 @@ def test_requests_without_an_answer_are_told_of() -> None:
     lines = FailureLines('av0', said.append)
     for timed_out in (0, 0, 2, 2, 3):
         lines.wait(timed_out, 1.0)
-    assert said == ['av0: its planner is slow or gone: no answer in 1 s, to 2 requests so far']
+    assert said == [
+        'av0: its planner is slow or gone: no answer in 1 s, requests so far without one: 2']

@@ -121,7 +121,7 @@ def one_state(request: JointSeries) -> JointSeries:
 
 BAD = [
     (spoilt(nan_in_the_middle), 'y of state 7 is nan'),
-    (spoilt(jump), 'jump of 2.00 m at state 5'),
+    (spoilt(jump), 'jump of 2.00 m from where its speed leads in 0.1 s at state 5'),
     (spoilt(elsewhere), 'the first state is 1.00 m from the vehicle'),
     (spoilt(too_fast), 'speed of .* beyond the limit'),
     (spoilt(too_tight), 'lateral acceleration of 80.00'),
