@@ -34,6 +34,7 @@ class _Tool(NamedTuple):
 RUN, OFFLINE = 'run a game live, as ./run.sh does', 'run a game as fast as it can, without ROS'
 CONVERT = 'turn a recording into a CommonRoad scenario'
 RECOVER, INFO = 'finish a recording whose recorder was killed', 'what is in a recording'
+RECORDING = 'folder of a run, or its recording: a folder or file'
 DOCTOR = 'what is missing on this machine, and the remedy'
 TOOLS = (
     _Tool('measure', 'how critical a recorded run was, and how people drove',
@@ -120,7 +121,7 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
     commands.add_parser('run', help=RUN)
     _add_offline(commands.add_parser('offline', help=OFFLINE))
     convert = commands.add_parser('convert', help=CONVERT)
-    convert.add_argument('bag', type=Path, help='folder or file of the recording')
+    convert.add_argument('bag', type=_recording, help=RECORDING)
     convert.add_argument('--out', type=Path, metavar='PATH',
                          help='file to write (*.xml), or folder for <benchmark id>.xml (default: '
                          'beside the recording)')
@@ -128,10 +129,10 @@ def _build_parser(chosen: str) -> argparse.ArgumentParser:
                          '(resets count them from 0; default: the last)')
     convert.set_defaults(command=_convert)
     recover = commands.add_parser('recover', help=RECOVER)
-    recover.add_argument('bag', type=Path, help='folder or .mcap file')
+    recover.add_argument('bag', type=_recording, help=RECORDING)
     recover.set_defaults(command=_recover)
     info = commands.add_parser('info', help=INFO)
-    info.add_argument('bag', type=Path, help='folder or file of the recording')
+    info.add_argument('bag', type=_recording, help=RECORDING)
     info.set_defaults(command=_info)
     for tool in TOOLS:
         command = commands.add_parser(tool.name, help=tool.does)
@@ -164,6 +165,11 @@ def _add_offline(parser: argparse.ArgumentParser) -> None:
     add('--out', type=Path, metavar='PATH',
         help='write the run as a CommonRoad scenario: a file (*.xml) or a folder')
     parser.set_defaults(command=_offline)
+
+
+def _recording(text: str) -> Path:
+    from crgame_ros.recording.run_folder import recording_in
+    return recording_in(Path(text))
 
 
 def _trigger(text: str) -> tuple[str, float]:

@@ -32,9 +32,9 @@ examples:
   ./run.sh                                        the cut-in game
   ./run.sh scenarios/merge.yaml --driver evdev    drive the merge yourself
   ./run.sh --scenario FILE.xml --planner reactive --duration 30
-  ./run.sh --driver replay:runs/NAME/bag --planner reactive
+  ./run.sh --driver replay:runs/NAME --planner reactive
                                                   a recorded game again, against another planner
-  ./run.sh --replay runs/NAME/bag                 look at a recording, with a time line
+  ./run.sh --replay runs/NAME                     look at a recording, with a time line
 
 driver sources: cockpit (the run waits for a person in the browser), auto (wheel, gamepad or
 keyboard, whichever is found), evdev[:NAME], keys:FILE, joy:FILE (scripted), joy (an external joy

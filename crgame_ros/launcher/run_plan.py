@@ -29,6 +29,7 @@ from crgame_ros.recording.recorded_inputs import (
     replay_notices,
     with_replayed_events,
 )
+from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.registry import POLICY
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.recorded_humans import plays_its_humans
@@ -190,7 +191,7 @@ def _own_recording(request: RunRequest) -> Path | None:
     if request.driver is None or request.game is not None or request.scenario is not None:
         return None
     source = parse_source(request.driver)
-    return Path(source.argument).expanduser() if source.kind == 'replay' else None
+    return recording_in(Path(source.argument).expanduser()) if source.kind == 'replay' else None
 
 
 def _from_here(driver: str) -> str:

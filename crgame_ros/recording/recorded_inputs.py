@@ -16,6 +16,7 @@ from crgame_ros.game.game import Game
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.run_cycles import replay_inputs
+from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.simulation.setup import Setup
@@ -147,4 +148,4 @@ def with_replayed_events(setup: Setup) -> Setup:
 
 def _bag(setup: Setup, source: SourceSpec) -> Path:
     """Return the recording that a source names, relative to the game file."""
-    return setup.game.base / Path(source.argument).expanduser()
+    return recording_in(setup.game.base / Path(source.argument).expanduser())

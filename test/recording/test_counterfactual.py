@@ -184,6 +184,20 @@ def test_a_human_without_inputs_takes_its_recorded_way(
     assert gaps[2]['value'] > gaps[0]['value'] + 1.0
 
 
+def test_a_run_is_named_by_its_folder_or_its_recording(
+        record: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, result = record('cut_in')
+    for words in (('info',), ('recover',), ('convert', '--out', str(tmp_path / 'run.xml'))):
+        said = []
+        for place in (folder, folder / 'bag'):
+            assert main([words[0], str(place), *words[1:]]) == 0
+            said.append(capsys.readouterr())
+        assert said[0] == said[1]
+    assert main(['offline', '--driver', f'replay:{folder}', '--planner', PLANNERS['cut_in'],
+                 '--duration', '8']) == 0
+    assert json.loads(capsys.readouterr().out)['state_hash'] == result.state_hash
+
+
 @pytest.mark.parametrize('words', [
     ('missing', '--planner', 'idm'), ('{run}', '--planner', 'nobody'), ('{run}',),
     ('{run}', '--planner', 'idm', '--latency', '-1'),
