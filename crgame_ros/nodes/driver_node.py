@@ -26,7 +26,7 @@ from crgame_ros.ros.live_force import LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.seat import GAME
-from crgame_ros.ros.spinning import prompt_executor, PromptNode, spin
+from crgame_ros.ros.spinning import PromptNode, spin_promptly
 from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
@@ -92,7 +92,7 @@ class DriverNode(PromptNode):
         watcher.start()
         try:
             # An input must not miss the cycle that it is meant for.
-            spin(self, stop, prompt_executor())
+            spin_promptly(self, stop)
         finally:
             self._running = False
             watcher.join()

@@ -19,7 +19,7 @@ LOOK_S = 0.1
 
 
 class PromptNode(Node):
-    """A node for `prompt_executor`, which may still poll some of its subscriptions."""
+    """A node for `spin_promptly`, which may still poll some of its subscriptions."""
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
@@ -54,28 +54,27 @@ def serve(node: Node, executor: Executor, timeout_s: float) -> None:
     attempt(node, lambda: executor.spin_once(timeout_sec=timeout_s))
 
 
-def prompt_executor() -> Executor:
+def spin(node: Node, stop: StopFlag) -> None:
+    """Run a node's callbacks until asked to stop."""
+    _spin(node, stop, SingleThreadedExecutor())
+
+
+def spin_promptly(node: PromptNode, stop: StopFlag) -> None:
     """
-    Return the executor that runs a callback soonest after its message has come.
+    Run each callback of a node as soon as its message has come, until asked to stop.
 
     rclpy's events executor costs 70 µs per message, the ordinary one 260 µs. It knows no callback
-    groups, so its nodes are PromptNodes. An older rclpy without it uses the ordinary one.
+    groups, so it is for PromptNodes alone. An older rclpy without it uses the ordinary one.
     """
     try:
         from rclpy.experimental import EventsExecutor
     except ImportError:
-        return SingleThreadedExecutor()
-    executor: Executor = EventsExecutor()
-    return executor
+        spin(node, stop)
+    else:
+        _spin(node, stop, EventsExecutor())
 
 
-def spin(node: Node, stop: StopFlag, executor: Executor | None = None) -> None:
-    """
-    Run a node's callbacks until asked to stop.
-
-    :param executor: the ordinary one where None.
-    """
-    executor = executor or SingleThreadedExecutor()
+def _spin(node: Node, stop: StopFlag, executor: Executor) -> None:
     executor.add_node(node)
     while not stop.requested:
         serve(node, executor, LOOK_S)

@@ -4,7 +4,7 @@
 
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.node_main import StopFlag
-from crgame_ros.ros.spinning import prompt_executor, PromptNode, spin
+from crgame_ros.ros.spinning import PromptNode, spin_promptly
 from live_peer import Peer
 import rclpy
 from ros_domains import own_domain_id
@@ -32,7 +32,7 @@ def test_a_prompt_node_runs_callbacks_and_leaves_polled_messages_alone() -> None
         publisher = peer.publisher('/trigger')
         peer.wait_until(lambda: publisher.get_subscription_count() == 2, 'both subscriptions')
         publisher.publish(String(data=sent[0]))
-        spin(node, stop, prompt_executor())
+        spin_promptly(node, stop)
         assert [message.data for message in iter(polled.pop, None)] == sent
         node.destroy_subscription(kept)
     node.destroy_node()
