@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files broken in one or two places: YAML by its values and by its text, anything by its bytes."""
+"""Files broken in one or two places: YAML and JSON by values and text, anything by bytes."""
 
 from collections.abc import Iterator
 from copy import deepcopy
+import json
 import math
 import random
 from typing import Any
@@ -37,6 +38,16 @@ def broken_yaml(text: bytes, dice: random.Random) -> tuple[bytes, str]:
     for place, raw in enumerate(TEXTS):
         data = data.replace(f'RAW{place}WAR'.encode(), raw.encode())
     return data, ' and '.join(done)
+
+
+def broken_json(text: bytes, dice: random.Random) -> tuple[bytes, str]:
+    """Break a JSON file, or one line of a file with such a line for each entry."""
+    parts = [text] if text.startswith(b'{\n') else text.splitlines()
+    number = dice.randrange(len(parts))
+    document = json.loads(parts[number])
+    done = dice.choice((_value, _value, _value, _delete, _double, _swap))(document, dice)
+    parts[number] = json.dumps(document).encode('utf-8')
+    return b'\n'.join(parts) + b'\n', f'part {number}: {done}'
 
 
 def broken_bytes(data: bytes, dice: random.Random) -> tuple[bytes, str]:

@@ -5,15 +5,15 @@
 from collections.abc import Callable, Iterable
 import contextlib
 from dataclasses import dataclass
-import importlib.util
 import io
 from pathlib import Path
 import random
 import re
 import shutil
-from typing import Any
+import subprocess
+import sys
 
-from broken_text import broken_bytes, broken_yaml
+from broken_text import broken_bytes, broken_json, broken_yaml
 from crgame_ros import cli
 from crgame_ros.analysis.outcome_line import NO_PLANS
 from crgame_ros.driver.device_map import load_device_map
@@ -28,6 +28,7 @@ from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.control_settings import load_control_settings
 from mutations import mutate
 import numpy as np
+from sound_results import test_module
 
 DURATION = '0.5'
 ROADS = 'ZAM_CutIn-1_1_T-1.xml'
@@ -35,7 +36,7 @@ PLAIN = f'scenario: {ROADS}\nhumans: [{{id: hv0, driver: idle}}]\n'
 # On stderr of a good run: notes, progress, planners that are slow or brake, its last line.
 USUAL = re.compile(
     r'note: |rasterize: |driving .*: \d+ %$|av\d+: (brakes along|its planner|planner \S+ is slow)'
-    r'|(\d+ contacts?|\d+ of \d+ plans?|nuPlan score)\b')
+    r'|(\d+ contacts?|\d+ of \d+ plans?|nuPlan score)\b|/.*/summary\.html$')
 UNDRIVEN = re.compile(r'error: av\d+: no plan of its planner was driven: ')
 Breaker = Callable[[bytes, random.Random], tuple[bytes, str]]
 
@@ -73,6 +74,10 @@ def prepare(folder: Path) -> None:
     command('roads', folder / ROADS, folder / 'roads.csv')
     (folder / 'mapped.yaml').write_text(f'{PLAIN}occupancy: map\n')
     _record(folder)
+    # In another process: libraries of tables start threads, which no fork has.
+    subprocess.run([sys.executable, str(Path(__file__).with_name('sound_results.py')),
+                    str(folder)], check=True, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL)
 
 
 def warm_up(folder: Path) -> None:
@@ -93,8 +98,9 @@ def trials(folder: Path, published: Iterable[Path]) -> dict[str, Trial]:
     games = sorted(path for path in folder.glob('*.yaml') if 'scenario:' in path.read_text())
     devices = sorted((config_directory() / 'devices').glob('*.yaml'))
     bag, database = folder / 'bag', folder / 'database'
+    evaluation, study = folder / 'evaluation', folder / 'studied'
     return {
-        'scenario, by element': Trial(0.46, scenarios, mutate, _scenario),
+        'scenario, by element': Trial(0.42, scenarios, mutate, _scenario),
         'scenario, by byte': Trial(0.06, scenarios, broken_bytes, _scenario),
         'game': Trial(0.16, tuple(games), broken_yaml, _game),
         'vehicle': Trial(0.05, (folder / 'bmw_320i.yaml',), broken_yaml, _vehicle),
@@ -110,7 +116,16 @@ def trials(folder: Path, published: Iterable[Path]) -> dict[str, Trial]:
         'metadata': Trial(0.04, (bag / 'metadata.yaml', database / 'metadata.yaml'), broken_yaml,
                           _bag),
         'recording': Trial(0.04, (bag / 'bag_0.mcap', database / 'database.db3'), broken_bytes,
-                           _bag)}
+                           _bag),
+        'evaluation, by value': Trial(0.01, (evaluation / 'evaluation.json',), broken_json,
+                                      _evaluation),
+        'evaluation, by byte': Trial(0.02, tuple(sorted(evaluation.glob('*/*.parquet'))),
+                                     broken_bytes, _evaluation),
+        'study, by value': Trial(0.02, (*sorted(study.glob('participants/*/*.json*')),
+                                        *sorted(study.glob('data/.runs/*/run.json'))),
+                                 broken_json, _study),
+        'study, by byte': Trial(0.02, tuple(sorted(path for path in study.rglob('*')
+                                                   if path.is_file())), broken_bytes, _study)}
 
 
 def void(_: object) -> None:
@@ -227,6 +242,18 @@ def _bag(path: Path, dice: random.Random) -> None:
         raise refusals[-1]
 
 
+def _evaluation(path: Path, dice: random.Random) -> None:
+    command('evaluate', _part_of(path, 'evaluation'), '--summary')
+
+
+def _study(path: Path, dice: random.Random) -> None:
+    command('study', 'data', _part_of(path, 'studied'))
+
+
+def _part_of(path: Path, name: str) -> Path:
+    return next(folder for folder in path.parents if folder.name == name)
+
+
 def _compare(log: RunTrajectories, sound: RunTrajectories) -> None:
     """Check that the data read from a broken recording is the recorded data."""
     rows = log.ks - sound.ks[0]
@@ -243,11 +270,7 @@ def _compare(log: RunTrajectories, sound: RunTrajectories) -> None:
 def _record(folder: Path) -> None:
     """Record a second, as the graph does and as `ros2 bag record` does into SQLite."""
     from rosbags.rosbag2 import StoragePlugin
-    source = Path(__file__).resolve().parents[1] / 'test' / 'recording' / 'conftest.py'
-    spec = importlib.util.spec_from_file_location('recording_conftest', source)
-    assert spec is not None and spec.loader is not None
-    maker: Any = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(maker)
+    maker = test_module('conftest')
     recorder = maker.RunRecorder(maker.Samples())
     game = folder / 'recorded.yaml'
     game.write_text(f'{PLAIN}avs: [{{id: av0}}]\n')

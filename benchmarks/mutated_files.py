@@ -34,9 +34,10 @@ TRACEBACK, WRONG, SLOW, LARGE = 'traceback', 'wrong result', 'too slow', 'too la
 OUTCOMES = (LOADED, REFUSED, BAD_REFUSAL, TRACEBACK, WRONG, SLOW, LARGE)
 DESCRIPTION = """\
 Break files of every kind in one or two places, and read each as a user would: scenarios, games,
-vehicles, steering ratios, timelines, device maps, gains, occupancy maps, trajectories, way-points
-and recordings. Scenarios and games are driven for half a second and exported, recordings are
-looked into, converted and recovered. Every case is a process of its own with 10 s of computing
+vehicles, steering ratios, timelines, device maps, gains, occupancy maps, trajectories, way-points,
+recordings, evaluations and studies. Scenarios and games are driven for half a second and exported,
+recordings are looked into, converted and recovered, evaluations summed up, and the tables of
+studies made. Every case is a process of its own with 10 s of computing
 and 1 GiB more memory than this process. The same seed gives the same cases.
 
   mutated_files.py --count 200                        a look
@@ -132,10 +133,11 @@ class Harness:
         for other in self._folder.iterdir():
             if other.is_file():
                 os.link(other, root / other.name)
-        inner = file.parent.name if file.parent.parent == self._folder else ''
-        for name in {'map', inner} - {''}:
+        place = file.relative_to(self._folder) if file.is_relative_to(self._folder) \
+            else Path(file.name)
+        for name in {'map', *place.parts[:-1][:1]}:
             shutil.copytree(self._folder / name, root / name, copy_function=os.link)
-        return root / inner / file.name
+        return root / place
 
 
 def _fork(work: object, broken: Path) -> Outcome:

@@ -43,7 +43,7 @@ def test_broken_files_of_every_kind_are_refused_in_one_line_or_run(
         assert case.outcome.is_good, case
         kinds[case.kind] += 1
         counts[case.outcome.kind] += 1
-    assert len(kinds) == 13 and min(counts['loaded'], counts['refused']) > 30
+    assert len(kinds) > 12 and min(counts['loaded'], counts['refused']) > 30
 
 
 def test_sound_files_of_every_kind_are_loaded(mutated_files: Any, tmp_path: Path) -> None:
