@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A small finished evaluation and a study with two participants, for the trials of broken files."""
+"""A finished evaluation and a study with two participants, for the trials of broken files."""
 
 import importlib.util
 from pathlib import Path
