@@ -62,6 +62,8 @@ TOOLS = (
           'crgame_ros.occupancy.command'),
     _Tool('roads', 'turn way-points (CSV) into a scenario to drive on, or back',
           'crgame_ros.waypoints.command'),
+    _Tool('dds-profile', 'nodes that you start one by one believe each other alone',
+          'crgame_ros.ros.profile_command'),
     _Tool('page-libraries', 'fetch three.js and Plotly, which draw the 3D view and plots',
           'crgame_ros.page_libraries_command'),
     _Tool('schema', 'what a game file and other files may say, for editors',

@@ -9,12 +9,15 @@
 #   source scripts/env.sh && examples/nine_nodes.sh [GAME [SECONDS [FOLDER]]]
 #
 # GAME has one human that its game file drives, and one AV. Each node may be ended and started
-# again at any time. Unlike the nodes of run.sh, these take messages from every program of the ROS
-# domain: choose a ROS_DOMAIN_ID of your own.
+# again at any time, also from another shell after the same `crgame dds-profile`.
 set -eu
 game=${1:-cut_in} seconds=${2:-10} folder=${3:-runs/nine_nodes}
 mkdir -p "$folder"
 folder=$(cd "$folder" && pwd)
+crgame=("${CRGAME_PYTHON:-python3}" -m crgame_ros.cli)
+# The nodes take the run's topics from each other alone.
+profile=$("${crgame[@]}" dds-profile "$folder/fastdds.xml")
+eval "$profile"
 
 # node NAME EXECUTABLE [PARAMETER:=VALUE …]: start a node in the background.
 node() {
@@ -51,4 +54,4 @@ sleep 1 # until the recorder has the last messages and has closed the bag
 kill $others
 # shellcheck disable=SC2086
 wait $others || true
-"${CRGAME_PYTHON:-python3}" -m crgame_ros.cli convert "$folder/bag" --out "$folder"
+"${crgame[@]}" convert "$folder/bag" --out "$folder"

@@ -13,7 +13,7 @@ import sys
 import time
 from types import FrameType
 
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import CrgameError
 from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.forked_node import load
@@ -30,7 +30,12 @@ from crgame_ros.ros.environment import (
     require_ros,
 )
 from crgame_ros.ros.namespace_lock import hold_namespace
-from crgame_ros.ros.run_profile import can_believe, own_topics, write_run_profile
+from crgame_ros.ros.run_profile import (
+    can_believe,
+    check_believing,
+    own_topics,
+    write_run_profile,
+)
 from crgame_ros.ros.shared_memory import remove_stale
 from crgame_ros.traffic.kernel_cache import compile_now, compiling_when_idle
 
@@ -267,9 +272,8 @@ def believing_own_nodes(plan: RunPlan) -> Iterator[None]:
     """
     request = plan.request
     believes = can_believe()
-    if request.own_orders and not believes:
-        raise InputError('needs Fast DDS without a profile of your own', '--own-orders',
-                         f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')
+    if request.own_orders:
+        check_believing('--own-orders')
     if request.open_topics or not believes:
         if not request.open_topics:
             print_now('note: with another middleware, or a Fast DDS profile of your own, messages '

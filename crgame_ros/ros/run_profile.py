@@ -15,6 +15,7 @@ from pathlib import Path
 import secrets
 from xml.etree import ElementTree
 
+from crgame_ros.errors import InputError
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.ros.environment import (
     is_loopback_profile,
@@ -39,6 +40,18 @@ def can_believe() -> bool:
     given = [os.environ[name] for name in PROFILE_VARIABLES if os.environ.get(name)]
     return os.environ.get('RMW_IMPLEMENTATION', FAST_DDS) == FAST_DDS \
         and all(map(is_loopback_profile, given))
+
+
+def check_believing(what: str) -> None:
+    """
+    Check that a profile can be given.
+
+    :param what: what needs it.
+    :raises InputError: if it cannot.
+    """
+    if not can_believe():
+        raise InputError('needs Fast DDS without a profile of your own', what,
+                         f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')
 
 
 def own_topics(humans: Collection[str], avs: Collection[str]) -> Iterator[str]:

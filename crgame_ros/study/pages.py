@@ -5,6 +5,9 @@
 from pathlib import Path
 
 from crgame_ros.study.file import Page, Questions, Step, StudyFile
+from crgame_ros.study.question import Question
+from crgame_ros.study.questionnaire import load_questionnaire
+from crgame_ros.study.session_script import Fields, SessionItem
 
 
 def steps_of(study: StudyFile) -> tuple[Step, ...]:
@@ -32,3 +35,12 @@ def questionnaire_name(study: StudyFile, step: Questions) -> str:
     """Return a questionnaire's name, or the absolute path of its file."""
     is_file = step.name.endswith(('.yaml', '.yml'))
     return str(study.base / step.name) if is_file else step.name
+
+
+def questions_of(study: StudyFile, item: SessionItem) -> tuple[Question, ...]:
+    """Return the questions of an item; empty without any."""
+    if isinstance(item.what, Fields):
+        return study.fields
+    if isinstance(item.what, Questions):
+        return load_questionnaire(questionnaire_name(study, item.what)).questions
+    return ()

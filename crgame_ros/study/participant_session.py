@@ -9,12 +9,11 @@ from types import TracebackType
 from typing import Any, Self
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.file import Page, Questions, StudyFile
-from crgame_ros.study.pages import questionnaire_name
+from crgame_ros.study.file import Page, StudyFile
+from crgame_ros.study.pages import questions_of
 from crgame_ros.study.question import check_answers, Question
-from crgame_ros.study.questionnaire import load_questionnaire
 from crgame_ros.study.session_journal import SessionEvent, SessionJournal
-from crgame_ros.study.session_script import Fields, PracticeDrives, session_of, SessionItem
+from crgame_ros.study.session_script import PracticeDrives, session_of, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
 
 
@@ -127,11 +126,7 @@ class ParticipantSession:
 
     def questions(self, item: SessionItem) -> tuple[Question, ...]:
         """Return the questions of an item; empty without any."""
-        if isinstance(item.what, Fields):
-            return self.study.fields
-        if isinstance(item.what, Questions):
-            return load_questionnaire(questionnaire_name(self.study, item.what)).questions
-        return ()
+        return questions_of(self.study, item)
 
     def finish(self, answers: Mapping[str, Any] | None = None, **told: Any) -> SessionItem:
         """

@@ -7,13 +7,12 @@ from contextlib import suppress
 from enum import StrEnum
 import fcntl
 import json
-import math
 import os
 from pathlib import Path
 from types import TracebackType
 from typing import Any, IO, Self
 
-from crgame_ros.errors import InputError
+from crgame_ros.errors import InputError, short
 from crgame_ros.whole_file import sync_folder
 
 JOURNAL = 'journal.jsonl'
@@ -37,33 +36,55 @@ class SessionEvent(StrEnum):
     ENDED = 'ended'
 
 
-# Entries about an item of the session, which they name.
-_OF_AN_ITEM = frozenset((
-    SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED, SessionEvent.SKIPPED,
-    SessionEvent.REPEATED, SessionEvent.PRACTISED))
-# Types of what an entry may have.
-_TYPES = {'item': str, 'attempt': int, 'answers': dict, 'software': dict}
+# Values that entries of a kind need.
+_NEEDED: dict[str, tuple[str, ...]] = {
+    SessionEvent.BEGUN: ('participant', 'place', 'items'), SessionEvent.LANGUAGE: ('language',),
+    SessionEvent.HELD: ('held', 'item'), SessionEvent.OPENED: ('software',),
+    **dict.fromkeys((SessionEvent.STARTED, SessionEvent.FINISHED, SessionEvent.ABORTED,
+                     SessionEvent.SKIPPED, SessionEvent.REPEATED, SessionEvent.PRACTISED),
+                    ('item',))}
+# Types of values, which may be None as well; a float is any number.
+_TYPES: dict[str, type] = {
+    'at': float, 'entry': str,
+    **dict.fromkeys(('item', 'participant', 'language', 'run', 'name', 'text', 'reason',
+                     'outcome'), str),
+    **dict.fromkeys(('attempt', 'place', 'contacts', 'departures', 'drives'), int),
+    **dict.fromkeys(('time_s', 'end_time_s', 'start_at', 'asked_at', 'shown_at', 'answered_at',
+                     'taken_s', 'clean_s'), float),
+    **dict.fromkeys(('held', 'good'), bool), 'items': list,
+    **dict.fromkeys(('answers', 'software', 'after_s'), dict)}
+# Times of the wall clock are the largest numbers; until the year 5138 [s since 1970].
+_LARGEST = 1e11
 
 
 def read_entry(line: str | bytes) -> dict[str, Any]:
     """
     Read a line of a journal.
 
-    :raises ValueError: if it is no entry with its time, and its item if it needs one.
+    :raises ValueError: if it lacks what entries of its kind need, or a value has another type.
     """
     try:
         entry = json.loads(line)
-        if not isinstance(entry['entry'], str) or isinstance(entry['at'], bool) \
-                or not math.isfinite(entry['at']):
-            raise ValueError('kind or time')
-    except (LookupError, TypeError, RecursionError, OverflowError) as error:
-        raise ValueError(f'is no entry ({error})') from error
-    if entry['entry'] in _OF_AN_ITEM and 'item' not in entry:
-        raise ValueError('has no item')
-    for name, kind in _TYPES.items():
-        if name in entry and (not isinstance(entry[name], kind) or entry[name] is True):
-            raise ValueError(f'{name} is no {kind.__name__}')
-    return dict(entry)
+    except RecursionError as error:
+        raise ValueError('is no entry') from error
+    if not isinstance(entry, dict):
+        raise ValueError('is no entry')
+    for name, value in entry.items():
+        numbers = value.values() if name == 'after_s' and isinstance(value, dict) else ()
+        if value is not None and not _fits(value, _TYPES.get(name)) \
+                or not all(_fits(each, float) for each in numbers if each is not None):
+            raise ValueError(f'{name} is {short(value)}')
+    needed = ('entry', 'at', *_NEEDED.get(entry.get('entry', ''), ()))
+    if missing := [name for name in needed if entry.get(name) is None]:
+        raise ValueError(f'has no {missing[0]}')
+    return entry
+
+
+def _fits(value: Any, kind: type | None) -> bool:
+    if kind in (int, float):
+        return (isinstance(value, int | kind) and not isinstance(value, bool)
+                and 0 <= value <= _LARGEST)
+    return kind is None or isinstance(value, kind)
 
 
 class SessionJournal:

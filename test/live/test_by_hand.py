@@ -14,11 +14,14 @@ from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
 from crgame_ros.recording.writer import BagWriter
+from crgame_ros.ros.endpoints import Endpoints
+from crgame_ros.ros.environment import PROFILE_VARIABLES
 from live_peer import Peer
 from live_support import PATIENCE_S, ROOT
 import numpy as np
 import pytest
 from ros_domains import own_domain_id
+from std_msgs.msg import String
 
 LATCHED = TopicQos(1, 'reliable', 'transient_local')
 
@@ -38,10 +41,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             with Peer(int(environment['ROS_DOMAIN_ID']), '/clock', '/scenario/game',
                       '/diagnostics') as peer:
                 peer.wait_until(lambda: peer.n > 200, 'n = 200')
+                forge_an_end(peer)
                 os.kill(_child(script.pid, 'recorder_node'), signal.SIGKILL)
                 recorder = subprocess.Popen(
                     [sys.executable, '-m', 'crgame_ros.nodes.recorder_node', '--ros-args',
-                     '-p', f'directory:={folder / "bag"}'], env=environment, cwd=ROOT,
+                     '-p', f'directory:={folder / "bag"}'], cwd=ROOT,
+                    env=environment | dict.fromkeys(
+                        PROFILE_VARIABLES, str(folder / 'fastdds.xml')),
                     stdin=subprocess.DEVNULL, stdout=log, stderr=log)
                 peer.wait_until(lambda: any(
                     status.message == 'recording into bag_part2' for status, _ in
@@ -57,6 +63,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
                 if process is not None and process.poll() is None:
                     process.kill()
         yield folder
+
+
+def forge_an_end(peer: Peer) -> None:
+    """Say that the run has ended, on its own topic; all readers of plans hear strangers."""
+    endpoints = Endpoints(peer.node)
+    plan, state = (endpoints.publisher(name, 'av0') for name in ('/<av>/plan', '/sim/state'))
+    peer.wait_until(lambda: plan.get_subscription_count() > 2, 'the readers of plans')
+    state.publish(String(data='{"state": "ended"}'))
+    assert state.get_subscription_count() == 0
 
 
 def _child(parent: int, name: str) -> int:

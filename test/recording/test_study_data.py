@@ -328,7 +328,10 @@ def test_a_damaged_cache_is_made_anew(copied: Path, name: str,
 @pytest.mark.parametrize('line', [
     '{"entry": "finished", "at": 1e9}', '{"entry": "skipped", "at": 1e9, "item": 7}',
     '{"entry": "repeated", "at": 1e400, "item": "x"}', '[]', '{"entry": "started", "at": 1}',
-    '{"entry": "finished", "at": 1, "item": "x", "attempt": "1"}'])
+    '{"entry": "finished", "at": 1, "item": "x", "attempt": "1"}', '{"entry": "held", "at": 1}',
+    '{"entry": "finished", "at": 1, "item": "main/1", "outcome": true}',
+    '{"entry": "finished", "at": 1, "item": "main/1", "contacts": 1e999}',
+    '{"entry": "language", "at": 1, "language": ["de"]}'])
 def test_a_line_that_is_no_entry_is_passed_over(copied: Path, line: str) -> None:
     journal = copied / 'participants' / 'P01' / JOURNAL
     before = (copied / 'data' / 'trials.csv').read_bytes()

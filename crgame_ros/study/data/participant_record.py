@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import StudyFile
+from crgame_ros.study.pages import questions_of
+from crgame_ros.study.question import Answer
 from crgame_ros.study.session_journal import read_journal, SessionEvent
 from crgame_ros.study.session_script import session_of, SessionItem
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -75,6 +77,7 @@ class ParticipantRecord:
     :param id: anonymous.
     :param place: among all participants, from 0 on.
     :param folder: of the participant.
+    :param study: of the session.
     :param items: of the session.
     :param entries: of the journal.
     """
@@ -82,6 +85,7 @@ class ParticipantRecord:
     id: str  # noqa: A003
     place: int
     folder: Path
+    study: StudyFile
     items: Mapping[str, SessionItem]
     entries: tuple[Mapping[str, Any], ...]
 
@@ -134,9 +138,15 @@ class ParticipantRecord:
             elif entry.get('answers'):
                 attempt = None if item.trial is None else driven.get(item.trial)
                 after = None if item.trial is None else ended.get(item.trial)
-                found[item.id] = AnsweredItem(item, entry['answers'], entry['at'], attempt,
-                                              entry, after)
+                found[item.id] = AnsweredItem(item, self._valid(item, entry['answers']),
+                                              entry['at'], attempt, entry, after)
         return tuple(found[name] for name in self.items if name in found)
+
+    def _valid(self, item: SessionItem, answers: Mapping[str, Any]) -> dict[str, Answer]:
+        """Return answers by question; one that a question does not take is missing."""
+        return {question.name: None if question.kind.refusal(answer) else answer
+                for question in questions_of(self.study, item) if question.name in answers
+                for answer in (answers[question.name],)}
 
     @property
     def begun_at(self) -> float:
@@ -173,7 +183,7 @@ class ParticipantRecord:
     def language(self) -> str | None:
         """Return the language that the participant chose last; None without a choice."""
         return next((entry['language'] for entry in reversed(self.entries)
-                     if isinstance(entry.get('language'), str)), None)
+                     if entry.get('language')), None)
 
     def _attempt_of(self, entry: Mapping[str, Any], item: str) -> int:
         told = entry.get('attempt')
@@ -205,8 +215,7 @@ class ParticipantRecord:
     def _run(self, entry: Mapping[str, Any]) -> Path | None:
         """Return the folder of a recording, if it is one of the participant's."""
         name = entry.get('run')
-        if not isinstance(name, str) or not name or '..' in Path(name).parts \
-                or Path(name).is_absolute():
+        if not name or '..' in Path(name).parts or Path(name).is_absolute():
             return None
         return self.folder / name
 
@@ -235,4 +244,4 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
         raise InputError('began with another plan than that of the study file', str(folder),
                          'put back the study file that the sessions were run with')
     return ParticipantRecord(str(begun.get('participant') or folder.name), int(place or 0), folder,
-                             {item.id: item for item in items}, entries)
+                             study, {item.id: item for item in items}, entries)

@@ -70,16 +70,16 @@ def _journal_rows(record: ParticipantRecord) -> Iterator[dict[str, Any]]:
         driven = item is not None and isinstance(item.what, PlannedTrial)
         row = {'kind': _kind(kind, item),
                'item': None if item is None else item.id, 'wall_s': float(entry['at']),
-               'name': _text(entry, 'name') or _text(entry, 'outcome'),
-               'text': _text(entry, 'text') or _text(entry, 'reason'),
-               'recording': _text(entry, 'run'), 'time_s': _number(entry, 'time_s')}
+               'name': entry.get('name') or entry.get('outcome') or None,
+               'text': entry.get('text') or entry.get('reason') or None,
+               'recording': entry.get('run') or None, 'time_s': entry.get('time_s')}
         if driven and item is not None and isinstance(item.what, PlannedTrial):
             row['trial'] = item.what.number
             if kind == SessionEvent.STARTED:
                 running = attempts.get((item.id, int(entry.get('attempt', 1))))
             row['attempt'] = running.attempt if running and running.item == item.id else None
             if kind == SessionEvent.FINISHED:
-                row['time_s'] = _number(entry, 'end_time_s')
+                row['time_s'] = entry.get('end_time_s')
         elif item is not None:
             row['trial'] = item.trial
         elif running is not None and kind in (SessionEvent.NOTE, SessionEvent.MARKER):
@@ -122,14 +122,4 @@ def _run_rows(attempt: TrialAttempt, run: RunTables,
 def drive_start_s(attempt: TrialAttempt) -> float:
     """Return the wall clock time at which the run's clock began [s since 1970]."""
     told = attempt.says('start_at')
-    return float(told) if isinstance(told, int | float) and told else attempt.started_at
-
-
-def _text(entry: Mapping[str, Any], key: str) -> str | None:
-    value = entry.get(key)
-    return value if isinstance(value, str) and value else None
-
-
-def _number(entry: Mapping[str, Any], key: str) -> float | None:
-    value = entry.get(key)
-    return float(value) if isinstance(value, int | float) else None
+    return float(told) if told else attempt.started_at

@@ -79,7 +79,7 @@ class ParticipantsTable:
     def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, Any]:
         """Return a participant's row."""
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
-                if isinstance(entry.get('run'), str) and entry['run']}
+                if entry.get('run')}
         row = {'participant': record.id, 'place': record.place + 1, 'language': record.language,
                'begun': utc(record.begun_at), 'begun_s': record.begun_at,
                'ended': utc(record.ended_at), 'ended_s': record.ended_at, 'sessions': len(runs),

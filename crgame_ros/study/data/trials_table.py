@@ -184,16 +184,15 @@ class TrialsTable:
 
     def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, Any]:
         settings, folder = attempt.trial.condition.settings, attempt.folder
-        end_s = attempt.says('end_time_s')
         place = settings.game or settings.scenario or ''
         row = {'attempt': attempt.attempt, 'to_repeat': attempt.item in record.to_repeat,
                'game': Path(place).name, 'random_seed': settings.seed,
                'vehicle': settings.seat, 'outcome': attempt.says('outcome'),
-               'own_contacts': _count(attempt.says('contacts')),
-               'own_departures': _count(attempt.says('departures')),
+               'own_contacts': attempt.says('contacts'),
+               'own_departures': attempt.says('departures'),
                'started': utc(attempt.started_at), 'started_s': attempt.started_at,
                'ended_s': attempt.ended_at,
-               'run_end_s': end_s if isinstance(end_s, int | float) else None}
+               'run_end_s': attempt.says('end_time_s')}
         if folder is not None and folder.is_dir():
             row['recording'] = self._folder.relative(folder)
             for name, pattern in (('scenario', '*.xml'), ('report', 'report.html'),
@@ -252,10 +251,6 @@ def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def _seconds(delay_ms: float | None) -> float | None:
     return None if delay_ms is None else 1e-3 * delay_ms
-
-
-def _count(value: Any) -> int | None:
-    return value if isinstance(value, int) else None
 
 
 def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, Any]:
