@@ -17,10 +17,10 @@ import time
 from typing import Any
 
 from bare_loop import BareLoop
-from crgame_ros.analysis.reproduction.synchronization import NaiveLoop
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game, with_planners
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.reproduction.synchronization import NaiveLoop
 from crgame_ros.simulation.setup import build_setup
 from live_graph import LiveGraph, RemoteControl
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import sys
 from typing import NamedTuple
 
-from crgame_ros import __version__
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.version import __version__
 
 
 class _Tool(NamedTuple):
@@ -49,7 +49,7 @@ TOOLS = (
           'crgame_ros.analysis.report.command'),
     _Tool('replay', 'the recorded human against other planners', 'crgame_ros.replay_command'),
     _Tool('reproduce', "a paper's evaluation again, beside its numbers",
-          'crgame_ros.analysis.reproduction.reproduce_command'),
+          'crgame_ros.reproduction.reproduce_command'),
     _Tool('evaluate', 'planners x scenarios x recorded humans x seeds, into tables',
           'crgame_ros.evaluation.evaluate_command'),
     _Tool('study', 'experiments with people: plan them, and find mistakes',

@@ -42,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _new(values: argparse.Namespace) -> int:
     from crgame_ros.driver.source import parse_source
-    from crgame_ros.game.file import dump_game
     from crgame_ros.simulation.setup import build_setup
     if not 1 <= values.humans <= MAX_HUMANS:
         raise InputError(f'is {values.humans}', '--humans', f'give 1 to {MAX_HUMANS}')
@@ -58,7 +57,7 @@ def _new(values: argparse.Namespace) -> int:
                    title=game.title or f'{setup.loaded.benchmark_id}, {len(humans)} in seats')
     # Place the vehicles as a reader of the file will.
     build_setup(game, setup.loaded)
-    _write(out, dump_game(game))
+    _write(out, game.dump())
     print(f'{out}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s)')
     for notice in setup.notices:
         print(f'note: {notice}')

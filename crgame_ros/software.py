@@ -8,7 +8,7 @@ from pathlib import Path
 import platform
 import subprocess
 
-from crgame_ros import __version__
+from crgame_ros.version import __version__
 
 # The packages that compute the contents of a report.
 _PACKAGES = ('numpy', 'scipy', 'shapely', 'commonroad-io', 'commonroad-drivability-checker')

@@ -34,7 +34,7 @@ FOLDERS = (
     'analysis/pictures', 'analysis/report', 'analysis', 'evaluation/results',
     'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit', 'cockpit/runs',
     'study/desk', 'gym', 'ros', 'nodes/sim', 'nodes/cockpit', 'nodes/markers', 'nodes',
-    'launcher', 'study/conduct', 'analysis/reproduction', 'python_interface', HIGHEST)
+    'launcher', 'study/conduct', 'reproduction', 'python_interface', HIGHEST)
 BEGIN, END = '<!-- folders: begin -->', '<!-- folders: end -->'
 # Of the picture [px].
 CELL, NAMES, TOP = 22, 150, 120
@@ -60,7 +60,7 @@ def imports() -> dict[tuple[str, str], list[str]]:
     found: dict[tuple[str, str], list[str]] = {}
     for path in known.values():
         # The package's own file loads a module only when it is used.
-        for name in sorted(_imported(path, known)) if path != PACKAGE / '__init__.py' else ():
+        for name in sorted(imported_by(path, known)) if path != PACKAGE / '__init__.py' else ():
             pair = folder_of(path), folder_of(known[name])
             if pair[0] != pair[1]:
                 found.setdefault(pair, []).append(
@@ -68,7 +68,8 @@ def imports() -> dict[tuple[str, str], list[str]]:
     return found
 
 
-def _imported(path: Path, known: dict[str, Path]) -> set[str]:
+def imported_by(path: Path, known: dict[str, Path]) -> set[str]:
+    """Return the modules of the package that a file imports, within functions as well."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
         if isinstance(node, ast.Import):

@@ -7,6 +7,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+import networkx as nx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,6 +46,21 @@ def test_every_folder_imports_from_those_above_it_alone() -> None:
     wrong = [line for (folder, other), lines in architecture.imports().items()
              for line in lines if place[other] > place[folder]]
     assert not wrong, '\n'.join(wrong)
+
+
+@pytest.mark.slow
+def test_neither_files_nor_folders_at_the_top_import_each_other_in_a_circle() -> None:
+    """Imports within functions and for types count, too."""
+    known = architecture.modules()
+    files = nx.DiGraph((name, other) for name, path in known.items() if name != 'crgame_ros'
+                       for other in architecture.imported_by(path, known) - {name})
+    tops = nx.DiGraph((first, second) for first, second in (
+        [name.split('.')[1] for name in pair] for pair in files.edges if 'crgame_ros' not in pair)
+        if first != second)
+    for graph in (files, tops):
+        assert len(graph) > 20
+        assert [names for names in nx.strongly_connected_components(graph)
+                if len(names) > 1] == []
 
 
 def test_every_folder_has_its_place_and_says_what_it_is() -> None:

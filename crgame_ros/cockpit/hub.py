@@ -12,10 +12,10 @@ import secrets
 from types import MappingProxyType
 from typing import Any
 
-from crgame_ros import __version__
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 from crgame_ros.cockpit.shown_paths import without_paths
+from crgame_ros.version import __version__
 
 MAX_CLIENTS = 32
 # Clients of one address: more would take the room of others.

@@ -14,7 +14,7 @@ from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
-from crgame_ros.game.file import dump_game, load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.planner.registry import create_planner
 from crgame_ros.scenario import guard
@@ -91,7 +91,7 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
     game = replace(setup.game, humans=tuple(humans), avs=tuple(avs),
                    title=setup.game.title or setup.loaded.benchmark_id)
     build_setup(game, setup.loaded)
-    return {'text': dump_game(game)}
+    return {'text': game.dump()}
 
 
 def main() -> None:

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from crgame_ros import __version__
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.data_package import PACKAGE_FILE, PROFILE, table_schema
 from crgame_ros.errors import InputError
@@ -17,6 +16,7 @@ from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
 from crgame_ros.recording.export import prepare_folder, write_text
 from crgame_ros.schema.writing import write
+from crgame_ros.version import __version__
 
 GRID_FILE, FILES, REPORTS = 'evaluation.json', 'files', 'reports'
 FORMAT = 1

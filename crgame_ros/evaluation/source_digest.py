@@ -11,12 +11,12 @@ import inspect
 from pathlib import Path
 import sys
 
-import crgame_ros
-from crgame_ros import __version__
 from crgame_ros.planner.registry import BUILT_IN, EXTERNAL, planner_class
+from crgame_ros.version import __version__
 
 # A larger planner should be installed on the workers instead [bytes].
 MOST_BYTES = 512 * 1024 * 1024
+_PACKAGE = __name__.partition('.')[0]
 
 
 def code_neighbours(file: Path) -> list[Path]:
@@ -73,7 +73,7 @@ def _imports(nodes: Iterable[ast.AST]) -> Iterator[str]:
 
 def _modules(names: Iterable[str], folder: Path) -> Iterator[Path]:
     """Yield the files of the modules and packages of these names in a folder."""
-    for name in set(names) - {crgame_ros.__name__}:
+    for name in set(names) - {_PACKAGE}:
         yield folder / f'{name}.py'
         if (folder / name / '__init__.py').is_file():
             yield from (path for path in sorted((folder / name).rglob('*'))
@@ -82,7 +82,7 @@ def _modules(names: Iterable[str], folder: Path) -> Iterator[Path]:
 
 # Folders and modules that offline runs and measures never execute.
 WITHOUT = ('cockpit', 'nodes', 'ros', 'launcher', 'evaluation/summary', 'analysis/pictures',
-           'analysis/report', 'analysis/reproduction', 'gym', 'python_interface', 'cli.py',
+           'analysis/report', 'reproduction', 'gym', 'python_interface', 'cli.py',
            'doctor.py')
 
 
@@ -106,7 +106,7 @@ def engine_digest() -> str:
 
     The versions of the packages that compute with it count, too.
     """
-    package = Path(crgame_ros.__file__).parent
+    package = Path(__file__).parents[1]
     planners = {f'{target.partition(":")[0].rpartition(".")[2]}.py'
                 for target in BUILT_IN.values()}
     total = hashlib.sha256(__version__.encode())
@@ -144,7 +144,7 @@ def planner_digest(name: str) -> str:
 def _package_files(planner: type[object]) -> list[Path]:
     """Return the Python files of the installed package of a planner, if it is not this one."""
     name = planner.__module__.partition('.')[0]
-    if name == crgame_ros.__name__ or name not in sys.modules:
+    if name == _PACKAGE or name not in sys.modules:
         return []
     folders = getattr(sys.modules[name], '__path__', ())
     return sorted(path for folder in folders for path in Path(folder).rglob('*.py'))

@@ -7,9 +7,7 @@ from typing import Any
 
 from crgame_ros.game.game import Game
 from crgame_ros.schema.reading import read
-from crgame_ros.schema.writing import write
 from crgame_ros.yaml_text import read_yaml
-import yaml
 
 
 def load_game(path: Path) -> Game:
@@ -31,12 +29,3 @@ def parse_game(values: Any, where: str, base: Path) -> Game:
     :param base: directory against which its file names are resolved.
     """
     return read(Game, values, where, base)
-
-
-def dump_game(game: Game) -> str:
-    """
-    Return a game file that gives the same game from any folder: its file names are absolute.
-
-    :return: YAML text.
-    """
-    return yaml.safe_dump(write(game, game.base), sort_keys=False, allow_unicode=True)

@@ -25,6 +25,7 @@ from crgame_ros.schema.marks import (
     Within,
     Wording,
 )
+from crgame_ros.schema.writing import write
 from crgame_ros.vehicle.parameters import AUTO
 
 Light = Literal['day', 'dusk']
@@ -334,9 +335,16 @@ class Game:
     def _repr_html_(self) -> str:
         """Return the game file as HTML for notebooks."""
         from html import escape
+        return f'<pre>{escape(self.dump())}</pre>'
 
-        from crgame_ros.game.file import dump_game
-        return f'<pre>{escape(dump_game(self))}</pre>'
+    def dump(self) -> str:
+        """
+        Return a game file that gives the same game from any folder: its file names are absolute.
+
+        :return: YAML text.
+        """
+        import yaml
+        return yaml.safe_dump(write(self, self.base), sort_keys=False, allow_unicode=True)
 
     def check(self) -> None:
         """Refuse more than `MAX_VEHICLES` vehicles."""

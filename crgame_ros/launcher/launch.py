@@ -18,7 +18,6 @@ from crgame_ros.launcher.arguments import parse_arguments
 from crgame_ros.launcher.finisher import Finisher
 from crgame_ros.launcher.forked_node import load
 from crgame_ros.launcher.interruption import ENDING, print_now, writing
-from crgame_ros.launcher.main import ENDED_EARLY
 from crgame_ros.launcher.node_process import NodeProcess, NodeSpec
 from crgame_ros.launcher.node_specs import node_specs, Roster, shared_modules
 from crgame_ros.launcher.run_plan import plan_run, RunPlan
@@ -209,6 +208,7 @@ def launch(arguments: Sequence[str] | None = None) -> int:
     Run a game from the command line.
 
     :return: exit code, as of `main`.
+    :raises KeyboardInterrupt: before the run began.
     """
     began = False
     try:
@@ -250,10 +250,9 @@ def launch(arguments: Sequence[str] | None = None) -> int:
         print(f'error: {error}', file=sys.stderr, flush=True)
         return error.exit_code
     except KeyboardInterrupt:
-        if began:
-            return 130
-        print_now(ENDED_EARLY)
-        return 0
+        if not began:
+            raise
+        return 130
 
 
 def clear(plan: RunPlan) -> None:

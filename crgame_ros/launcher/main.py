@@ -33,7 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from crgame_ros.ros.node_main import end_with_parent
     end_with_parent()
     signal.signal(signal.SIGINT, before)
-    return launch(arguments)
+    try:
+        return launch(arguments)
+    except KeyboardInterrupt:
+        print(ENDED_EARLY, flush=True)
+        return 0
 
 
 def _leave(_number: int, _frame: FrameType | None) -> None:

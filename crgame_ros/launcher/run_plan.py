@@ -17,7 +17,7 @@ from crgame_ros.cockpit.exposure import check_certificate
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import PlannerSwap
-from crgame_ros.game.file import dump_game, load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, TimingSpec
 from crgame_ros.launcher.arguments import cockpit_host, RunRequest
 from crgame_ros.paths import check_room, default_game, numbered
@@ -252,7 +252,7 @@ def _plan_in(folder: Path, request: RunRequest, setup: Setup) -> RunPlan:
     # Left by a killed launcher; its links are no longer valid.
     shutil.rmtree(plan.private, ignore_errors=True)
     plan.private.mkdir(mode=0o700)
-    plan.game_file.write_text(dump_game(setup.game), encoding='utf-8')
+    plan.game_file.write_text(setup.game.dump(), encoding='utf-8')
     return plan
 
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from crgame_ros.driver.source import COCKPIT, is_replay
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.file import dump_game
 from crgame_ros.game.game import Game
 from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.live_run import LiveRun
@@ -150,7 +149,7 @@ class SimNode(Node):
         path = run_folder(self._control.folder, epoch) / 'game.yaml'
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(dump_game(game), encoding='utf-8')
+            path.write_text(game.dump(), encoding='utf-8')
         except OSError as error:
             self.get_logger().error(f'{path}: cannot be written ({error.strerror})')
 

@@ -155,7 +155,7 @@ class Run(ABC):
     @cached_property
     def drive_scores(self) -> 'tuple[VehicleScores, ...]':
         """Score its drives without CommonRoad's tools; empty where they cannot be scored."""
-        from crgame_ros.analysis.scores.scored_drives import scores_of
+        from crgame_ros.analysis.scores.run_scores import scores_of
         return scores_of(self.record, {}, drives_only=True).vehicles
 
     def criticality(self, thresholds: Thresholds = USUAL) -> 'dict[str, VehicleCriticality]':
@@ -258,8 +258,11 @@ class Run(ABC):
         return f'<{type(self).__name__} {self.name}: {who or "nobody"}, {self.duration_s:.1f} s>'
 
     def _repr_html_(self) -> str:
-        from crgame_ros.python_interface.run_html import run_html
-        return run_html(self)
+        from crgame_ros.python_interface.run_html import ShownRun
+        caption = f'{self.name}: {self.game.benchmark_id}, {self.duration_s:.1f} s' + (
+            f', states {self.state_hash[:12]}…' if self.state_hash else '')
+        return ShownRun(caption, self.record, self.usual_criticality, self.contacts,
+                        self.answers).html()
 
 
 def warn_of(notices: Iterable[str]) -> None:

@@ -7,9 +7,11 @@ from contextlib import contextmanager
 import fcntl
 import os
 from pathlib import Path
-import tempfile
 
 from crgame_ros.errors import InputError
+
+# Where every shell of a user looks, whatever its TMPDIR is, and where a full disk is no hindrance.
+FOLDER = Path('/tmp')
 
 
 @contextmanager
@@ -21,7 +23,7 @@ def hold_namespace(domain: str, namespace: str) -> Iterator[None]:
     :raises InputError: if another graph of this user holds it.
     """
     name = f'crgame-{os.getuid()}-{domain}{namespace.rstrip("/").replace("/", ".")}.lock'
-    path = Path(tempfile.gettempdir()) / name
+    path = FOLDER / name
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except OSError as error:

@@ -8,7 +8,6 @@ import math
 from typing import Any
 
 from crgame_ros.game.documents import document_entry
-from crgame_ros.game.file import dump_game
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.schema.writing import write
 from crgame_ros.simulation.setup import Setup
@@ -64,7 +63,7 @@ def game_document(setup: Setup, *, epoch: int, clock_offset_ns: int,
         'tasks': write([replace(task, seat=task_seat(task, setup.vehicle_ids))
                         for task in game.tasks]),
         'language': game.language,
-        'file': dump_game(game)}
+        'file': game.dump()}
     return json.dumps(document, allow_nan=False)
 
 

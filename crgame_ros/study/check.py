@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Literal
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.file import dump_game, parse_game
+from crgame_ros.game.file import parse_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.study.file import Block, Break, Page, Questions, StudyFile
@@ -119,7 +119,7 @@ def _try(settings: TrialSettings) -> None:
     """Simulate the start of a trial without a driver."""
     game = trial_game(settings, 'idle')
     # Read it as the run will, so that the combination of several files is checked.
-    game = parse_game(yaml.safe_load(dump_game(game)), 'game of the trial', game.base)
+    game = parse_game(yaml.safe_load(game.dump()), 'game of the trial', game.base)
     run_offline(build_setup(game), duration_s=min(TRIED_S, game.duration))
     if game.duration == float('inf'):
         raise CrgameError('has no end: give "duration" to the game or to the study')

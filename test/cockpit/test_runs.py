@@ -13,7 +13,7 @@ import zipfile
 
 from aiohttp import ClientSession, CookieJar, WSMsgType
 from cockpit_support import HOST, in_loop, PATIENCE_S, PumpBackend
-from crgame_ros.analysis.scores.scored_drives import scores_of
+from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.run_files import run_id
 from crgame_ros.cockpit.runs.archive import RunArchive

@@ -25,7 +25,7 @@ from crgame_ros.game.events import (
     SpeedLimit,
     TrafficChange,
 )
-from crgame_ros.game.file import dump_game, load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.schema.reading import read
 import pytest
 import yaml
@@ -94,7 +94,7 @@ def test_dumped_game_has_the_same_events(tmp_path: Path) -> None:
     path, again = tmp_path / 'game.yaml', tmp_path / 'elsewhere' / 'game.yaml'
     path.write_text(EVENTS)
     again.parent.mkdir()
-    again.write_text(dump_game(load_game(path)))
+    again.write_text(load_game(path).dump())
     assert load_game(again).events == load_game(path).events
 
 

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import dump_game, load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import (
     AvSpec,
     DrivabilitySpec,
@@ -218,7 +218,7 @@ def test_dump_gives_the_same_game_from_another_directory(
     write(home, FULL)
     monkeypatch.chdir(home)
     original = load_game(Path('game.yaml'))
-    text = dump_game(original)
+    text = original.dump()
     monkeypatch.chdir(elsewhere)
     again = load_game(write(elsewhere, text, 'other.yaml'))
     human = again.humans[0]
@@ -233,16 +233,16 @@ def test_dump_gives_the_same_game_from_another_directory(
     for field in ('title', 'duration', 'seed', 'prediction', 'drivability', 'timing'):
         assert getattr(again, field) == getattr(original, field)
     # An absolute path stays unchanged.
-    assert dump_game(again) == text
+    assert again.dump() == text
 
 
 def test_dump_of_a_minimal_game(tmp_path: Path) -> None:
     """Infinity and an unset list of AVs are left out, so that reading restores the defaults."""
     game = Game(tmp_path / 'a.xml')
-    values = yaml.safe_load(dump_game(game))
+    values = yaml.safe_load(game.dump())
     assert 'duration' not in values
     assert 'avs' not in values
-    again = load_game(write(tmp_path, dump_game(game)))
+    again = load_game(write(tmp_path, game.dump()))
     assert replace(again, base=game.base) == game
 
 
@@ -252,7 +252,7 @@ def test_dump_of_a_minimal_game(tmp_path: Path) -> None:
 def test_own_games_round_trip(tmp_path: Path, path: Path) -> None:
     """The package's games survive the launcher's way of writing them into a run's folder."""
     game = load_game(path)
-    again = load_game(write(tmp_path, dump_game(game)))
+    again = load_game(write(tmp_path, game.dump()))
     assert again.scenario == game.scenario.resolve()
     for before, after in zip(game.humans, again.humans, strict=True):
         kind, _, name = before.driver.partition(':')
@@ -265,6 +265,6 @@ def test_sound_is_on_or_none(tmp_path: Path, written: str, meant: str) -> None:
     """YAML reads a bare `on` as a truth value; only a value other than the default is written."""
     game = load_game(write(tmp_path, f'scenario: road.xml\nsound: {written}\n'))
     assert game.sound == meant
-    again = dump_game(game)
+    again = game.dump()
     assert ('\nsound:' in again) == (meant == 'none')
     assert load_game(write(tmp_path, again, 'again.yaml')).sound == meant

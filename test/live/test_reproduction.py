@@ -4,11 +4,11 @@
 
 from pathlib import Path
 
-from crgame_ros.analysis.reproduction.commonroad_game import write_timing_figure
-from crgame_ros.analysis.reproduction.expectation import judge
-from crgame_ros.analysis.reproduction.recorded_human import read_recorded
-from crgame_ros.analysis.reproduction.single_av_evaluation import HUMAN_EXPECTATIONS, SameHuman
-from crgame_ros.analysis.reproduction.synchronization import (
+from crgame_ros.reproduction.commonroad_game import write_timing_figure
+from crgame_ros.reproduction.expectation import judge
+from crgame_ros.reproduction.recorded_human import read_recorded
+from crgame_ros.reproduction.single_av_evaluation import HUMAN_EXPECTATIONS, SameHuman
+from crgame_ros.reproduction.synchronization import (
     judge_synchronization,
     measure_synchronization,
 )

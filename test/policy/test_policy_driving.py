@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import dump_game, load_game, parse_game
+from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.game.game import Game
 from crgame_ros.policy.policy_file import load_policy
 from crgame_ros.simulation.offline import OfflineResult, run_offline
@@ -93,7 +93,7 @@ def test_a_game_finds_its_policies_beside_it_and_from_anywhere(tmp_path: Path) -
     assert game.avs is not None
     assert game.avs[0].planner == f'policy:{tmp_path}/mine.py:acceleration'
     assert build_setup(game).humans[0].driver == f'policy:{tmp_path}/mine.py:acceleration'
-    again = parse_game(yaml.safe_load(dump_game(game)), 'game', Path('/'))
+    again = parse_game(yaml.safe_load(game.dump()), 'game', Path('/'))
     assert again.avs == game.avs
     assert again.humans[0].driver == f'policy:{tmp_path}/mine.py:acceleration'
     assert run_offline(build_setup(again), duration_s=1.0).planners[

@@ -12,7 +12,7 @@ from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import GAME_TOPIC
-from crgame_ros.game.file import dump_game, load_game
+from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, ModelSpec, PoseSpawn
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup, plan_run
@@ -141,7 +141,7 @@ def test_other_start_is_told(record: Any) -> None:
             (moved, bicycle, 'another start and vehicle model than')):
         human = HumanSpec('hv0', f'replay:{bag}', spawn=spawn, dynamics=dynamics)
         path = bag.parent / 'game.yaml'
-        path.write_text(dump_game(replace(original.setup.game, humans=(human,))))
+        path.write_text(replace(original.setup.game, humans=(human,)).dump())
         notices = effective_setup(RunRequest(path)).notices
         assert [expected in notice for notice in notices if 'hv0' in notice] == (
             [True] if expected else []), notices

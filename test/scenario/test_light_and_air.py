@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
-from crgame_ros.game.file import dump_game, load_game, parse_game
+from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.game.game import EnvironmentSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.light_and_air import environment_of
@@ -55,7 +55,7 @@ def test_a_run_records_what_was_resolved() -> None:
     text = game_document(build_setup(game), epoch=0, clock_offset_ns=0, real_time_factor=1.0)
     assert parse_game_document(text).environment == EnvironmentSpec('day', 80.0)
     # The file itself omits the values that the game omits.
-    assert yaml.safe_load(dump_game(game))['environment'] == {'visibility': 80.0}
+    assert yaml.safe_load(game.dump())['environment'] == {'visibility': 80.0}
     old = json.loads(text)
     del old['environment']
     assert parse_game_document(json.dumps(old)).environment is None

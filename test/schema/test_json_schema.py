@@ -11,7 +11,7 @@ from typing import Any
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import dump_game, load_game, parse_game
+from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.occupancy.map_file import map_text
 from crgame_ros.paths import config_directory, scenarios_directory
 from crgame_ros.schema.file_kinds import FILE_KINDS
@@ -99,7 +99,7 @@ def test_written_files_fit_their_schema() -> None:
     validator('occupancy').validate(yaml.safe_load(map_text('map.pgm', 0.1, (0.0, 1.0))))
     found = validator('game')
     for path in GAMES:
-        found.validate(yaml.safe_load(dump_game(load_game(path))))
+        found.validate(yaml.safe_load(load_game(path).dump()))
 
 
 def places(value: Any) -> Iterator[tuple[Any, Any]]:

@@ -5,7 +5,7 @@
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import dump_game, parse_game
+from crgame_ros.game.file import parse_game
 from crgame_ros.game.objects import Role
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import with_recorded_events
@@ -89,7 +89,7 @@ def test_a_map_that_is_not_there_is_refused() -> None:
 def test_the_written_game_has_objects_traffic_and_map() -> None:
     """The game that a run writes beside its recording gives the same run."""
     setup = living('blocked_lane')
-    values = yaml.safe_load(dump_game(setup.game))
+    values = yaml.safe_load(setup.game.dump())
     again = build_setup(parse_game(values, 'written', scenarios_directory()))
     assert again.descriptions == setup.descriptions
     hashes = [run_offline(item, duration_s=3.0).object_poses.tobytes() for item in (setup, again)]

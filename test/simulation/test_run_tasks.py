@@ -10,7 +10,7 @@ from typing import Any
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.events import EventList
-from crgame_ros.game.file import dump_game, parse_game
+from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import HumanSpec, PoseSpawn
 from crgame_ros.game.task_documents import (
     log_document,
@@ -267,7 +267,7 @@ def test_the_documents_say_the_tasks(street: LoadedScenario) -> None:
     """The game file and the game document have them; the document names the seat."""
     setup = setup_of(street, LIGHT, {**CALL, 'seat': 'av0', 'label': 'Baustelle'},
                      events=(SLOW,), language='de')
-    again = parse_game(yaml.safe_load(dump_game(setup.game)), 'game', setup.game.base)
+    again = parse_game(yaml.safe_load(setup.game.dump()), 'game', setup.game.base)
     assert again.tasks == setup.game.tasks and again.language == 'de'
     document = parse_game_document(game_document(
         setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))

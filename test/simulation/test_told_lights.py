@@ -7,7 +7,7 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.game.file import dump_game, parse_game
+from crgame_ros.game.file import parse_game
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.planner.registry import BUILT_IN, planner_class
@@ -142,8 +142,8 @@ def test_the_game_may_say_otherwise(file: Path) -> None:
     setup = game('external', lights=True)
     simulation, result = first_request(setup, HAZARD)
     assert told(setup, result.requests['av0'], simulation) == {'hv0': HAZARD}
-    assert yaml.safe_load(dump_game(setup.game))['avs'][0]['lights'] is True
-    assert 'lights' not in yaml.safe_load(dump_game(game('idm').game))['avs'][0]
+    assert yaml.safe_load(setup.game.dump())['avs'][0]['lights'] is True
+    assert 'lights' not in yaml.safe_load(game('idm').game.dump())['avs'][0]
 
 
 def test_a_planner_that_an_event_brings_in_is_told(file: Path) -> None:

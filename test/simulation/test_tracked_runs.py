@@ -11,7 +11,7 @@ from commonroad.planning.goal import GoalRegion
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
-from crgame_ros.game.file import dump_game, parse_game
+from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import AvSpec, DrivabilitySpec, Game, ModelSpec
 from crgame_ros.geometry.angles import wrap_pi_array
 from crgame_ros.paths import scenarios_directory
@@ -238,7 +238,7 @@ def everything() -> Iterator[Setup]:
 def test_the_written_game_is_the_same(everything: Setup) -> None:
     """The game that a run writes beside its recording reads back as the same AV."""
     game = everything.game
-    written = parse_game(yaml.safe_load(dump_game(game)), 'written', scenarios_directory())
+    written = parse_game(yaml.safe_load(game.dump()), 'written', scenarios_directory())
     assert game.avs is not None and written.avs is not None
     assert [replace(av, vehicle='') for av in written.avs] \
         == [replace(av, vehicle='') for av in game.avs]

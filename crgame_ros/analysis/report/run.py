@@ -15,7 +15,7 @@ from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.pictures.critical_moments import Moment
 from crgame_ros.analysis.report.story_moments import story_moments
 from crgame_ros.analysis.scores.plan_record import plans_of_report
-from crgame_ros.analysis.scores.scored_drives import RunScores, scores_of
+from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.objects import Role
 from crgame_ros.recording.reader import BagReader

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of a run's drives by nuPlan, and the expert: without CommonRoad's checker."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.nuplan import Expert, NuplanScore, NuplanScorer
@@ -11,14 +10,12 @@ from crgame_ros.analysis.scores.plan_record import PlanRecord
 from crgame_ros.analysis.scores.scored_drive import drive_of
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.vehicle import VehicleScores
-from crgame_ros.errors import CrgameError, InputError, one_line
+from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.reference_point import shifted
-from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import parse_scenario
 import numpy as np
-from shapely.errors import GEOSException
 
 
 def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
@@ -86,38 +83,6 @@ class _Drives:
             return self._nuplan.score(drive_of(log, number), expert, problem), ()
         except InputError as error:
             return None, (f'no nuPlan score: {error}',)
-
-
-class RunScores(NamedTuple):
-    """
-    The scores of a run.
-
-    :param vehicles: scores of each driven vehicle, in the log's order; empty without scores.
-    :param refusal: why there are no scores; empty otherwise.
-    """
-
-    vehicles: tuple[VehicleScores, ...] = ()
-    refusal: str = ''
-
-
-def scores_of(record: RunRecord, plans: Mapping[str, PlanRecord], *, drives_only: bool = False,
-              progress: Callable[[float], object] = lambda _: None) -> RunScores:
-    """
-    Score a run as `crgame score` does.
-
-    :param plans: plan records by AV, as far as known.
-    :param drives_only: whether to leave out CommonRoad's tools, which take most of the time.
-    :param progress: called with the share done so far, 0 to 1.
-    """
-    try:
-        if drives_only:
-            return RunScores(score_drives(record.log, plans=plans, put_back=record.put_back))
-        # The checker takes a second to import.
-        from crgame_ros.analysis.scores.scored_run import score_run
-        return RunScores(score_run(record, plans=plans, progress=progress).vehicles)
-    except (CrgameError, ValueError, GEOSException) as error:
-        # States from another publisher may have no outlines, and cannot be exported.
-        return RunScores((), one_line(str(error)))
 
 
 def expert_of_run(expert: RunTrajectories, log: RunTrajectories, name: str) -> Expert:

@@ -3,22 +3,60 @@
 """Judges solutions of planning problems with CommonRoad's tools."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from commonroad.common.solution import PlanningProblemSolution
+from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution
+from commonroad.scenario.scenario import ScenarioID
 from commonroad.scenario.state import TraceState
 from commonroad.scenario.trajectory import Trajectory
-from crgame_ros.analysis.scores.commonroad_costs import evaluate_costs
-from crgame_ros.analysis.scores.planner import SolutionScores
+from crgame_ros.analysis.scores.commonroad_costs import COSTS, evaluate_costs, TrajectoryCost
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
-from crgame_ros.analysis.scores.solution_checks import check_solution
+from crgame_ros.analysis.scores.solution_checks import check_solution, SolutionChecks
 from crgame_ros.analysis.scores.trajectory_feasibility import (
     check_feasibility,
+    TrajectoryFeasibility,
 )
 from crgame_ros.roads.boundary import RoadBoundary
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SolutionScores:
+    """
+    The results of CommonRoad's tools for the solution of one planning problem.
+
+    :param solved: the solution; its cost function is one of several.
+    :param exact_type: whether its vehicle type has the vehicle's dimensions.
+    :param costs: costs by function; empty without a trajectory.
+    :param checks: checks of `valid_solution`.
+    :param feasibility: feasibility with the vehicle model.
+    """
+
+    solved: PlanningProblemSolution
+    exact_type: bool
+    costs: tuple[TrajectoryCost, ...]
+    checks: SolutionChecks
+    feasibility: TrajectoryFeasibility
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields as a JSON-compatible dictionary."""
+        return {
+            'planning_problem': self.solved.planning_problem_id,
+            'vehicle': self.solved.vehicle_id, 'exact_vehicle_type': self.exact_type,
+            'states': len(self.solved.trajectory.state_list),
+            'costs': {cost.name: cost.as_dict() for cost in self.costs},
+            **self.checks.as_dict(), 'feasibility': self.feasibility.as_dict()}
+
+    def solutions(self, scenario_id: ScenarioID) -> dict[str, Solution]:
+        """Return a solution for each cost function that the vehicle model supports."""
+        found = self.solved
+        return {name: Solution(scenario_id, [PlanningProblemSolution(
+            found.planning_problem_id, found.vehicle_model, found.vehicle_type,
+            CostFunction[name], found.trajectory)]) for name in COSTS}
 
 
 class SolutionJudge:

@@ -10,7 +10,7 @@ from crgame_ros.analysis.scores.nuplan import NuplanScore
 from crgame_ros.analysis.scores.plan_record import GoalRecord, PlanRecord
 
 if TYPE_CHECKING:  # The checker takes a second to import, and reports of runs do without it.
-    from crgame_ros.analysis.scores.planner import SolutionScores
+    from crgame_ros.analysis.scores.solution_judge import SolutionScores
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import hashlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from crgame_ros import __version__
 from crgame_ros.analysis.tables.column import Column, FLAG, TableDeclaration
 from crgame_ros.analysis.tables.writer import Format, FORMULA_GUARD, NOT_A_NUMBER
+from crgame_ros.version import __version__
 
 PACKAGE_FILE = 'datapackage.json'
 CREATOR = 'crgame_ros'

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.plan_record import plans_of_report
-from crgame_ros.analysis.scores.scored_drives import scores_of
+from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER, TEXT
 from crgame_ros.analysis.tables.part import TablePart

@@ -14,7 +14,7 @@ from crgame_ros.analysis.report.file import write_report
 from crgame_ros.analysis.report.run import measured_run
 from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
-from crgame_ros.analysis.scores.scored_drives import scores_of
+from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.job_loop import serve_jobs
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.export import write_text

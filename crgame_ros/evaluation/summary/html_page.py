@@ -7,7 +7,6 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-from crgame_ros import __version__
 from crgame_ros.analysis.report.document import plain_document
 from crgame_ros.analysis.report.text import free, note, plain, table
 from crgame_ros.evaluation.summary.markdown import relative
@@ -30,6 +29,7 @@ from crgame_ros.evaluation.summary.tables import (
     SummaryTable,
 )
 from crgame_ros.recording.export import write_text
+from crgame_ros.version import __version__
 import numpy as np
 
 # Sizes in the picture, which is scaled as a whole [px].

@@ -11,7 +11,6 @@ from urllib.parse import urlencode
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.game.file import dump_game
 from crgame_ros.study.session_script import PracticeDrives, SessionItem
 from crgame_ros.study.trial_game import seat_of, trial_game
 from crgame_ros.study.trial_plan import PlannedTrial
@@ -159,7 +158,7 @@ def write_drive(item: SessionItem, games: Path) -> StudyDrive | None:
         return None
     game = trial_game(settings, COCKPIT)
     path = games / f'{item.id.replace("/", "_")}.yaml'
-    text = dump_game(game)
+    text = game.dump()
     games.mkdir(parents=True, exist_ok=True)
     write_whole(text.encode(), path)
     return StudyDrive(item, settings, seat_of(settings, game), path)

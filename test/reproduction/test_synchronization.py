@@ -10,15 +10,15 @@ import time
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
-from crgame_ros.analysis.reproduction.synchronization import (
+from crgame_ros.game.file import load_game
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.reproduction.synchronization import (
     judge_synchronization,
     NaiveLoop,
     others_beside,
     PAPER_TABLE,
     Synchronization,
 )
-from crgame_ros.game.file import load_game
-from crgame_ros.paths import scenarios_directory
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleTable, TIMING_COLUMNS
 import numpy as np

@@ -15,13 +15,13 @@ import platform
 import sys
 from typing import Any
 
-from crgame_ros import __version__
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS
-from crgame_ros.analysis.reproduction.commonroad_game import EvaluationPart, EvaluationRequest
-from crgame_ros.analysis.reproduction.expectation import Judgement
-from crgame_ros.analysis.reproduction.synchronization import PAPER_TABLE
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import write_text
+from crgame_ros.reproduction.commonroad_game import EvaluationPart, EvaluationRequest
+from crgame_ros.reproduction.expectation import Judgement
+from crgame_ros.reproduction.synchronization import PAPER_TABLE
+from crgame_ros.version import __version__
 
 # Captions of the figures, by file name: which figure of the paper each corresponds to.
 CAPTIONS = {
@@ -150,13 +150,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def reproduce(values: argparse.Namespace) -> int:
     """Run the experiments, write the report and print every expectation."""
-    from crgame_ros.analysis.reproduction.commonroad_game import (
+    from crgame_ros.planner.registry import planner_class
+    from crgame_ros.reproduction.commonroad_game import (
         evaluate_multi_av,
         evaluate_single_av,
         evaluate_timing,
         EvaluationRequest,
     )
-    from crgame_ros.planner.registry import planner_class
     formats = _formats(values.format)
     if not 1.0 <= values.duration < math.inf:
         raise InputError(f'is {values.duration:g} s', '--duration', 'give a second or more')

@@ -3,8 +3,8 @@
 """Runs that the tests of the reproduction share: each takes seconds."""
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.reproduction.recorded_human import record_offline, RecordedHuman
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.reproduction.recorded_human import record_offline, RecordedHuman
 import pytest
 
 

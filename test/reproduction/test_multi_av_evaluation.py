@@ -4,15 +4,15 @@
 
 from dataclasses import replace
 
-from crgame_ros.analysis.reproduction.recorded_human import record_offline
-from crgame_ros.analysis.reproduction.single_av_evaluation import (
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.run_trajectories import RunTrajectories
+from crgame_ros.reproduction.recorded_human import record_offline
+from crgame_ros.reproduction.single_av_evaluation import (
     judge_multi_av,
     jumps,
     MultiAvRun,
     run_alone,
 )
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.run_trajectories import RunTrajectories
 import numpy as np
 import pytest
 

@@ -5,17 +5,17 @@
 from dataclasses import replace
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.reproduction.encounter import DrivenLane, Encounter
-from crgame_ros.analysis.reproduction.expectation import judge
-from crgame_ros.analysis.reproduction.recorded_human import record_offline, RecordedHuman
-from crgame_ros.analysis.reproduction.single_av_evaluation import (
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.reproduction.encounter import DrivenLane, Encounter
+from crgame_ros.reproduction.expectation import judge
+from crgame_ros.reproduction.recorded_human import record_offline, RecordedHuman
+from crgame_ros.reproduction.single_av_evaluation import (
     HUMAN_EXPECTATIONS,
     IDM_EXPECTATIONS,
     judge_single_av,
     REACTIVE_EXPECTATIONS,
     SameHuman,
 )
-from crgame_ros.paths import scenarios_directory
 import numpy as np
 import pytest
 

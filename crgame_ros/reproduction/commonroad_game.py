@@ -14,27 +14,27 @@ from crgame_ros.analysis.pictures.frames_figure import frames_figure
 from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.pictures.timing_figure import timing_figure
-from crgame_ros.analysis.reproduction.encounter import Encounter
-from crgame_ros.analysis.reproduction.expectation import Judgement
-from crgame_ros.analysis.reproduction.recorded_human import (
+from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.export import write_bytes, write_scenario, write_text
+from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.reproduction.encounter import Encounter
+from crgame_ros.reproduction.expectation import Judgement
+from crgame_ros.reproduction.recorded_human import (
     record_live,
     record_offline,
     RecordedHuman,
 )
-from crgame_ros.analysis.reproduction.single_av_evaluation import (
+from crgame_ros.reproduction.single_av_evaluation import (
     judge_multi_av,
     judge_single_av,
     MultiAvRun,
     run_alone,
 )
-from crgame_ros.analysis.reproduction.synchronization import (
+from crgame_ros.reproduction.synchronization import (
     judge_synchronization,
     measure_synchronization,
     Synchronization,
 )
-from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.export import write_bytes, write_scenario, write_text
-from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from matplotlib.figure import Figure
 import numpy as np

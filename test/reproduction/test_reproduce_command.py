@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-from crgame_ros.analysis.reproduction.reproduce_command import CAPTIONS
 from crgame_ros.cli import main
+from crgame_ros.reproduction.reproduce_command import CAPTIONS
 import pytest
 
 pytestmark = pytest.mark.xdist_group('reproduction')

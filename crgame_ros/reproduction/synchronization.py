@@ -14,18 +14,18 @@ from typing import Any, TypeVar
 from crgame_ros.analysis.pictures.figure_run import FigureRun
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
-from crgame_ros.analysis.reproduction.expectation import (
-    Expectation,
-    Finding,
-    judge,
-    Judgement,
-)
-from crgame_ros.analysis.reproduction.recorded_human import run_live
 from crgame_ros.game.game import TimingSpec
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
+from crgame_ros.reproduction.expectation import (
+    Expectation,
+    Finding,
+    judge,
+    Judgement,
+)
+from crgame_ros.reproduction.recorded_human import run_live
 from crgame_ros.simulation.engine import Simulation
 from crgame_ros.simulation.observer import drivability_monitor
 from crgame_ros.simulation.offline import observed_run, offline_driver, PlannerSeat

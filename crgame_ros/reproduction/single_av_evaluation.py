@@ -9,16 +9,16 @@ import time
 from typing import NamedTuple
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.reproduction.encounter import Encounter, human_states
-from crgame_ros.analysis.reproduction.expectation import (
+from crgame_ros.launcher.arguments import RunRequest
+from crgame_ros.launcher.run_plan import effective_game, with_planners
+from crgame_ros.recording.run_trajectories import RunTrajectories, trajectories_of
+from crgame_ros.reproduction.encounter import Encounter, human_states
+from crgame_ros.reproduction.expectation import (
     Expectation,
     Finding,
     judge,
     Judgement,
 )
-from crgame_ros.launcher.arguments import RunRequest
-from crgame_ros.launcher.run_plan import effective_game, with_planners
-from crgame_ros.recording.run_trajectories import RunTrajectories, trajectories_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import StateColumn
