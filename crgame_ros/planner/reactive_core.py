@@ -4,6 +4,7 @@
 
 from copy import deepcopy
 import logging
+import math
 import os
 
 # commonroad-clcs imports pyplot, which costs a second with a backend that has windows.
@@ -150,8 +151,8 @@ class ReactiveCore:
 
         :param driving: the path that its curvilinear frame follows.
         :param position: where the ego is on it.
-        :raises PlanningError: if the ego rolls backwards or is too far from the path, or an
-            obstacle was never described.
+        :raises PlanningError: if the ego rolls backwards, faces back or is too far from the path,
+            or an obstacle was never described.
         """
         ego = request.ego
         if ego.speed < -REST:
@@ -168,7 +169,11 @@ class ReactiveCore:
         here = system.convert_to_curvilinear_coords(ego.x, ego.y)
         heading = float(np.interp(here[0], system.ref_pos, system.ref_theta))
         # The package compares headings without wrapping them.
-        self._turn = heading + wrap_pi(ego.yaw - heading) - ego.yaw
+        turned = wrap_pi(ego.yaw - heading)
+        if abs(turned) >= 0.5 * math.pi:
+            raise PlanningError(f'the vehicle is turned by {math.degrees(turned):.0f} deg against '
+                                'its path, which the package cannot plan')
+        self._turn = heading + turned - ego.yaw
         limit = self._vehicle.max_steering_angle
         state = ReactivePlannerState(
             time_step=request.k, position=np.array([ego.x, ego.y]),

@@ -140,6 +140,9 @@ def test_reactive_reports_that_nothing_is_feasible(vehicle: VehicleParameters) -
         ready('reactive', 20.0, 3).plan(support.request(ego(vehicle, 20.0), 0, wall))
     with pytest.raises(PlanningError, match='backwards'):
         ready('reactive').plan(support.request(ego(vehicle, -1.0)))
+    for yaw in (-1.7, 2.0, 3.1):
+        with pytest.raises(PlanningError, match=f'turned by {math.degrees(yaw):.0f} deg against'):
+            ready('reactive').plan(support.request(VehicleState(0.0, 0.0, yaw, 5.0)))
     for x, y, where in ((0.0, -59.0, '59 m beside'), (1e6, 0.0, 'm beyond the end of'),
                         (-1e6, 0.0, 'm before the start of')):
         with pytest.raises(PlanningError, match=f'{where} its path'):
