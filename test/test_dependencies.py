@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 THIRD_PARTY = {
     'PIL': ('pillow', 'python3-pil'),
     'aiohttp': ('aiohttp', 'python3-aiohttp'),
+    'annotated_types': ('annotated-types', None),
     'commonroad': ('commonroad-io', None),
     'commonroad_clcs': ('commonroad-clcs', None),
     'commonroad_dc': ('commonroad-drivability-checker', None),
@@ -34,6 +35,7 @@ THIRD_PARTY = {
     'numpy': ('numpy', 'python3-numpy'),
     'packaging': ('packaging', 'python3-packaging'),
     'pyarrow': ('pyarrow', None),
+    'pydantic': ('pydantic', None),
     'rosbags': ('rosbags', None),
     'scipy': ('scipy', 'python3-scipy'),
     'shapely': ('shapely', 'python3-shapely'),

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Interface of the source behind the page: a live run or a recording."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Protocol, TYPE_CHECKING
+from typing import Literal, Protocol, TYPE_CHECKING
 
 from aiohttp import web
+from crgame_ros.cockpit.page_messages import Command
 
 if TYPE_CHECKING:
     from crgame_ros.cockpit.client import Client
@@ -32,7 +32,7 @@ class Backend(Protocol):
     async def stop(self) -> None:
         """Stop sending; called once, after the last client has left."""
 
-    async def command(self, client: 'Client', message: Mapping[str, Any]) -> str:
+    async def command(self, client: 'Client', message: Command) -> str:
         """
         Carry out the request of a client.
 
@@ -40,7 +40,7 @@ class Backend(Protocol):
         anything; the other messages of a client are awaited one after another.
 
         :param client: the client that asks.
-        :param message: a checked message as `messages.parse_message` returns it.
+        :param message: what it asks.
         :return: text of the reply.
         :raises CrgameError: if the request is refused; the text of the error is the reply.
         """

@@ -10,7 +10,7 @@ import secrets
 from typing import Protocol
 
 from aiohttp import WSMsgType
-from crgame_ros.cockpit.page_messages import SeenView
+from crgame_ros.cockpit.page_messages import Layers, SeenView, Sound
 from crgame_ros.cockpit.rights import ALL_RIGHTS
 
 MAX_WAITING = 256
@@ -32,19 +32,11 @@ class _Text:
     data: bytes
 
 
-@dataclass(frozen=True)
-class Sound:
-    """
-    Sound and rumble settings of a page.
-
-    :param on: whether sound is played during a run.
-    :param volume: 0 to 1.
-    :param rumble: strength of its gamepads' motors, 0 to 1.
-    """
-
-    on: bool = False
-    volume: float = 0.0
-    rumble: float = 0.0
+# Of a page that has reported nothing yet.
+SILENT = Sound(on=False, volume=0.0, rumble=0.0)
+NOT_SEEN = SeenView.model_construct(
+    shown='', inset=False, plans=False, mirrors=False, bare=False, software=False, width_px=0.0,
+    height_px=0.0, ratio=1.0)
 
 
 class TokenBucket:
@@ -109,8 +101,8 @@ class Client:
         self.perceives_as = ''
         self.wants_scans = False
         # As last reported by the page.
-        self.sound = Sound()
-        self.view = SeenView()
+        self.sound = SILENT
+        self.view = NOT_SEEN
         # Least time between two frames of the slot 'state' [s]; 0 sends every frame.
         self.state_period_s = 0.0
         self.dropped = ''
@@ -126,6 +118,15 @@ class Client:
         self._sent = 0
         # Messages sent, bytes unsent, and since when neither has moved [s].
         self._stall: tuple[int, int, float] | None = None
+
+    def choose_layers(self, wanted: Layers) -> None:
+        """Send other layers from now on; those that are not named stay as they are."""
+        if wanted.predictions is not None:
+            self.wants_predictions = wanted.predictions
+        if wanted.perception is not None:
+            self.perceives_as = wanted.perception
+        if wanted.scans is not None:
+            self.wants_scans = wanted.scans
 
     @property
     def waiting(self) -> int:

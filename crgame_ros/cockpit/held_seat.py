@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A seat that the driver at a page holds, and the driver's inputs."""
 
-from collections.abc import Mapping
-from typing import Any
-
+from crgame_ros.cockpit.page_messages import Input
 from crgame_ros.driver.indicator_lever import IndicatorLever, LightButtons
 from crgame_ros.driver.input_delay import InputDelay
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
@@ -44,28 +42,24 @@ class HeldSeat:
         self._heard_s = 0.0
         self.away = True
 
-    def apply_input(self, message: Mapping[str, Any], now_s: float) -> bool:
+    def apply_input(self, message: Input, now_s: float) -> bool:
         """
-        Apply a checked input message of the holder.
+        Apply an input of the holder.
 
         :param now_s: steady clock [s]
         :return: whether the inputs differ from the ones before.
         """
         self._heard_s = now_s
         before = (self._keys, self._axes)
-        self._put_back = bool(message.get('put_back'))
-        reverse = bool(message.get('reverse'))
-        keys, axes = message.get('keys'), message.get('axes')
-        self.away = keys is None and axes is None
-        self._lever.hold(i for i, held in enumerate(message.get('lights', ())) if held)
-        if self.away:
+        self._put_back = message.put_back
+        self.away = bool(message.away)
+        self._lever.hold(i for i, held in enumerate(message.lights or ()) if held)
+        if message.axes is not None:
+            self._keys, self._axes = None, DriverCommand(*message.axes, message.reverse)
+        elif message.keys is not None:
+            self._keys, self._axes = KeyState(*message.keys, message.reverse), None
+        else:
             self.release()
-        elif axes is not None:
-            throttle, brake, steering = axes
-            self._keys, self._axes = None, DriverCommand(throttle, brake, steering, reverse)
-        elif keys is not None:
-            throttle, brake, left, right = map(bool, keys)
-            self._keys, self._axes = KeyState(throttle, brake, left, right, reverse), None
         return (self._keys, self._axes) != before
 
     def release(self) -> None:

@@ -4,7 +4,7 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 import json
 from pathlib import Path
@@ -15,6 +15,7 @@ from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
 from crgame_ros.analysis.criticality.rows import criticality_rows, CRITICALITY_TOPIC
 from crgame_ros.cockpit.message_frames import MessageFrames
+from crgame_ros.cockpit.page_messages import Command
 from crgame_ros.cockpit.replay_chunks import ChunkBuilder
 from crgame_ros.cockpit.replay_index import index_run, RunIndex
 from crgame_ros.cockpit.replay_outline import pack
@@ -302,7 +303,7 @@ class ReplayBackend:
         """Close the recording."""
         self.close()
 
-    async def command(self, client: 'Client', message: Mapping[str, Any]) -> str:
+    async def command(self, client: 'Client', message: Command) -> str:
         """
         Raise CrgameError: a recording cannot be controlled.
 

@@ -12,12 +12,11 @@ from crgame_ros.errors import InputError
 from crgame_ros.game.documents import (
     GameDocument,
     parse_events_document,
-    parse_seats_document,
     parse_signals_document,
 )
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
-from crgame_ros.game.seat_documents import parse_tenants
+from crgame_ros.game.seat_documents import parse_seats_document, parse_tenants
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status, Status
 from crgame_ros.recording.reader import DecodedMessage
@@ -206,7 +205,7 @@ class TrackCollector:
             if kind == 'signals':
                 signals = parse_signals_document(text)
                 n = (signals.k - self._scheduler.k0) * self._scheduler.steps_per_tick
-                self._put(kind, max(n, 0), signals._asdict())
+                self._put(kind, max(n, 0), asdict(signals))
             elif kind == 'seats':
                 self._put(kind, newest or 0, {'seats': _seats(text)})
             else:

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rights of a person at a page: direct the experiment, drive, or watch."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 # The roles that a page, a link or the address may request.
 ROLES = ('direct', 'drive', 'watch', 'all')
@@ -70,8 +68,3 @@ class Rights:
 
 
 ALL_RIGHTS = Rights()
-
-
-def refusal_of(rights: Rights, message: Mapping[str, Any]) -> str:
-    """Return why a page's message is refused; empty if it is not."""
-    return rights.refusal(message['type'], message.get('action', ''))

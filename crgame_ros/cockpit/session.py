@@ -3,20 +3,31 @@
 """One WebSocket connection from its first message to its end."""
 
 import asyncio
-from collections.abc import Mapping
 import contextlib
 import logging
 import socket
-from typing import Any
 
 from aiohttp import web, WSCloseCode, WSMsgType
-from crgame_ros.cockpit import page_messages
 from crgame_ros.cockpit.backend import Backend
-from crgame_ros.cockpit.client import Client, Sound, TokenBucket
+from crgame_ros.cockpit.client import Client, TokenBucket
 from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.page_messages import SeenView
+from crgame_ros.cockpit.page_messages import (
+    DeviceUsed,
+    Input,
+    Layers,
+    MAX_BYTES,
+    Name,
+    Order,
+    parse_message,
+    Person,
+    Ping,
+    Request,
+    Role,
+    SeenView,
+    Sound,
+    TaskDone,
+)
 from crgame_ros.cockpit.request_guard import browser_of, granted
-from crgame_ros.cockpit.rights import refusal_of
 from crgame_ros.errors import CrgameError, InputError
 
 MESSAGES_PER_S = 400.0
@@ -47,9 +58,9 @@ class Session:
         # because they count as messages, and closes, because the backend comes first.
         self.socket = web.WebSocketResponse(
             timeout=CLOSE_S, heartbeat=HEARTBEAT_S, compress=False, autoping=False,
-            autoclose=False, max_msg_size=page_messages.MAX_BYTES + 1, writer_limit=0)
+            autoclose=False, max_msg_size=MAX_BYTES + 1, writer_limit=0)
         self._bucket = TokenBucket(MESSAGES_PER_S, MESSAGE_BURST)
-        self._requests: asyncio.Queue[Mapping[str, Any] | None] = asyncio.Queue(MAX_REQUESTS)
+        self._requests: asyncio.Queue[Order | None] = asyncio.Queue(MAX_REQUESTS)
         self._malformed = 0
         self._transport: asyncio.WriteTransport | None = None
         self._worker: asyncio.Task[None] | None = None
@@ -146,51 +157,49 @@ class Session:
 
     async def _handle(self, client: Client, text: str) -> None:
         try:
-            message = page_messages.parse_message(text)
+            message = parse_message(text)
         except InputError as error:
             self._blame(client, error)
             return
-        refusal = refusal_of(client.rights, message)
-        match message['type']:
+        refusal = client.rights.refusal(message.type, getattr(message, 'action', ''))
+        match message:
             case _ if refusal and self._backend.mode == 'live':
-                if 'id' in message:
+                if isinstance(message, Request):
                     self._reply(client, message, False, refusal)
-            case 'input' | 'task':
+            case Input() | TaskDone():
                 try:
                     await self._backend.command(client, message)
                 except CrgameError as error:
                     # Inputs repeat every 50 ms, and go on for a while after a seat was lost. The
                     # seats document already names the holders.
-                    _log.debug('%s of %s: %s', message['type'], client.id, error)
-            case 'name':
-                client.name = message['name']
-            case 'layers':
-                client.wants_predictions = message.get('predictions', client.wants_predictions)
-                client.perceives_as = message.get('perception', client.perceives_as)
-                client.wants_scans = message.get('scans', client.wants_scans)
+                    _log.debug('%s of %s: %s', message.type, client.id, error)
+            case Name():
+                client.name = message.name
+            case Layers():
+                client.choose_layers(message)
                 self._hub.send_wanted(client)
-            case 'sound':
-                client.sound = Sound(message['on'], message['volume'], message['rumble'])
-            case 'view':
-                client.view = SeenView(**{key: value for key, value in message.items()
-                                          if key != 'type'})
-            case 'person':
-                self._hub.identify(client, message['key'], fresh=message['fresh'])
+            case Sound():
+                client.sound = message
+            case SeenView():
+                client.view = message
+            case Person():
+                self._hub.identify(client, message.key, fresh=message.fresh)
                 self._backend.joined(client)
-            case 'role':
-                client.rights = client.granted.narrowed(message['role'])
+            case Role():
+                client.rights = client.granted.narrowed(message.role)
                 self._hub.send_rights(client)
                 self._backend.joined(client)
                 self._reply(client, message, True, f'you are a {client.rights.role}')
-            case 'device':
-                client.device = message['device']
-            case 'ping':
-                client.round_trip_ms = message.get('round_trip_ms', client.round_trip_ms)
-                self._hub.send_event('pong', {'t': message['t']}, only=client)
+            case DeviceUsed():
+                client.device = message.device
+            case Ping():
+                if message.round_trip_ms is not None:
+                    client.round_trip_ms = message.round_trip_ms
+                self._hub.send_event('pong', {'t': message.t}, only=client)
             case _:
                 await self._ask(client, message)
 
-    async def _ask(self, client: Client, message: Mapping[str, Any]) -> None:
+    async def _ask(self, client: Client, message: Order) -> None:
         try:
             self._requests.put_nowait(message)
         except asyncio.QueueFull:
@@ -209,13 +218,13 @@ class Session:
             except CrgameError as error:
                 self._reply(client, message, False, str(error))
             except Exception:
-                _log.exception('%s of %s', message['type'], client.id)
+                _log.exception('%s of %s', message.type, client.id)
                 self._reply(client, message, False, 'it failed; the log of the server says why')
             else:
                 self._reply(client, message, True, text)
 
-    def _reply(self, client: Client, message: Mapping[str, Any], ok: bool, text: str) -> None:
-        self._hub.send_event('reply', {'to': message['id'], 'ok': ok, 'text': text}, only=client)
+    def _reply(self, client: Client, message: Request, ok: bool, text: str) -> None:
+        self._hub.send_event('reply', {'to': message.id, 'ok': ok, 'text': text}, only=client)
 
 
 def _end_with(writer: asyncio.Task[None], client: Client) -> None:

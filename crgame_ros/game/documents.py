@@ -8,11 +8,12 @@ neither the game's files nor the engine.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 import json
 from pathlib import Path
-from typing import Any, get_args, NamedTuple
+from typing import Annotated, Any, get_args
 
+from annotated_types import Interval
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import (
     DrivenAv,
@@ -20,15 +21,14 @@ from crgame_ros.game.driven_vehicle import (
     DrivenVehicle,
     read_av,
     read_human,
-    VEHICLE_ID,
 )
 from crgame_ros.game.events import EventList, EventSpec, FiredBy, FiredEvent
 from crgame_ros.game.game import DrivabilitySpec, EnvironmentSpec, MAX_VEHICLES, TimingSpec
-from crgame_ros.game.objects import ObjectDescription, Role
+from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.geometry.shape import Shape
+from crgame_ros.schema.json_documents import DocumentReader
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
 from crgame_ros.vehicle.lights import ALL_LIGHTS
@@ -37,7 +37,6 @@ GAME_TOPIC = '/scenario/game'
 OBJECTS_TOPIC = '/scenario/objects'
 EVENTS_TOPIC = '/scenario/events'
 SIGNALS_TOPIC = '/scenario/signals'
-SEATS_TOPIC = '/seats'
 RUN_STATE_TOPIC = '/sim/state'
 # Upper limit of a ROS stamp [ns].
 LARGEST_NUMBER = 2**31 * 10**9
@@ -174,75 +173,65 @@ def objects_document(descriptions: Sequence[ObjectDescription]) -> str:
         for item in descriptions], allow_nan=False)
 
 
+_OBJECTS: DocumentReader[tuple[ObjectDescription, ...]] = DocumentReader(
+    tuple[ObjectDescription, ...], OBJECTS_TOPIC, 'list of objects')
+
+
 def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
     """
     Read `/scenario/objects`.
 
     :raises InputError: if it is not what `objects_document` writes.
     """
-    try:
-        return tuple(
-            ObjectDescription(
-                str(item['id']), str(item['type']), Role(item['role']),
-                Shape(item['shape']['kind'], float(item['shape']['length']),
-                      float(item['shape']['width']),
-                      tuple((float(x), float(y)) for x, y in item['shape']['vertices'])),
-                float(item['rear_to_center']))
-            for item in json.loads(text))
-    except MALFORMED as error:
-        raise InputError(f'is no list of objects ({type(error).__name__}: {error})',
-                         OBJECTS_TOPIC) from error
+    return _OBJECTS.read(text)
 
 
-class Signals(NamedTuple):
+@dataclass(frozen=True)
+class Signals:
     """
     What is shown from a scenario step on.
 
     :param k: scenario step.
     :param states: of each traffic light, by its id.
-    :param objects: bits of `Light` of recorded vehicles with signals, by id.
+    :param objects: bits of `Light` of recorded vehicles with signals, by id; earlier recordings
+        lack them.
     """
 
     k: int
     states: dict[str, str]
-    objects: dict[str, int]
+    objects: dict[str, Annotated[int, Interval(ge=0, le=ALL_LIGHTS)]] = field(
+        default_factory=dict)
+
+
+_SIGNALS: DocumentReader[Signals] = DocumentReader(Signals, SIGNALS_TOPIC, 'list of states')
 
 
 def parse_signals_document(text: str) -> Signals:
     """
-    Read `/scenario/signals`; earlier recordings lack the objects.
+    Read `/scenario/signals`.
 
     :raises InputError: if it is malformed.
     """
-    try:
-        content = json.loads(text)
-        return Signals(
-            int(content['k']),
-            {str(light): str(state) for light, state in content['states'].items()},
-            {str(name): int(bits) & ALL_LIGHTS
-             for name, bits in content.get('objects', {}).items()})
-    except MALFORMED as error:
-        raise InputError(f'is no list of states ({type(error).__name__}: {error})',
-                         SIGNALS_TOPIC) from error
+    return _SIGNALS.read(text)
 
 
-def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
-    """
-    Read `/seats`.
+@dataclass(frozen=True)
+class _FiredEntry:
+    name: str
+    n: int
+    k: int
+    by: str
 
-    :return: source and driver of each seat, by vehicle.
-    :raises InputError: if it does not follow the contract.
-    """
-    try:
-        seats = {name: {'source': entry['source'], 'driver': entry['driver']}
-                 for name, entry in json.loads(text).items()}
-    except MALFORMED as error:
-        raise InputError('is not what the contract says', SEATS_TOPIC) from error
-    for name, entry in seats.items():
-        if VEHICLE_ID.fullmatch(name) is None \
-                or not all(isinstance(value, str) for value in entry.values()):
-            raise InputError('is not what the contract says', SEATS_TOPIC)
-    return seats
+
+@dataclass(frozen=True)
+class _FiredEvents:
+    epoch: int
+    fired: tuple[_FiredEntry, ...]
+
+
+_CAUSES: dict[str, FiredBy] = {cause: cause for cause in get_args(FiredBy)}
+_EVENTS: DocumentReader[_FiredEvents] = DocumentReader(
+    _FiredEvents, EVENTS_TOPIC, 'list of events')
 
 
 def events_document(epoch: int, fired: Sequence[FiredEvent]) -> str:
@@ -257,18 +246,15 @@ def parse_events_document(text: str) -> tuple[int, tuple[FiredEvent, ...]]:
     :return: the epoch, and the events that took effect in it, in order.
     :raises InputError: if it is not what `events_document` writes.
     """
-    try:
-        content = json.loads(text)
-        return int(content['epoch']), tuple(
-            FiredEvent(str(item['name']), int(item['n']), int(item['k']),
-                       item['by'] if item['by'] in get_args(FiredBy) else 'condition')
-            for item in content['fired'])
-    except MALFORMED as error:
-        raise InputError(f'is no list of events ({type(error).__name__}: {error})',
-                         EVENTS_TOPIC) from error
+    found = _EVENTS.read(text)
+    # A newer program may know more causes.
+    return found.epoch, tuple(
+        FiredEvent(item.name, item.n, item.k, _CAUSES.get(item.by, 'condition'))
+        for item in found.fired)
 
 
-class RunStateDocument(NamedTuple):
+@dataclass(frozen=True)
+class RunStateDocument:
     """
     The content of `/sim/state` that names a run and tells whether it goes on.
 
@@ -281,19 +267,17 @@ class RunStateDocument(NamedTuple):
     state: str
 
 
+_RUN_STATE: DocumentReader[RunStateDocument] = DocumentReader(
+    RunStateDocument, RUN_STATE_TOPIC, 'state of a run')
+
+
 def parse_run_state(text: str) -> RunStateDocument:
     """
     Read `/sim/state`.
 
     :raises InputError: if it is not what sim_node writes.
     """
-    try:
-        content = json.loads(text)
-        return RunStateDocument(str(content['simulation']), int(content['epoch']),
-                                str(content['state']))
-    except MALFORMED as error:
-        raise InputError(f'is no state of a run ({type(error).__name__}: {error})',
-                         RUN_STATE_TOPIC) from error
+    return _RUN_STATE.read(text)
 
 
 def document_entry(event: EventSpec) -> dict[str, Any]:

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math
 import re
-from typing import Any
+from typing import Annotated, Any
 
+from annotated_types import Predicate
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.schema.reading import read
@@ -17,6 +18,7 @@ from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 # Parameters of a vehicle that are not numbers.
 TEXTS = ('name', 'steering_ratio', 'type', 'powertrain')
 VEHICLE_ID = re.compile(r'(hv|av)\d{1,3}')
+VehicleId = Annotated[str, Predicate(VEHICLE_ID.fullmatch)]
 
 
 @dataclass(frozen=True)

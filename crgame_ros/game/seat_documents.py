@@ -2,19 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The persons in seats as JSON text: parts of `/seats`, `/seats/order` and `/seats/drivers`."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 import json
-from typing import Any
+from typing import Annotated, Any
 
+from annotated_types import Len, Predicate
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import MALFORMED, SEATS_TOPIC
-from crgame_ros.game.driven_vehicle import VEHICLE_ID
+from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.schema.json_documents import DocumentReader
 
+SEATS_TOPIC = '/seats'
 ORDER_TOPIC = '/seats/order'
 DRIVERS_TOPIC = '/seats/drivers'
-MAX_PERSON_TEXT = 80
 MAX_SOURCE_LENGTH = 40
+# Printable, in one line.
+SourceName = Annotated[str, Len(1, MAX_SOURCE_LENGTH), Predicate(str.isprintable)]
+PersonText = Annotated[str, Len(0, 80), Predicate(str.isprintable)]
 
 
 @dataclass(frozen=True)
@@ -29,11 +33,11 @@ class SeatPerson:
     :param role: in the experiment.
     """
 
-    id: str  # noqa: A003
-    name: str = ''
-    device: str = ''
-    browser: str = ''
-    role: str = ''
+    id: SourceName  # noqa: A003
+    name: PersonText = ''
+    device: PersonText = ''
+    browser: PersonText = ''
+    role: PersonText = ''
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ class SeatDemand:
     """
 
     seat: str
-    source: str | None = None
+    source: SourceName | None = None
     person: SeatPerson | None = None
     displaced: str | None = None
     left: str | None = None
@@ -85,7 +89,7 @@ class DrivingSpell:
     :param until_n: the first step of the next spell; None if it has not ended.
     """
 
-    seat: str
+    seat: VehicleId
     source: str
     driver: str
     person: SeatPerson | None
@@ -101,18 +105,40 @@ def seat_entry(source: str, driver: str, tenant: SeatOccupant | None) -> dict[st
     return entry
 
 
+@dataclass(frozen=True)
+class _SeatEntry:
+    """An entry of `/seats`; without a person, nobody has sat there."""
+
+    source: str
+    driver: str
+    person: SeatPerson | None = None
+    here: bool = False
+    ready: bool = False
+
+
+_SEATS: DocumentReader[dict[str, _SeatEntry]] = DocumentReader(
+    dict[VehicleId, _SeatEntry], SEATS_TOPIC, 'list of seats')
+
+
+def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
+    """
+    Read `/seats`.
+
+    :return: source and driver of each seat, by vehicle.
+    :raises InputError: if it does not follow the contract.
+    """
+    return {name: {'source': entry.source, 'driver': entry.driver}
+            for name, entry in _SEATS.read(text).items()}
+
+
 def parse_tenants(text: str) -> dict[str, SeatOccupant]:
     """
     Read the occupants of the seats from `/seats`.
 
     :raises InputError: if it does not follow the contract.
     """
-    try:
-        return {str(name): SeatOccupant(_person(entry['person']), entry['here'] is True,
-                                        entry['ready'] is True)
-                for name, entry in json.loads(text).items() if entry.get('person') is not None}
-    except (*MALFORMED, InputError) as error:
-        raise InputError('is not what the contract says', SEATS_TOPIC) from error
+    return {name: SeatOccupant(entry.person, entry.here, entry.ready)
+            for name, entry in _SEATS.read(text).items() if entry.person is not None}
 
 
 def demand_text(demand: SeatDemand) -> str:
@@ -127,25 +153,28 @@ def parse_demand(text: str) -> SeatDemand:
 
     :raises InputError: if it is malformed.
     """
-    try:
-        content = json.loads(text)
-        person, ready = content.get('person'), content.get('ready')
-        demand = SeatDemand(
-            str(content['seat']), content.get('source'),
-            None if person is None else _person(person), content.get('displaced'),
-            content.get('left'), None if ready is None else ready is True)
-    except MALFORMED as error:
-        raise InputError('is no order', ORDER_TOPIC, 'give seat and source') from error
+    demand = _DEMAND.read(text)
     if (demand.source, demand.person, demand.left, demand.ready) == (None,) * 4:
         raise InputError('is no order', ORDER_TOPIC, 'give seat and source')
-    if demand.source is not None and not is_short(demand.source, MAX_SOURCE_LENGTH):
-        raise InputError('the source is no name', ORDER_TOPIC, 'give game or a driver')
     return demand
+
+
+_DEMAND: DocumentReader[SeatDemand] = DocumentReader(
+    SeatDemand, ORDER_TOPIC, 'order', 'give seat and source')
+
+
+@dataclass(frozen=True)
+class _Spells:
+    epoch: int
+    drivers: tuple[DrivingSpell, ...]
+
+
+_SPELLS: DocumentReader[_Spells] = DocumentReader(_Spells, DRIVERS_TOPIC, 'list of drivers')
 
 
 def spells_document(epoch: int, spells: Iterable[DrivingSpell]) -> str:
     """Return the text of `/seats/drivers`."""
-    return json.dumps({'epoch': epoch, 'drivers': [asdict(item) for item in spells]})
+    return json.dumps(asdict(_Spells(epoch, tuple(spells))))
 
 
 def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
@@ -155,32 +184,5 @@ def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
     :return: the epoch, and its driving spells.
     :raises InputError: if it is not what `spells_document` writes.
     """
-    try:
-        content = json.loads(text)
-        spells = tuple(
-            DrivingSpell(str(item['seat']), str(item['source']), str(item['driver']),
-                         None if item['person'] is None else _person(item['person']),
-                         int(item['from_n']),
-                         None if item['until_n'] is None else int(item['until_n']))
-            for item in content['drivers'])
-        epoch = int(content['epoch'])
-    except (*MALFORMED, InputError) as error:
-        raise InputError('is not what the contract says', DRIVERS_TOPIC) from error
-    if not all(VEHICLE_ID.fullmatch(item.seat) for item in spells):
-        raise InputError('is not what the contract says', DRIVERS_TOPIC)
-    return epoch, spells
-
-
-def is_short(text: object, length: int, least: int = 1) -> bool:
-    """Return whether a value is a printable text of one line."""
-    return isinstance(text, str) and least <= len(text) <= length and text.isprintable()
-
-
-def _person(entry: Mapping[str, Any]) -> SeatPerson:
-    person = SeatPerson(entry['id'], *(entry.get(name, '') for name in (
-        'name', 'device', 'browser', 'role')))
-    if not is_short(person.id, MAX_SOURCE_LENGTH) or not all(
-            is_short(text, MAX_PERSON_TEXT, 0)
-            for text in (person.name, person.device, person.browser, person.role)):
-        raise InputError('the person is not described as the contract says', ORDER_TOPIC)
-    return person
+    found = _SPELLS.read(text)
+    return found.epoch, found.drivers

@@ -5,13 +5,12 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import json
-import math
-from typing import Any, get_args, Literal
+from typing import Annotated, Literal
 
-from crgame_ros.errors import InputError
-from crgame_ros.game.documents import MALFORMED
-from crgame_ros.game.driven_vehicle import VEHICLE_ID
-from crgame_ros.game.task_spec import TaskKind, TASKS
+from annotated_types import Interval, Len
+from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.game.task_spec import TaskKind
+from crgame_ros.schema.json_documents import DocumentReader
 
 LOG_TOPIC = '/tasks/log'
 STATE_TOPIC = '/tasks/state'
@@ -19,6 +18,8 @@ REPORT_TOPIC = '/tasks/report'
 MAX_NUMBER = 1_000_000
 # Longest time in a page's report [ms].
 LONGEST_MS = 600_000.0
+PromptNumber = Annotated[int, Interval(ge=0, le=MAX_NUMBER)]
+Milliseconds = Annotated[float, Interval(ge=-LONGEST_MS, le=LONGEST_MS)]
 
 # Kinds of task entries: the task begins or ends; a stimulus or request comes, is shown, or is
 # over; the driver answers (`unrequested` answers had no stimulus).
@@ -38,10 +39,10 @@ class PageTimes:
     :param paused_ms: pauses between frame and answer, which the response time leaves out.
     """
 
-    response_ms: float | None = None
-    delay_ms: float | None = None
-    picture_ms: float | None = None
-    paused_ms: float | None = None
+    response_ms: Milliseconds | None = None
+    delay_ms: Milliseconds | None = None
+    picture_ms: Milliseconds | None = None
+    paused_ms: Milliseconds | None = None
 
 
 NOT_MEASURED = PageTimes()
@@ -66,9 +67,9 @@ class TaskEntry:
     n: int
     task: str
     kind: TaskKind
-    seat: str
+    seat: VehicleId
     what: TaskHappening
-    number: int = 0
+    number: PromptNumber = 0
     by: str = ''
     times: PageTimes = NOT_MEASURED
 
@@ -86,8 +87,8 @@ class OpenPrompt:
     """
 
     task: str
-    seat: str
-    number: int
+    seat: VehicleId
+    number: PromptNumber
     n: int
     seen: bool = False
 
@@ -104,16 +105,42 @@ class TaskReport:
     :param times: as the page has measured them.
     """
 
-    seat: str
-    task: str
-    number: int
+    seat: VehicleId
+    task: Annotated[str, Len(0, 40)]
+    number: PromptNumber
     what: Literal['shown', 'answer']
     times: PageTimes = NOT_MEASURED
 
 
+@dataclass(frozen=True)
+class _Log:
+    epoch: int
+    entries: tuple[TaskEntry, ...]
+
+
+@dataclass(frozen=True)
+class TaskState:
+    """
+    The content of `/tasks/state`.
+
+    :param epoch: of the run.
+    :param running: names of the running tasks.
+    :param open: what is neither answered nor over.
+    """
+
+    epoch: int
+    running: tuple[str, ...]
+    open: tuple[OpenPrompt, ...]  # noqa: A003
+
+
+_LOG: DocumentReader[_Log] = DocumentReader(_Log, LOG_TOPIC, 'log of tasks')
+_STATE: DocumentReader[TaskState] = DocumentReader(TaskState, STATE_TOPIC, 'state of tasks')
+_REPORT: DocumentReader[TaskReport] = DocumentReader(TaskReport, REPORT_TOPIC, 'report of a page')
+
+
 def log_document(epoch: int, entries: Sequence[TaskEntry]) -> str:
     """Return the text of `/tasks/log`: the entries of one step."""
-    return json.dumps({'epoch': epoch, 'entries': [asdict(entry) for entry in entries]})
+    return json.dumps(asdict(_Log(epoch, tuple(entries))))
 
 
 def parse_log(text: str) -> tuple[int, tuple[TaskEntry, ...]]:
@@ -123,36 +150,22 @@ def parse_log(text: str) -> tuple[int, tuple[TaskEntry, ...]]:
     :return: the epoch, and the entries, in order.
     :raises InputError: if it is not what `log_document` writes.
     """
-    try:
-        content = json.loads(text)
-        return int(content['epoch']), tuple(_entry(each) for each in content['entries'])
-    except MALFORMED as error:
-        raise InputError(f'is no log of tasks ({type(error).__name__}: {error})',
-                         LOG_TOPIC) from error
+    found = _LOG.read(text)
+    return found.epoch, found.entries
 
 
-def state_document(epoch: int, running: Sequence[str], prompts: Sequence[OpenPrompt]) -> str:
-    """Return the text of `/tasks/state`: the running tasks and the open prompts."""
-    return json.dumps({'epoch': epoch, 'running': list(running),
-                       'open': [asdict(prompt) for prompt in prompts]})
+def state_document(state: TaskState) -> str:
+    """Return the text of `/tasks/state`."""
+    return json.dumps(asdict(state))
 
 
-def parse_state(text: str) -> tuple[int, dict[str, Any]]:
+def parse_state(text: str) -> TaskState:
     """
     Read `/tasks/state`.
 
-    :return: the epoch, and `running` and `open` for the pages.
     :raises InputError: if it is not what `state_document` writes.
     """
-    try:
-        content = json.loads(text)
-        return int(content['epoch']), {
-            'running': [str(name) for name in content['running']],
-            'open': [asdict(OpenPrompt(
-                str(each['task']), _seat(each['seat']), _number(each['number']), int(each['n']),
-                bool(each['seen']))) for each in content['open']]}
-    except MALFORMED as error:
-        raise InputError('is not what the contract says', STATE_TOPIC) from error
+    return _STATE.read(text)
 
 
 def report_text(report: TaskReport) -> str:
@@ -166,43 +179,4 @@ def parse_report(text: str) -> TaskReport:
 
     :raises InputError: if it is not what `report_text` writes.
     """
-    try:
-        content = json.loads(text)
-        if content['what'] not in ('shown', 'answer'):
-            raise ValueError('neither shown nor answer')
-        return TaskReport(_seat(content['seat']), str(content['task'])[:40],
-                          _number(content['number']), content['what'], _times(content['times']))
-    except MALFORMED as error:
-        raise InputError('is not what the contract says', REPORT_TOPIC) from error
-
-
-def _entry(content: Any) -> TaskEntry:
-    if content['kind'] not in TASKS or content['what'] not in get_args(TaskHappening):
-        raise ValueError('no such kind of entry')
-    return TaskEntry(int(content['n']), str(content['task']), content['kind'],
-                     _seat(content['seat']), content['what'], _number(content['number']),
-                     str(content['by']), _times(content['times']))
-
-
-def _seat(value: Any) -> str:
-    if not isinstance(value, str) or VEHICLE_ID.fullmatch(value) is None:
-        raise ValueError('no vehicle')
-    return value
-
-
-def _number(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MAX_NUMBER:
-        raise ValueError('no number')
-    return value
-
-
-def _times(content: Any) -> PageTimes:
-    return PageTimes(**{name: _milliseconds(content[name]) for name in PageTimes.__annotations__})
-
-
-def _milliseconds(value: Any) -> float | None:
-    if value is None:
-        return None
-    if isinstance(value, bool) or not math.isfinite(value) or abs(value) > LONGEST_MS:
-        raise ValueError('no time')
-    return float(value)
+    return _REPORT.read(text)

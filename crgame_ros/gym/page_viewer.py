@@ -8,7 +8,7 @@ real time. Users cannot steer there: only the agent drives.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 import sys
 import threading
 import time
@@ -19,6 +19,7 @@ from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.message_frames import state_rows
+from crgame_ros.cockpit.page_messages import Command
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
@@ -54,7 +55,7 @@ class EnvironmentBackend:
     async def stop(self) -> None:
         """Do nothing: the environment continues."""
 
-    async def command(self, client: Client, message: Mapping[str, Any]) -> str:
+    async def command(self, client: Client, message: Command) -> str:
         """
         Refuse the command, because the agent drives.
 

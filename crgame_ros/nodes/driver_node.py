@@ -16,7 +16,8 @@ from crgame_ros.driver.source import (
     parse_source,
 )
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import GameDocument, parse_game_document, parse_seats_document
+from crgame_ros.game.documents import GameDocument, parse_game_document
+from crgame_ros.game.seat_documents import parse_seats_document
 from crgame_ros.registry import POLICY
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.device_delay import DeviceDelay

@@ -15,6 +15,7 @@ from crgame_ros.cockpit.access import Access
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.frames import encode_objects, encode_plan, encode_state, STATE_COLUMNS
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.page_messages import Command, Control, Rate
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.game.documents import parse_game_document
@@ -117,11 +118,11 @@ class RunBackend:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def command(self, client: Client, message: Mapping[str, Any]) -> str:
-        self.messages.append(message)
-        if message['type'] == 'rate':
-            self.factor = message['factor']
-        match message.get('action'):
+    async def command(self, client: Client, message: Command) -> str:
+        self.messages.append(message.model_dump(mode='json', exclude_unset=True))
+        if isinstance(message, Rate):
+            self.factor = message.factor
+        match getattr(message, 'action', ''):
             case 'start':
                 self.state = 'running'
             case 'pause':
@@ -211,9 +212,9 @@ class Served:
         """Call a function of the backend in its thread."""
         self._loop.call_soon_threadsafe(function, *arguments)
 
-    def control(self, action: str) -> None:
+    def control(self, action: Literal['start', 'pause', 'step', 'reset', 'stop']) -> None:
         """Start, pause, step or reset, as a client would."""
-        message = {'type': 'control', 'action': action}
+        message = Control(id=0, action=action)
         asyncio.run_coroutine_threadsafe(
             self.backend.command(next(iter(self.backend.hub.clients.values())), message),
             self._loop).result(10.0)

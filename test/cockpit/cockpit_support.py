@@ -18,6 +18,7 @@ from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.frames import encode_state
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.library import Library
+from crgame_ros.cockpit.page_messages import Command, Trigger
 from crgame_ros.cockpit.server import create_app, HUB, listen
 from crgame_ros.errors import InputError
 import numpy as np
@@ -62,15 +63,15 @@ class PumpBackend:
         await asyncio.wait([self._task])
         self.stopped = True
 
-    async def command(self, client: Client, message: Mapping[str, Any]) -> str:
-        self.commands.append((client.id, message))
-        if message['type'] == 'trigger':
+    async def command(self, client: Client, message: Command) -> str:
+        self.commands.append((client.id, message.model_dump(mode='json', exclude_unset=True)))
+        if isinstance(message, Trigger):
             await self.held.wait()
-            if message['event'] == 'broken':
+            if message.event == 'broken':
                 raise RuntimeError('a mistake in the backend')
-            if message['event'] == 'forbidden':
+            if message.event == 'forbidden':
                 raise InputError('is not to be', 'event')
-        return f'did {message["type"]}'
+        return f'did {message.type}'
 
     def joined(self, client: Client) -> None:
         self.present.append(client.id)

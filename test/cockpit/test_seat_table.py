@@ -3,18 +3,23 @@
 """Seats in the browser: their holders, and the effects of input, silence and absence."""
 
 from crgame_ros.cockpit.held_seat import HeldSeat, SILENCE_S
+from crgame_ros.cockpit.page_messages import Input
 from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
 from crgame_ros.cockpit.seat_table import KEEP_S, SeatTable
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import parse_seats_document
-from crgame_ros.game.seat_documents import SeatDemand, SeatOccupant, SeatPerson
+from crgame_ros.game.seat_documents import (
+    parse_seats_document,
+    SeatDemand,
+    SeatOccupant,
+    SeatPerson,
+)
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 import pytest
 
 NAMES = {'c1': 'Ada', 'c2': 'Bob', 'c3': 'Cleo'}
 DT = 0.01
-THROTTLE = {'keys': [True, False, False, False], 'reverse': False}
+THROTTLE = Input(seat='hv0', keys=(True, False, False, False))
 
 
 @pytest.fixture
@@ -174,7 +179,7 @@ def test_the_driver_is_named_without_the_way_to_its_file(table: SeatTable) -> No
 def test_keys_go_through_the_papers_filter() -> None:
     """CRG 18-19 apply in simulation time: commands equal a keyboard's at the same cycles."""
     seat, keyboard = HeldSeat('hv0', 'c1'), KeyboardCycles()
-    seat.apply_input({'keys': [True, False, True, False], 'reverse': False}, 0.0)
+    seat.apply_input(Input(seat='hv0', keys=(True, False, True, False)), 0.0)
     for n in range(40):
         assert seat.command(n, DT) == keyboard.command(n, KeyState(True, False, True), DT)
     # r_th+ = 1.8 / s over 40 cycles of 10 ms, s_max = 0.65.
@@ -185,7 +190,7 @@ def test_keys_go_through_the_papers_filter() -> None:
 def test_axes_pass_as_they_are() -> None:
     """Axes are not changed, as the page has calibrated them."""
     seat = HeldSeat('hv0', 'c1')
-    seat.apply_input({'axes': [0.25, 0.0, -0.5], 'reverse': True}, 0.0)
+    seat.apply_input(Input(seat='hv0', axes=(0.25, 0.0, -0.5), reverse=True), 0.0)
     assert seat.command(3, DT) == DriverCommand(0.25, 0.0, -0.5, True)
 
 
@@ -195,7 +200,7 @@ def test_hands_off_means_released_at_once() -> None:
     seat.apply_input(THROTTLE, 0.0)
     for n in range(50):
         seat.command(n, DT)
-    seat.apply_input({'away': True}, 0.5)
+    seat.apply_input(Input(seat='hv0', away=True), 0.5)
     assert seat.away and seat.command(50, DT) == RELEASED
     seat.apply_input(THROTTLE, 0.6)
     assert seat.command(60, DT).throttle == pytest.approx(1.8 * DT)
@@ -272,5 +277,5 @@ def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: s
     '{"hv0000": {"source": "game", "driver": "idle"}}'])
 def test_seats_that_are_none_are_refused(text: str) -> None:
     """A bad name would become a topic, and a missing source an error during the drive."""
-    with pytest.raises(InputError, match='/seats: is not what the contract says'):
+    with pytest.raises(InputError, match='/seats: is no list of seats'):
         parse_seats_document(text)

@@ -21,9 +21,8 @@ from cockpit_support import (
 )
 from crgame_ros.cockpit import hub, page_files, server, session
 from crgame_ros.cockpit.access import Access
-from crgame_ros.cockpit.client import Sound
 from crgame_ros.cockpit.frames import FrameKind
-from crgame_ros.cockpit.page_messages import SeenView
+from crgame_ros.cockpit.page_messages import SeenView, Sound
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
 import pytest
@@ -163,8 +162,7 @@ async def test_requests_get_the_backends_reply_and_inputs_do_not() -> None:
                 assert json.loads(message.data) == {'type': 'pong', 't': 5.5}
                 break
         assert running.backend.commands[-1] == ('c1', {
-            'type': 'input', 'seat': 'hv0', 'keys': [True, False, False, False],
-            'reverse': False})
+            'type': 'input', 'seat': 'hv0', 'keys': [True, False, False, False]})
         await socket.close()
 
 
@@ -229,9 +227,10 @@ async def test_names_layers_and_sound_are_kept() -> None:
         client = running.hub.clients['c1']
         await wait_until(lambda: client.wants_predictions, 'the layers')
         assert client.name == 'Ada' and not running.backend.commands
-        assert client.sound == Sound(True, 0.5, 0.25)
-        assert client.view == SeenView('chase', inset=True, software=True, width_px=900.0,
-                                       height_px=500.0, ratio=0.5, renderer='x')
+        assert client.sound == Sound(on=True, volume=0.5, rumble=0.25)
+        assert client.view == SeenView(
+            shown='chase', inset=True, plans=False, mirrors=False, bare=False, software=True,
+            width_px=900.0, height_px=500.0, ratio=0.5, renderer='x')
         # Unnamed layers stay; a client that adds one gets its newest frame, also in a pause.
         wanted = running.hub.send_frame
         wanted('seen:1', b'12345678', only_if=lambda other: other.perceives_as == 'av0')

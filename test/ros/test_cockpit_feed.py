@@ -8,8 +8,7 @@ import json
 from typing import Any
 
 from cockpit_graph import Graph, lived, OFFSET_NS
-from crgame_ros.cockpit.client import Sound
-from crgame_ros.cockpit.page_messages import SeenView
+from crgame_ros.cockpit.page_messages import SeenView, Sound
 from crgame_ros.errors import InputError
 from crgame_ros.game.documents import events_document
 from crgame_ros.game.events import FiredEvent
@@ -154,22 +153,24 @@ def test_what_the_person_in_a_seat_hears_and_sees_is_told(setup: Setup) -> None:
         await graph.seats('cockpit')
         await graph.state(setup, 20)
         await graph.until(lambda: 'state' in graph.hub._frames, 'the state')
-        other.sound = Sound(True, 1.0, 1.0)
+        other.sound = Sound(on=True, volume=1.0, rumble=1.0)
         await graph.pause(0.3)
         assert told(graph) == []
         await graph.ask(page, 'claim', seat='hv0')
         await graph.until(lambda: told(graph), 'the sound of the seat')
         silent = {'on': 'false', 'volume': '0.00', 'rumble': '0.00'}
         assert told(graph)[0] == (OFFSET_NS + 200_000_000, silent)
-        page.sound = Sound(True, 0.6, 0.5)
+        page.sound = Sound(on=True, volume=0.6, rumble=0.5)
         loud = {'on': 'true', 'volume': '0.60', 'rumble': '0.50'}
         await graph.until(lambda: told(graph)[-1][1] == loud, 'the new sound')
         await graph.until(lambda: [values for _, values in told(graph)].count(loud) > 1,
                           'the same once more')
         assert all(values in (silent, loud) for _, values in told(graph))
         assert told(graph, 'view')[0][1]['shown'] == ''
-        page.view = SeenView('driver', inset=True, across_deg=75.0, ratio=0.5, rate_hz=30.0,
-                             renderer='a card', width_px=1280.0, height_px=720.0)
+        page.view = SeenView(
+            shown='driver', inset=True, plans=False, mirrors=False, bare=False, software=False,
+            across_deg=75.0, ratio=0.5, rate_hz=30.0, renderer='a card', width_px=1280.0,
+            height_px=720.0)
         seen = {'shown': 'driver', 'inset': 'true', 'plans': 'false', 'mirrors': 'false',
                 'bare': 'false', 'across_deg': '75.0', 'screen_width_m': '',
                 'eye_distance_m': '', 'width_px': '1280', 'height_px': '720', 'ratio': '0.500',

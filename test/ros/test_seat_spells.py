@@ -45,5 +45,5 @@ def test_a_flood_of_changes_is_bounded() -> None:
     '"from_n": 0, "until_n": null}]}'])
 def test_what_is_no_such_document_is_refused(text: str) -> None:
     """Recordings hold what any peer has published."""
-    with pytest.raises(InputError, match='/seats/drivers: is not what the contract says'):
+    with pytest.raises(InputError, match='/seats/drivers: is no list of drivers'):
         parse_spells(text)

@@ -22,6 +22,7 @@ from crgame_ros.game.task_documents import (
     state_document,
     TaskEntry,
     TaskReport,
+    TaskState,
 )
 from crgame_ros.game.task_spec import DetectionResponse, TaskList
 from crgame_ros.paths import scenarios_directory
@@ -286,9 +287,11 @@ def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenar
     course.answer(1, 250.5)
     assert parse_log(log_document(3, course.entries)) == (3, tuple(course.entries))
     course.to_stimulus(2)
-    epoch, state = parse_state(state_document(
-        2, course.simulation.tasks_running, course.simulation.prompts))
-    assert (epoch, state['running'], state['open'][0]['number']) == (2, ['light'], 2)
+    written = TaskState(2, tuple(course.simulation.tasks_running),
+                        tuple(course.simulation.prompts))
+    state = parse_state(state_document(written))
+    assert state == written
+    assert (state.epoch, state.running, state.open[0].number) == (2, ('light',), 2)
     report = TaskReport('hv0', 'light', 4, 'answer', PageTimes(250.5, 30.0, 16.7, 0.0))
     assert parse_report(report_text(report)) == report
     content = json.loads(report_text(report))

@@ -7,7 +7,7 @@ from pathlib import Path
 import sys
 
 from crgame_ros.errors import InputError
-from crgame_ros.study.desk.messages import parse_experimenter, parse_participant
+from crgame_ros.study.desk.messages import Finish, Note, parse_experimenter, parse_participant
 from crgame_ros.study.desk.page_markdown import picture, read_tree
 from crgame_ros.study.desk.pages import words_of
 from crgame_ros.study.file import Page
@@ -33,14 +33,25 @@ def test_messages_that_no_page_sends_are_refused(message: str) -> None:
 
 
 def test_messages_of_the_experimenter_need_their_fields() -> None:
-    assert parse_experimenter('{"type":"note","text":"x","id":1,"more":2}') == {
-        'type': 'note', 'text': 'x', 'id': 1}
+    assert parse_experimenter('{"type":"note","text":"x","id":1,"more":2}') == Note(
+        text='x', id=1)
     for message in ('{"type":"note","text":" ","id":1}', '{"type":"note","text":"x"}',
                     '{"type":"end","reason":"","id":1}', '{"type":"hold","held":1,"id":1}',
                     '{"type":"skip","item":"a","reason":"","id":1}',
                     '{"type":"mark","name":"","id":1}', '{"type":"ready","item":"a"}'):
         with pytest.raises(InputError):
             parse_experimenter(message)
+
+
+def test_answers_keep_their_types_and_lose_what_is_no_character() -> None:
+    found = parse_participant(
+        '{"type":"finish","item":"a","shown_at":1,"answered_at":2,"taken_s":1.5,"answers":'
+        '{"a":3,"b":0.5,"c":["x"],"d":"\\ud800 \\ud83d\\ude00","e":null}}')
+    assert isinstance(found, Finish)
+    assert found.answers == {'a': 3, 'b': 0.5, 'c': ['x'], 'd': '\N{REPLACEMENT CHARACTER} '
+                             '\N{GRINNING FACE}', 'e': None}
+    assert isinstance(found.answers['a'], int) and isinstance(found.answers['b'], float)
+    assert found.told() == {'shown_at': 1.0, 'answered_at': 2.0, 'taken_s': 1.5, 'after_s': {}}
 
 
 def test_markdown_becomes_a_tree_without_html(tmp_path: Path) -> None:

@@ -6,14 +6,25 @@ import asyncio
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 import time
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-from crgame_ros.cockpit.client import Client, Sound
+from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.cockpit.hub import Hub
-from crgame_ros.cockpit.page_messages import SeenView
+from crgame_ros.cockpit.page_messages import (
+    Command,
+    Control,
+    Input,
+    PlannerSwitch,
+    Rate,
+    Ready,
+    SeenView,
+    Sound,
+    TaskDone,
+    Trigger,
+)
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.task_documents import PageTimes, TaskReport
+from crgame_ros.game.task_documents import TaskReport
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.nodes.cockpit.seat_desk import PeopleFeed, SeatDesk
@@ -203,39 +214,40 @@ class LiveBackend:
         """Release the controls of a page that is gone, at once."""
         self._desk.left(client)
 
-    async def command(self, client: Client, message: Mapping[str, Any]) -> str:
+    async def command(self, client: Client, message: Command) -> str:
         """
         Carry out a page's command.
 
         :raises CrgameError: if it cannot be done.
         """
-        kind = message['type']
-        if kind == 'input':
-            return self._desk.input(client, message)
-        if kind == 'task':
-            return self._report_task(client, message)
-        if kind == 'control':
-            return await self._control(client, message['action'], bool(message.get('all')))
-        if kind == 'rate':
-            await self._orders.set_parameter('real_time_factor', float(message['factor']))
-            self._announce(client, f'set the speed of time to × {message["factor"]:g}')
-            return f'real-time factor {message["factor"]:g}'
-        if kind == 'planner':
-            self._known_av(message['av'])
-            text = await self._orders.run_planner(message['av'], message['run'])
-            self._announce(client, f'let the planner of {message["av"]} go on' if message['run']
-                           else f'stopped the planner of {message["av"]}')
-            return text
-        if kind == 'trigger':
-            return self._trigger(client, message['event'])
-        return self._desk.order(client, message)
+        match message:
+            case Input():
+                return self._desk.input(client, message)
+            case TaskDone():
+                return self._report_task(client, message)
+            case Control():
+                return await self._control(client, message.action, message.all)
+            case Rate():
+                await self._orders.set_parameter('real_time_factor', message.factor)
+                self._announce(client, f'set the speed of time to × {message.factor:g}')
+                return f'real-time factor {message.factor:g}'
+            case PlannerSwitch():
+                self._known_av(message.av)
+                text = await self._orders.run_planner(message.av, message.run)
+                self._announce(client, f'let the planner of {message.av} go on' if message.run
+                               else f'stopped the planner of {message.av}')
+                return text
+            case Trigger():
+                return self._trigger(client, message.event)
+            case _:
+                return self._desk.order(client, message)
 
     async def _control(self, client: Client, action: str, for_all: bool) -> str:
         """Control the run; a start by one of several drivers in seats declares them ready."""
         seat = self._desk.gate_seat(client)
         if action == 'start' and seat is not None and not (for_all and client.rights.directs) \
                 and (len(self._desk.cockpit_seats) > 1 or not client.rights.directs):
-            return self._desk.order(client, {'type': 'ready', 'seat': seat, 'ready': True})
+            return self._desk.order(client, Ready(id=0, seat=seat, ready=True))
         if not client.rights.directs:
             raise CrgameError('only a director can start this run; a driver in its seat says '
                               'that they are ready')
@@ -256,14 +268,14 @@ class LiveBackend:
         self._announce(client, f'triggered {event}')
         return f'{event}: triggered'
 
-    def _report_task(self, client: Client, message: Mapping[str, Any]) -> str:
+    def _report_task(self, client: Client, message: TaskDone) -> str:
         """Pass on what the page of a seat has shown, or what its driver has answered."""
-        seat, what = message['seat'], message['what']
+        seat, what = message.seat, message.what
         # A take-over request is shown before any client has the seat.
         if what != 'shown' or seat in self._desk.table.held or not client.rights.drives:
             self._desk.table.holding(client.id, seat)
         self._orders.report_task(TaskReport(
-            seat, message['task'], message['number'], what, PageTimes(**message['times'])))
+            seat, message.task, message.number, what, message.times))
         return ''
 
     def _known_av(self, av: str) -> None:

@@ -340,9 +340,10 @@ class CockpitFeed:
         message = None if self.scenario is None else self._tasks.latest()
         if message is None or self.scenario is None:
             return
-        epoch, state = parse_state(message.data)
-        if epoch == self.scenario.game.epoch:
-            self._hub.set_document('tasks', state)
+        state = parse_state(message.data)
+        if state.epoch == self.scenario.game.epoch:
+            self._hub.set_document('tasks', {
+                'running': state.running, 'open': [asdict(prompt) for prompt in state.open]})
 
     def _poll_criticality(self) -> None:
         for _ in range(QUEUE):
@@ -363,7 +364,7 @@ class CockpitFeed:
                 self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
                 self.status.add_events(events, self.scenario.game.scheduler.dt_s)
         if signals is not None:
-            self._hub.set_document('signals', parse_signals_document(signals.data)._asdict())
+            self._hub.set_document('signals', asdict(parse_signals_document(signals.data)))
 
     def _poll_diagnostics(self) -> None:
         for slot in (self._diagnostics, *self._verdicts.values()):

@@ -2,20 +2,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """The seats of a live run: how people at this cockpit take, drive, offer and leave them."""
 
-from collections.abc import Mapping
 import time
 from typing import Any
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.cockpit.hub import Hub
+from crgame_ros.cockpit.page_messages import (
+    Answer,
+    Ask,
+    Claim,
+    HandOver,
+    Input,
+    Ready,
+    Release,
+    SeatOrder,
+)
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.seat_orders import SeatOrders
 from crgame_ros.cockpit.seat_table import SeatTable
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import parse_seats_document
-from crgame_ros.game.seat_documents import parse_tenants, SeatDemand, SeatPerson
+from crgame_ros.game.seat_documents import (
+    parse_seats_document,
+    parse_tenants,
+    SeatDemand,
+    SeatPerson,
+)
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints
@@ -194,13 +207,13 @@ class SeatDesk:
             self._orders.order_seat(SeatDemand(seat.id, left=seat.person))
         self.show()
 
-    def input(self, client: Client, message: Mapping[str, Any]) -> str:  # noqa: A003
+    def input(self, client: Client, message: Input) -> str:  # noqa: A003
         """
         Pass on a client's input.
 
         :raises InputError: if the client does not have the seat.
         """
-        seat = self.table.holding(client.id, message['seat'])
+        seat = self.table.holding(client.id, message.seat)
         now_s = time.monotonic()
         if seat.apply_input(message, now_s):
             # Read the newest step first: the step that executes this input is measured from it.
@@ -209,19 +222,33 @@ class SeatDesk:
         self._publish(seat)
         return ''
 
-    def order(self, client: Client, message: Mapping[str, Any]) -> str:
+    def order(self, client: Client, message: SeatOrder) -> str:
         """
         Carry out a page's order about a seat.
 
         :raises CrgameError: if it cannot be done.
         """
-        orders = {'claim': self._claim, 'release': self._release_asked, 'hand_over': self._offer,
-                  'answer': self._answer, 'ask': self._ask, 'ready': self._ready}
-        if message['type'] not in orders:
-            raise InputError('cannot be done in a live run', str(message['type']))
-        text = orders[message['type']](client, message)
+        text = self._ordered(client, message)
         self.show()
         return text
+
+    def _ordered(self, client: Client, message: SeatOrder) -> str:
+        match message:
+            case Claim():
+                client.device = message.device or client.device
+                return self._claim(client, message.seat)
+            case Release():
+                self._release(client, message.seat)
+                return f'{message.seat} is given back'
+            case HandOver():
+                return self._offer(client, message.seat, message.to)
+            case Answer():
+                return self._answer(client, message.seat, message.accept)
+            case Ask():
+                held = self.table.ask(client.id, message.seat)
+                return f'{self._drivers().get(held.holder, "")} was asked for {held.id}'
+            case Ready():
+                return self._ready(client, message.seat, message.ready)
 
     def claim_for(self, client: Client) -> None:
         """Claim the first free seat that the game leaves to a cockpit for a client."""
@@ -229,7 +256,7 @@ class SeatDesk:
             return
         for name, entry in self.table.seats.items():
             if entry['driver'] == COCKPIT and name not in self.table.held:
-                self._claim(client, {'seat': name})
+                self._claim(client, name)
                 self.show()
                 return
 
@@ -262,9 +289,7 @@ class SeatDesk:
         if held is None and seat not in self._awaited:
             self._sit(client, self.table.claim(client.id, seat, {}, person=client.person))
 
-    def _claim(self, client: Client, message: Mapping[str, Any]) -> str:
-        seat = message['seat']
-        client.device = message.get('device') or client.device
+    def _claim(self, client: Client, seat: str) -> str:
         if client.rights.seat not in ('', seat):
             raise CrgameError(f'your link is for {client.rights.seat}; the driver of {seat} can '
                               'offer it to you')
@@ -283,10 +308,6 @@ class SeatDesk:
         displaced = None if tenant is None or tenant.person.id == person.id else tenant.person.id
         self._order(SeatDemand(held.id, COCKPIT, person, displaced))
 
-    def _release_asked(self, client: Client, message: Mapping[str, Any]) -> str:
-        self._release(client, message['seat'])
-        return f'{message["seat"]} is given back'
-
     def _release(self, client: Client, seat: str) -> None:
         held = self.table.release(client.id, seat)
         if held is not None:
@@ -294,16 +315,15 @@ class SeatDesk:
         self._told.pop(seat, None)
         self._order(SeatDemand(seat, GAME))
 
-    def _offer(self, client: Client, message: Mapping[str, Any]) -> str:
-        seat, to, names = message['seat'], message['to'], self._drivers()
+    def _offer(self, client: Client, seat: str, to: str) -> str:
+        names = self._drivers()
         if to not in names:
             raise InputError('is not here any more, or only watches', to)
         held = self.table.offer(client.id, seat, to)
         return f'{seat} is offered to {names[to]}' if held.offered_to else f'you keep {seat}'
 
-    def _answer(self, client: Client, message: Mapping[str, Any]) -> str:
-        seat = message['seat']
-        if not message['accept']:
+    def _answer(self, client: Client, seat: str, accept: bool) -> str:
+        if not accept:
             self._send(self.table.decline(client.id, seat).holder,
                        f'{client.name} does not want {seat}')
             return f'you do not take {seat}'
@@ -318,17 +338,13 @@ class SeatDesk:
         self._send(before.holder, f'{client.name} drives {seat} now')
         return f'you drive {seat}'
 
-    def _ask(self, client: Client, message: Mapping[str, Any]) -> str:
-        held = self.table.ask(client.id, message['seat'])
-        return f'{self._drivers().get(held.holder, "")} was asked for {held.id}'
-
-    def _ready(self, client: Client, message: Mapping[str, Any]) -> str:
-        seat = self.table.holding(client.id, message['seat']).id
+    def _ready(self, client: Client, seat: str, ready: bool) -> str:
+        seat = self.table.holding(client.id, seat).id
         if self.gate_seat(client) is None:
             raise InputError('no run waits for its driver', seat)
         self._orders.order_seat(
-            SeatDemand(seat, person=_person(client), ready=bool(message['ready'])))
-        return 'you are ready' if message['ready'] else 'you are not ready'
+            SeatDemand(seat, person=_person(client), ready=ready))
+        return 'you are ready' if ready else 'you are not ready'
 
     def _send(self, client_id: str, text: str) -> None:
         client = self._hub.clients.get(client_id)

@@ -10,7 +10,13 @@ import time
 from crgame_ros.game.documents import events_document, objects_document, RUN_STATE_TOPIC
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.game.task_documents import log_document, LOG_TOPIC, state_document, STATE_TOPIC
+from crgame_ros.game.task_documents import (
+    log_document,
+    LOG_TOPIC,
+    state_document,
+    STATE_TOPIC,
+    TaskState,
+)
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.messages.joints import (
@@ -157,7 +163,7 @@ class SimOutputs:
         texts = {'/scenario/xml': setup.loaded.xml_text,
                  '/scenario/objects': objects_document(setup.descriptions),
                  '/scenario/events': events_document(epoch, ()),
-                 STATE_TOPIC: state_document(epoch, (), ()),
+                 STATE_TOPIC: state_document(TaskState(epoch, (), ())),
                  '/scenario/game': game_document(
                      setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
                      real_time_factor=factor, simulation=simulation)}
@@ -181,8 +187,8 @@ class SimOutputs:
 
     def publish_tasks(self, simulation: Simulation, result: StepResult) -> None:
         """Publish the new events of the game's tasks, and their state."""
-        self._latched[STATE_TOPIC].publish(String(data=state_document(
-            self._epoch, simulation.tasks_running, simulation.prompts)))
+        self._latched[STATE_TOPIC].publish(String(data=state_document(TaskState(
+            self._epoch, simulation.tasks_running, simulation.prompts))))
         self._task_log.publish(String(data=log_document(self._epoch, result.tasks)))
 
     def shows_vehicles(self, simulation: Simulation) -> bool:

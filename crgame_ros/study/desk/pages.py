@@ -12,6 +12,22 @@ from typing import Any
 from crgame_ros.cockpit.client import Client
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.study.desk.desk import Desk
+from crgame_ros.study.desk.messages import (
+    End,
+    ExperimenterMessage,
+    ExperimenterOrder,
+    Finish,
+    Hello,
+    Here,
+    Hold,
+    Language,
+    Mark,
+    Note,
+    ParticipantMessage,
+    Ping,
+    Ready,
+    Reasoned,
+)
 from crgame_ros.study.desk.participant_document import experimenter_document, participant_document
 from crgame_ros.study.file import StudyFile
 from crgame_ros.yaml_text import read_yaml
@@ -118,77 +134,76 @@ class DeskPages:
         """Return whether the experimenter's pages lack a change."""
         return self._is_due
 
-    def participant_says(self, client: Client, message: Mapping[str, Any]) -> None:
+    def participant_says(self, client: Client, message: ParticipantMessage) -> None:
         """
         Process a message of a participant's page.
 
         :raises CrgameError: if the session refuses it.
         """
-        kind = message['type']
-        if kind in ('hello', 'here'):
-            self._participants[client] = message.get('page', self._participants[client])
+        if isinstance(message, Hello | Here):
+            if isinstance(message, Hello):
+                self._participants[client] = message.page
             page = self._participants[client]
-            if kind == 'here' or message['fresh'] or page == self._used_page or not self._used:
+            if isinstance(message, Here) or message.fresh or page == self._used_page \
+                    or not self._used:
                 self._used, self._used_page, self._told = client, page, {}
             self._changed()
             return
-        if kind == 'ping':
+        if isinstance(message, Ping):
             if client is self._used:
-                self._hear({name: value for name, value in message.items()
-                            if name not in ('type', 't')})
-            client.put_event(_text({'type': 'pong', 't': message['t'],
-                                    'at': self.desk.clock_s()}))
+                self._hear(message.model_dump(exclude={'type', 't'}, exclude_none=True))
+            self._answer(client, message)
             return
         if client is self._used:
             try:
                 self._do(message)
             except InputError as error:
-                client.put_event(_text({'type': 'refused', 'item': message.get('item', ''),
+                client.put_event(_text({'type': 'refused', 'item': getattr(message, 'item', ''),
                                         'text': str(error)}))
         # Also after an outdated message, so that the page learns the session's state.
         self._send_participant(client)
 
-    def experimenter_says(self, client: Client, message: Mapping[str, Any]) -> None:
+    def experimenter_says(self, client: Client, message: ExperimenterMessage) -> None:
         """Process and answer a message of an experimenter's page."""
-        if message['type'] == 'ping':
-            client.put_event(_text({'type': 'pong', 't': message['t'],
-                                    'at': self.desk.clock_s()}))
+        if isinstance(message, Ping):
+            self._answer(client, message)
             return
         ok, text = True, ''
         try:
             self._order(message)
         except CrgameError as error:
             ok, text = False, str(error)
-        client.put_event(_text({'type': 'reply', 'to': message['id'], 'ok': ok, 'text': text}))
+        client.put_event(_text({'type': 'reply', 'to': message.id, 'ok': ok, 'text': text}))
         self.update_experimenters()
 
-    def _do(self, message: Mapping[str, Any]) -> None:
-        match message['type']:
-            case 'language':
-                self.desk.choose_language(message['language'])
-            case 'ready':
-                self.desk.ready(message['item'])
-            case 'finish':
-                more = {name: message[name] for name in ('device', 'moved') if name in message}
-                self.desk.finish(message['item'], message['answers'], message.get('agreed'),
-                                 **message['times'], **more)
+    def _answer(self, client: Client, ping: Ping) -> None:
+        client.put_event(_text({'type': 'pong', 't': ping.t, 'at': self.desk.clock_s()}))
 
-    def _order(self, message: Mapping[str, Any]) -> None:
-        match message['type']:
-            case 'note':
-                self.desk.note(message['text'])
-            case 'mark':
-                self.desk.mark(message['name'])
-            case 'repeat':
-                self.desk.repeat(message['item'], message['reason'])
-            case 'skip':
-                self.desk.skip(message['item'], message['reason'])
-            case 'abort':
-                self.desk.abort(message['item'], message['reason'])
-            case 'end':
-                self.desk.end(message['reason'])
-            case 'hold':
-                self.desk.hold(message['held'])
+    def _do(self, message: Language | Ready | Finish) -> None:
+        match message:
+            case Language():
+                self.desk.choose_language(message.language)
+            case Ready():
+                self.desk.ready(message.item)
+            case Finish():
+                self.desk.finish(message.item, message.answers, message.agreed, **message.told())
+
+    def _order(self, message: ExperimenterOrder) -> None:
+        match message:
+            case Note():
+                self.desk.note(message.text)
+            case Mark():
+                self.desk.mark(message.name)
+            case Reasoned(type='repeat'):
+                self.desk.repeat(message.item, message.reason)
+            case Reasoned(type='skip'):
+                self.desk.skip(message.item, message.reason)
+            case Reasoned():
+                self.desk.abort(message.item, message.reason)
+            case End():
+                self.desk.end(message.reason)
+            case Hold():
+                self.desk.hold(message.held)
 
     def _hear(self, told: dict[str, Any]) -> None:
         if told != self._told:

@@ -9,7 +9,6 @@ from itertools import count
 import json
 import logging
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
 from aiohttp import hdrs, web, WSCloseCode, WSMsgType
@@ -119,14 +118,16 @@ class DeskSocket:
 
     def _handle(self, client: Client, text: str) -> None:
         try:
-            message: dict[str, Any] = (parse_experimenter if self._is_experimenter
-                                       else parse_participant)(text)
+            if self._is_experimenter:
+                order = parse_experimenter(text)
+            else:
+                message = parse_participant(text)
         except InputError as error:
             self._malformed += 1
             _log.info('%s: %s', client.id, error)
             return
         if self._is_experimenter:
-            self._pages.experimenter_says(client, message)
+            self._pages.experimenter_says(client, order)
         else:
             self._pages.participant_says(client, message)
 
