@@ -14,8 +14,6 @@ from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
 
 # Printed after a value that is beyond its threshold.
 CRITICAL = '   <- critical'
-# Longer times [s] are not printed: they result from speeds that are almost equal.
-TOLD_S = 100.0
 
 DESCRIPTION = """\
 Measure how critical a recorded run was: for each driven vehicle the worst moment of each measure,
@@ -75,25 +73,25 @@ def measure(values: argparse.Namespace) -> int:
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:
-    limits = found['thresholds']
+    from crgame_ros.analysis.criticality.criticality import MEASURES
+    limits = Thresholds(**found['thresholds'])
     for vehicle_id, vehicle in found['vehicles'].items():
         yield vehicle_id
         near = {name: worst for name, worst in vehicle['worst'].items()
-                if worst['unit'] != 's' or worst['value'] < TOLD_S}
+                if MEASURES[name].matters(worst['value'])}
         for name, worst in near.items():
-            critical = (name == 'ttc' and worst['value'] < limits['ttc_s']
-                        or name == 'drac' and worst['value'] > limits['drac'])
+            critical = limits.exceeded(name, worst['value'])
             yield (f'  {name:<13}{worst["value"]:9.2f} {worst["unit"]:<6} {worst["of"]} at '
                    f'{worst["time_s"]:.1f} s{CRITICAL if critical else ""}')
         if not near:
             yield '  no other was near'
         yield (f'  tet          {vehicle["tet_s"]:9.2f} s      with a ttc below '
-               f'{limits["ttc_s"]:g} s')
+               f'{limits.ttc_s:g} s')
         yield f'  tit          {vehicle["tit_s2"]:9.2f} s^2    what it was below that, over time'
         for each in vehicle['crossings']:
             yield (f'  pet          {each["pet_s"]:9.2f} s      {each["second"]} after '
                    f'{each["first"]} at {each["entered_s"]:.1f} s'
-                   f'{CRITICAL if each["pet_s"] < limits["pet_s"] else ""}')
+                   f'{CRITICAL if limits.exceeded("pet", each["pet_s"]) else ""}')
 
 
 NEVER = '-'
@@ -108,10 +106,11 @@ def replay_rows(found: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]
     :param found: entries of `Alternative.as_dict`; the entry of the recorded run itself lacks the
         comparison.
     """
+    from crgame_ros.analysis.criticality.criticality import MEASURES
     for each in found:
         for vehicle_id, vehicle in each['criticality']['vehicles'].items():
             worst = {name: f'{entry["value"]:.2f}' for name, entry in vehicle['worst'].items()
-                     if entry['unit'] != 's' or entry['value'] < TOLD_S}
+                     if MEASURES[name].matters(entry['value'])}
             touched = [item for item in each.get('contacts') or ()
                        if vehicle_id in (item['vehicle'], item['with'])]
             yield (

@@ -36,6 +36,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+# Times above this say nothing [s].
+LONGEST_S = 100.0
 
 
 class Measure(NamedTuple):
@@ -45,30 +47,41 @@ class Measure(NamedTuple):
     :param unit: as tables write it.
     :param worst: whether smaller (-1) or greater (1) values are more critical.
     :param undefined: the value where there is nothing to measure.
+    :param label: for people.
     :param definition: one sentence.
     """
 
     unit: str
     worst: int
     undefined: float
+    label: str
     definition: str
+
+    def matters(self, value: float) -> bool:
+        """Return whether a value is worth telling: longer times come from equal speeds."""
+        return self.unit != 's' or value < LONGEST_S
 
 
 # In the order of the columns of `TickMeasures.values`.
 MEASURES = {
-    'gap': Measure('m', -1, math.nan,
+    'gap': Measure('m', -1, math.nan, 'Gap to the leader',
                    "from the subject's front to the leader's rear along its own path"),
-    'time_gap': Measure('s', -1, math.inf, "gap divided by the subject's speed"),
-    'thw': Measure('s', -1, math.inf,
+    'time_gap': Measure('s', -1, math.inf, 'Time gap',
+                        "gap divided by the subject's speed"),
+    'thw': Measure('s', -1, math.inf, 'Time headway (THW)',
                    "time until the subject's front is where the leader's rear is now"),
-    'ttc': Measure('s', -1, math.inf, 'gap divided by the closing speed along the path'),
-    'ttc_a': Measure('s', -1, math.inf,
+    'ttc': Measure('s', -1, math.inf, 'Time to collision (TTC)',
+                   'gap divided by the closing speed along the path'),
+    'ttc_a': Measure('s', -1, math.inf, 'TTC with accelerations',
                      'the same where each keeps its acceleration until it stands'),
-    'drac': Measure('m/s^2', 1, 0.0, 'half the squared closing speed divided by the gap'),
-    'a_req': Measure('m/s^2', -1, 0.0, 'constant acceleration that just avoids contact'),
-    'ttc_2d': Measure('s', -1, math.inf,
+    'drac': Measure('m/s^2', 1, 0.0, 'Deceleration to avoid a crash (DRAC)',
+                    'half the squared closing speed divided by the gap'),
+    'a_req': Measure('m/s^2', -1, 0.0, 'Required acceleration',
+                     'constant acceleration that just avoids contact'),
+    'ttc_2d': Measure('s', -1, math.inf, 'TTC in the plane',
                       'time until footprints touch that keep velocity and yaw'),
-    'min_distance': Measure('m', -1, math.nan, 'distance of the footprints'),
+    'min_distance': Measure('m', -1, math.nan, 'Distance',
+                            'distance of the footprints'),
 }
 COLUMN = {name: column for column, name in enumerate(MEASURES)}
 UNDEFINED = np.array([measure.undefined for measure in MEASURES.values()])

@@ -23,8 +23,23 @@ class Thresholds(NamedTuple):
 
     def exceeded(self, measure: str, value: float) -> bool:
         """Return whether a value is critical; False for measures without a threshold."""
-        return {'ttc': value < self.ttc_s, 'drac': value > self.drac,
-                'pet': value < self.pet_s}.get(measure, False)
+        return self.excess(measure, value) > 1.0
+
+    def excess(self, measure: str, value: float) -> float:
+        """
+        Return how far a value is towards its threshold (0 to 1) or beyond (above 1).
+
+        Without a threshold it is 0; where two vehicles touch it is infinite.
+        """
+        match measure:
+            case 'ttc' | 'pet':
+                limit_s = self.ttc_s if measure == 'ttc' else self.pet_s
+                return limit_s / value if value > 0.0 else math.inf
+            case 'drac':
+                return value / self.drac
+            case 'gap' | 'min_distance':
+                return 0.0 if value > 0.0 else math.inf
+        return 0.0
 
     def check(self, prefix: str = '') -> None:
         """

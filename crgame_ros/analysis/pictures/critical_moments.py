@@ -103,20 +103,20 @@ def critical_moments(record: RunRecord, criticality: Criticality,
 def _critical(criticality: Criticality) -> Iterator[_Ranked]:
     limits = criticality.thresholds
     for vehicle in criticality.report():
-        for name, limit in (('ttc', limits.ttc_s), ('drac', limits.drac)):
+        for name in ('ttc', 'drac'):
             worst = vehicle.worst.get(name)
             value = 0.0 if worst is None else worst.value
             if worst is None or value == 0.0 or math.isinf(value):
                 # They touch.
                 continue
-            excess = limit / value if MEASURES[name].worst < 0 else value / limit
+            excess = limits.excess(name, value)
             if excess > 1.0 or name == 'ttc' and value < NOTICED_S:
                 yield _Ranked(_CRITICAL if excess > 1.0 else _NOTICED, -excess, Moment(
                     worst.time_s,
                     f'{name} of {vehicle.vehicle_id} to {worst.other} is {value:.2f} '
                     f'{MEASURES[name].unit}', (vehicle.vehicle_id, worst.other)))
         for crossing in vehicle.crossings:
-            if crossing.pet_s < limits.pet_s:
+            if limits.exceeded('pet', crossing.pet_s):
                 first, second = (criticality.ids[i] for i in (crossing.first, crossing.second))
                 yield _Ranked(_CRITICAL, -limits.pet_s / max(crossing.pet_s, _LEAST), Moment(
                     crossing.entered_s,

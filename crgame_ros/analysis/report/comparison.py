@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
-from crgame_ros.analysis.report.criticality_section import is_critical, marked
+from crgame_ros.analysis.report.criticality_section import marked
 from crgame_ros.analysis.report.outcome_section import contacts_of_report
 from crgame_ros.analysis.report.planners_section import planners_compared
 from crgame_ros.analysis.report.run import PLOTTED, ReportRun
@@ -73,7 +73,7 @@ def worst_of_all(run: ReportRun, name: str) -> str:
         return NOTHING
     sign = MEASURES[name].worst
     worst = max(found, key=lambda each: sign * each.value)
-    critical = is_critical(name, worst.value, run.criticality.thresholds)
+    critical = run.criticality.thresholds.exceeded(name, worst.value)
     return f'{marked(number(worst.value), critical)} <small>at {moment(run, worst.time_s)}</small>'
 
 

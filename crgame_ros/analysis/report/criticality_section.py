@@ -11,7 +11,7 @@ from crgame_ros.analysis.report.motion_section import dash_of
 from crgame_ros.analysis.report.run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
-from crgame_ros.analysis.report.story_moments import is_told, TWICE, WORDS
+from crgame_ros.analysis.report.story_moments import TWICE
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import note, number, plain, share, table
 import numpy as np
@@ -53,13 +53,6 @@ def criticality_section(run: ReportRun) -> Section:
     return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
 
 
-def is_critical(name: str, value: float, limits: Thresholds) -> bool:
-    """Return whether a measure's value is beyond its threshold."""
-    return name in ('ttc', 'ttc_2d') and value < limits.ttc_s \
-        or name == 'drac' and value > limits.drac \
-        or name in ('min_distance', 'gap') and value <= 0.0
-
-
 def marked(text: str, critical: bool) -> str:
     """Return a text as HTML, marked if it is critical: not by colour alone."""
     return f'<strong class="critical">{text}<span class="sign"> ‼</span></strong>' \
@@ -70,10 +63,10 @@ def _worst(run: ReportRun, vehicle: VehicleCriticality,
            limits: Thresholds) -> Iterator[Sequence[str]]:
     for name, measure in MEASURES.items():
         worst = vehicle.worst.get(name)
-        if worst is None or name == TWICE or not is_told(measure, worst):
+        if worst is None or name == TWICE or not measure.matters(worst.value):
             continue
-        word = f'<span title="{plain(measure.definition)}">{WORDS.get(name, name)}</span>'
-        yield (word, marked(number(worst.value), is_critical(name, worst.value, limits)),
+        word = f'<span title="{plain(measure.definition)}">{measure.label}</span>'
+        yield (word, marked(number(worst.value), limits.exceeded(name, worst.value)),
                measure.unit.replace('^2', '²'), named(run, worst.other),
                moment(run, worst.time_s))
 
@@ -95,7 +88,7 @@ def _crossings(run: ReportRun, vehicle: VehicleCriticality,
         yield (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
                named(run, ids[each.second]), moment(run, each.entered_s),
                marked(('≈ ' if each.is_estimate else '') + number(each.pet_s),
-                      each.pet_s < limits.pet_s))
+                      limits.exceeded('pet', each.pet_s)))
 
 
 def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:
@@ -107,7 +100,7 @@ def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:
         if not np.isfinite(values).any():
             continue
         unit = MEASURES[name].unit.replace('^2', '²')
-        yield Plot(name.replace('_', '-'), WORDS[name], unit, tuple(
+        yield Plot(name.replace('_', '-'), MEASURES[name].label, unit, tuple(
             PlotLine(item.id, run.times_s, values[i], run.colours[item.id], dash_of(item.role))
             for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),
             bounds=_bounds(name, unit, values, limits))

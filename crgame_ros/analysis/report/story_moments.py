@@ -7,9 +7,7 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import (
     Criticality,
-    Measure,
     MEASURES,
-    Worst,
 )
 from crgame_ros.analysis.pictures.critical_moments import (
     critical_moments,
@@ -21,12 +19,6 @@ from crgame_ros.recording.run_record import RunRecord
 
 # Greatest number of pictures of a run, start and end included.
 MOST_FRAMES = 14
-# Longer times result from speeds that are almost equal [s].
-TOLD_S = 100.0
-WORDS = {
-    'gap': 'Gap to the leader', 'thw': 'Time headway (THW)', 'ttc': 'Time to collision (TTC)',
-    'ttc_a': 'TTC with accelerations', 'drac': 'Deceleration to avoid a crash (DRAC)',
-    'a_req': 'Required acceleration', 'ttc_2d': 'TTC in the plane', 'min_distance': 'Distance'}
 # This measure has the same value as the time headway.
 TWICE = 'time_gap'
 
@@ -47,12 +39,12 @@ def story_moments(record: RunRecord, criticality: Criticality,
     ends = [Moment(first_s, 'start', ()), Moment(last_s, 'end', ())]
     found = list(critical_moments(record, criticality,
                                   [Touch.from_entry(item) for item in contacts]))
-    found += [Moment(worst.time_s, f'{WORDS.get(name, name)} of {vehicle.vehicle_id} to '
+    found += [Moment(worst.time_s, f'{MEASURES[name].label} of {vehicle.vehicle_id} to '
                      f'{worst.other} is {worst.value:.2f} '
                      + MEASURES[name].unit.replace('^2', '²'),
                      (vehicle.vehicle_id, worst.other))
               for vehicle in criticality.report() for name, worst in vehicle.worst.items()
-              if name != TWICE and is_told(MEASURES[name], worst)]
+              if name != TWICE and MEASURES[name].matters(worst.value)]
     chosen: list[Moment] = []
     for each in found:
         if all(abs(each.time_s - other.time_s) > TOGETHER_S for other in chosen) \
@@ -61,11 +53,6 @@ def story_moments(record: RunRecord, criticality: Criticality,
     chosen += [end for end in ends
                if all(abs(end.time_s - other.time_s) > TOGETHER_S for other in chosen)]
     return tuple(sorted(chosen))
-
-
-def is_told(measure: Measure, worst: Worst) -> bool:
-    """Return whether a worst value is meaningful."""
-    return measure.unit != 's' or worst.value < TOLD_S
 
 
 def nearest_moment(moments: Sequence[Moment], time_s: float) -> int | None:

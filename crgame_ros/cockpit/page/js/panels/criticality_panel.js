@@ -173,6 +173,7 @@ function isCritical(limits, name, value) {
   switch (name) {
     case 'ttc': case 'pet': return value < limits[name];
     case 'drac': return value > limits.drac;
+    case 'gap': case 'min_distance': return value <= 0;
     default: return false;
   }
 }
