@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from enum import IntEnum
 
+from crgame_ros.analysis.criticality.rows import MEASURED
 from crgame_ros.errors import InputError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,7 @@ ESTIMATE_WIDTH = 8
 # Values of a scan before its ranges: x, y, yaw, first angle, increment, longest range, period.
 SCAN_WIDTH = 7
 # Values of a vehicle's criticality: its index, then value and other object of ten measures.
-CRITICALITY_COLUMNS = 21
+CRITICALITY_COLUMNS = 1 + 2 * len(MEASURED)
 
 _FLOAT = np.dtype('<f8')
 
@@ -200,9 +201,9 @@ def encode_criticality(epoch: int, n: int, k: int, t: float, rows: ArrayLike) ->
     :param n: simulation step.
     :param k: scenario step.
     :param t: time since the start of the run [s].
-    :param rows: (S, 21) index of the vehicle; then of gap [m], time_gap, thw, ttc, ttc_a [s],
-        drac, a_req [m/s^2], ttc_2d [s], min_distance [m] and pet [s] the most critical value and
-        the other object: 0 to V - 1 are vehicles, objects follow from V, -1 is none.
+    :param rows: (S, 1 + 2 measures) index of the vehicle; then of each of `MEASURED` the most
+        critical value and the other object: 0 to V - 1 are vehicles, objects follow from V, -1
+        is none.
     :raises InputError: if the array has another width.
     """
     return _rows(FrameKind.CRITICALITY, epoch, n, k, t, (), rows, CRITICALITY_COLUMNS)

@@ -12,6 +12,8 @@ import secrets
 from types import MappingProxyType
 from typing import Any
 
+from crgame_ros.analysis.criticality.rows import MEASURED
+from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.rights import ALL_RIGHTS, Rights
 from crgame_ros.cockpit.shown_paths import without_paths
@@ -26,6 +28,11 @@ GIVES_WAY_S = 5.0
 SILENT_S = 180.0
 # A new scene invalidates them.
 SCENE = 'scene'
+# The measures of criticality, for pages.
+_MEASURES = [
+    {'name': name, 'label': measure.label, 'unit': measure.unit.replace('^2', '²'),
+     'worst': measure.worst, 'limit': USUAL.of(name), 'definition': measure.definition}
+    for name, measure in MEASURED.items()]
 
 
 @dataclass(frozen=True)
@@ -171,7 +178,7 @@ class Hub:
         client.put_event(_encode('hello', {
             'client': client.id, 'name': client.name, 'mode': self._mode,
             'version': __version__, 'program': self._program, 'rights': _rights(client),
-            'framed_by': self._framed_by}))
+            'framed_by': self._framed_by, 'measures': _MEASURES}))
         for kind, text in self._documents.items():
             client.put_document(kind, text)
         for slot, frame in self._frames.items():

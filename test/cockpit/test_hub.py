@@ -9,6 +9,7 @@ from typing import Any
 
 from cockpit_support import cockpit, in_loop, next_text, wait_until
 from crgame_ros import __version__
+from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.shown_paths import without_paths
@@ -62,12 +63,16 @@ async def test_a_new_client_gets_hello_then_documents_and_the_newest_frames() ->
     hub.send_frame('state', b'old')
     hub.send_frame('state', b'new')
     sink = await received(add(hub))
-    program = sink.texts[0]['program']
+    program, measures = (sink.texts[0][name] for name in ('program', 'measures'))
+    assert [measure['name'] for measure in measures] == [*MEASURES, 'pet']
+    assert measures[3] == {
+        'name': 'ttc', 'label': 'Time to collision (TTC)', 'unit': 's', 'worst': -1, 'limit': 3.0,
+        'definition': MEASURES['ttc'].definition}
     assert sink.texts == [
         {'type': 'hello', 'client': 'c1', 'name': 'Guest 1', 'mode': 'live',
          'version': __version__, 'program': program, 'rights': {
              'role': 'director and driver', 'directs': True, 'drives': True, 'seat': '',
-             'may_direct': True, 'may_drive': True}, 'framed_by': ''},
+             'may_direct': True, 'may_drive': True}, 'framed_by': '', 'measures': measures},
         {'type': 'scene', 'id': 2}, {'type': 'seats', 'seats': {}}]
     assert sink.frames == [b'new']
     assert (await received(add(hub))).texts[0]['program'] == program

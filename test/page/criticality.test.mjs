@@ -5,25 +5,30 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { CriticalityLog, limitsOf } from '../../crgame_ros/cockpit/page/js/criticality.js';
-import { CRITICALITY_WIDTH, decodeFrame, KIND, MEASURES } from
-  '../../crgame_ros/cockpit/page/js/frames.js';
+import { CriticalityLog, isCritical, limitsOf } from
+  '../../crgame_ros/cockpit/page/js/criticality.js';
+import { decodeFrame, KIND } from '../../crgame_ros/cockpit/page/js/frames.js';
 import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
 import { close, frameOf } from './support.mjs';
 
+const MEASURES = [
+  ['gap', -1, 0], ['thw', -1, null], ['ttc', -1, 3], ['drac', 1, 3], ['pet', -1, 2],
+].map(([name, worst, limit]) => ({ name, worst, limit, label: name, unit: '', definition: '' }));
 const row = (index, values) => [index, ...MEASURES.flatMap(
-  (name) => (name in values ? [values[name], 2] : [NaN, -1]))];
+  ({ name }) => (name in values ? [values[name], 2] : [NaN, -1]))];
 const frame = (n, ...rows) => frameOf(KIND.CRITICALITY, 0, n, n / 10, n / 100, rows.length,
   ...rows.flat());
 const logOf = (keeps_s, ...frames) => {
-  const log = new CriticalityLog(keeps_s);
+  const log = new CriticalityLog(() => MEASURES, keeps_s);
   frames.forEach((each) => log.add(decodeFrame(each)));
   return log;
 };
 
 test('a frame has a row per vehicle, with a value and another vehicle per measure', () => {
-  const { kind, rows } = decodeFrame(frame(10, row(0, { ttc: 4 }), row(1, { drac: 2 })));
-  assert.deepEqual([kind, rows.length], [KIND.CRITICALITY, 2 * CRITICALITY_WIDTH]);
+  const { kind, rows, width } = decodeFrame(
+    frame(10, row(0, { ttc: 4 }), row(1, { drac: 2 })));
+  assert.deepEqual([kind, width, rows.length], [KIND.CRITICALITY, 11, 22]);
+  assert.equal(decodeFrame(frame(10)).rows.length, 0);
 });
 
 test('missing values over time are NaN', () => {
@@ -60,7 +65,7 @@ test('a repeated step replaces all values from it on, and old values are dropped
 
 test('a replay fetches it once, when the panel is opened', () => {
   let asked = 0;
-  const log = new CriticalityLog(Infinity, () => { asked += 1; });
+  const log = new CriticalityLog(() => MEASURES, Infinity, () => { asked += 1; });
   log.want();
   log.want();
   assert.equal(asked, 1);
@@ -77,7 +82,17 @@ test('a reset clears it, a jump in a replay does not', () => {
 });
 
 test('limits come from the node, else the defaults hold', () => {
-  assert.deepEqual(limitsOf(null), { ttc: 3, drac: 3, pet: 2 });
+  assert.deepEqual(limitsOf(MEASURES, null), { gap: 0, ttc: 3, drac: 3, pet: 2 });
   const told = { criticality: { hv0: { thresholds: { ttc: 2.5, drac: null } } } };
-  assert.deepEqual(limitsOf(told), { ttc: 2.5, drac: 3, pet: 2 });
+  assert.deepEqual(limitsOf(MEASURES, told), { gap: 0, ttc: 2.5, drac: 3, pet: 2 });
+});
+
+test('values beyond their limit are critical, and contacts', () => {
+  const limits = limitsOf(MEASURES, null);
+  const critical = Object.fromEntries(MEASURES.map((measure) => [measure.name,
+    [-1, 0, 1, 2.5, 4].filter((value) => isCritical(measure, limits, value))]));
+  assert.deepEqual(critical, {
+    gap: [-1, 0], thw: [], ttc: [-1, 0, 1, 2.5], drac: [4], pet: [-1, 0, 1],
+  });
+  assert.equal(isCritical(MEASURES[2], limits, undefined), false);
 });

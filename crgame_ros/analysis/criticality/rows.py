@@ -7,6 +7,7 @@ import math
 
 from crgame_ros.analysis.criticality.criticality import (
     Criticality,
+    Measure,
     MEASURES,
     most_critical,
     UNDEFINED,
@@ -17,8 +18,11 @@ from numpy.typing import NDArray
 
 CRITICALITY_TOPIC = '/criticality'
 PLACE_COLUMNS = ('epoch', 'n', 'subject', 'other')
-# The columns of a row; pet has a value at the tick at which the second vehicle has entered.
-COLUMNS = (*PLACE_COLUMNS, *MEASURES, 'pet')
+# The measures of a row; pet has a value at the tick at which the second vehicle has entered.
+MEASURED = MEASURES | {'pet': Measure(
+    's', -1, math.nan, 'Post-encroachment time (PET)',
+    'from one leaving the area where both ways cross to the other entering it')}
+COLUMNS = (*PLACE_COLUMNS, *MEASURED)
 PET = COLUMNS.index('pet')
 
 FloatArray = NDArray[np.float64]
@@ -76,11 +80,11 @@ def most_critical_rows(rows: FloatArray) -> FloatArray:
     Return the most critical values of each subject at one tick.
 
     :param rows: (P, `COLUMNS`)
-    :return: (S, 1 + 2 (measures + 1)) the subject's number; then for each measure, and for pet,
-        the value and the number of the other, -1 where there is none.
+    :return: (S, 1 + 2 measures) the subject's number; then for each of `MEASURED` the value and
+        the number of the other, -1 where there is none.
     """
     subjects = np.unique(rows[:, 2])
-    chosen = np.empty((len(subjects), 1 + 2 * (len(MEASURES) + 1)))
+    chosen = np.empty((len(subjects), 1 + 2 * len(MEASURED)))
     for row, subject in zip(chosen, subjects.tolist(), strict=True):
         mine = rows[rows[:, 2] == subject]
         others = mine[:, 3].astype(np.int64)

@@ -25,21 +25,23 @@ class Thresholds(NamedTuple):
         """Return whether a value is critical; False for measures without a threshold."""
         return self.excess(measure, value) > 1.0
 
+    def of(self, measure: str) -> float | None:
+        """Return the threshold of a measure; None if it has none."""
+        return {'ttc': self.ttc_s, 'drac': self.drac, 'pet': self.pet_s, 'gap': 0.0,
+                'min_distance': 0.0}.get(measure)
+
     def excess(self, measure: str, value: float) -> float:
         """
         Return how far a value is towards its threshold (0 to 1) or beyond (above 1).
 
         Without a threshold it is 0; where two vehicles touch it is infinite.
         """
-        match measure:
-            case 'ttc' | 'pet':
-                limit_s = self.ttc_s if measure == 'ttc' else self.pet_s
-                return limit_s / value if value > 0.0 else math.inf
-            case 'drac':
-                return value / self.drac
-            case 'gap' | 'min_distance':
-                return 0.0 if value > 0.0 else math.inf
-        return 0.0
+        limit = self.of(measure)
+        if limit is None:
+            return 0.0
+        if measure == 'drac':
+            return value / limit
+        return limit / value if value > 0.0 else math.inf
 
     def check(self, prefix: str = '') -> None:
         """

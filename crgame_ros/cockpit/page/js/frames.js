@@ -20,12 +20,6 @@ export const VEHICLE_WIDTH = 13;
 export const OBJECT_WIDTH = 6;
 export const PLAN_WIDTH = 5;
 
-/** Measures of a vehicle's row in a CRITICALITY frame, each a value and the other object. */
-export const MEASURES = /** @type {const} */ ([
-  'gap', 'time_gap', 'thw', 'ttc', 'ttc_a', 'drac', 'a_req', 'ttc_2d', 'min_distance', 'pet',
-]);
-export const CRITICALITY_WIDTH = 1 + 2 * MEASURES.length;
-
 const HEADER = 5;
 
 /**
@@ -49,7 +43,8 @@ const HEADER = 5;
  * @typedef {Head & {kind: typeof KIND.SCAN} & Scan} ScanFrame
  * @typedef {Head & {kind: typeof KIND.ESTIMATE} & Estimate} EstimateFrame
  * @typedef {Head & {kind: typeof KIND.OCCUPANCY} & Occupancy} OccupancyFrame
- * @typedef {Head & {kind: typeof KIND.CRITICALITY, rows: Float64Array}} CriticalityFrame
+ * @typedef {Head & {kind: typeof KIND.CRITICALITY, width: number,
+ *   rows: Float64Array}} CriticalityFrame
  * @typedef {ScanFrame|EstimateFrame|SeenFrame|OccupancyFrame} PerceptionFrame
  * @typedef {StateFrame|ObjectsFrame|PlanFrame|PredictionFrame|PerceptionFrame|
  *   CriticalityFrame} Frame
@@ -136,8 +131,11 @@ export function decodeFrame(buffer) {
       };
     case KIND.OCCUPANCY:
       return { ...head, kind, ...occupancy(buffer, rows) };
-    case KIND.CRITICALITY:
-      return { ...head, kind, rows: rows(HEADER + 1, values[HEADER], CRITICALITY_WIDTH) };
+    case KIND.CRITICALITY: {
+      // A row has the vehicle's index, and of each measure the value and the other object.
+      const width = (values.length - HEADER - 1) / (values[HEADER] || 1);
+      return { ...head, kind, width, rows: rows(HEADER + 1, values[HEADER], Math.max(width, 1)) };
+    }
     default:
       return null;
   }

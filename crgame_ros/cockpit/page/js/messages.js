@@ -230,6 +230,18 @@ export {};
 /** @typedef {{vehicle: string, with: string, side: string, avoidable_by: string}} NamedContact */
 
 /**
+ * A measure of criticality.
+ *
+ * @typedef {object} Measure
+ * @property {string} name
+ * @property {string} label
+ * @property {string} unit
+ * @property {-1|1} worst whether smaller (-1) or greater (1) values are more critical
+ * @property {number|null} limit beyond which it is critical; null for none
+ * @property {string} definition
+ */
+
+/**
  * The worst values so far by measure, and the thresholds of criticality.
  *
  * @typedef {object} Criticality
@@ -310,7 +322,8 @@ export {};
  * Messages from the server to the store.
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
- *   version: string, program?: string, rights: Rights, framed_by?: string}} HelloMessage
+ *   version: string, program?: string, rights: Rights, framed_by?: string,
+ *   measures?: Measure[]}} HelloMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>,

@@ -14,7 +14,7 @@ import { SampleRing } from './samples.js';
 /** @import { CriticalityFrame, StateFrame } from './frames.js' */
 /** @import { History } from './history.js' */
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
-/** @import { FiredEvent, HelloMessage, NoticeMessage, Scene } from './messages.js' */
+/** @import { FiredEvent, HelloMessage, Measure, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
 /** @import { DeviceDelay, PeopleMessage, Present, Rights } from './people_messages.js' */
 /** @import { YouMessage } from './people_messages.js' */
@@ -104,8 +104,10 @@ export class Store {
   predictions = new Map();
   /** The perception of AVs, and the map of permanent obstacles. */
   perceived = new Perceived();
+  /** @type {Measure[]} of criticality, as the server has greeted with */
+  measures = [];
   /** The criticality of the vehicles; of a replay, over the whole run. */
-  criticality = new CriticalityLog(HISTORY_S);
+  criticality = new CriticalityLog(() => this.measures, HISTORY_S);
   // Received raw samples, a few seconds: states and scenario steps.
   /** @type {SampleRing<StateFrame>} */
   samples = new SampleRing(RAW_SAMPLES);
@@ -157,6 +159,7 @@ export class Store {
         this.mode = message.mode;
         this.version = message.version;
         this.framedBy = message.framed_by ?? '';
+        this.measures = message.measures ?? [];
         this.rights = message.rights ?? this.rights;
         this.#fresh = true;
         break;

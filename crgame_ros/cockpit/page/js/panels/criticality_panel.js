@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The panel of criticality: measures now, at worst, and over time with their thresholds. */
 
-import { limitsOf } from '../criticality.js';
+import { isCritical, limitsOf } from '../criticality.js';
 import { element, setAttribute, setText } from '../dom.js';
 import { clockTime, fixed, NONE } from './format.js';
 import { HistoryPanel } from './history.js';
 
-/** @import { Limits, MeasureName, Worst } from '../criticality.js' */
-/** @import { Criticality } from '../messages.js' */
+/** @import { Worst } from '../criticality.js' */
+/** @import { Criticality, Measure } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 /** @import { Quantity } from './quantities.js' */
 
@@ -38,18 +38,8 @@ const QUANTITIES = [
   },
 ];
 
-/** @type {[MeasureName, string, string, string][]} name, title, unit, explanation */
-const ROWS = [
-  ['gap', 'Gap', 'm', 'bumper to bumper to the leader, along the own path'],
-  ['time_gap', 'Time gap', 's', 'gap divided by the own speed'],
-  ['ttc', 'TTC', 's', 'gap divided by the closing speed'],
-  ['ttc_a', 'TTC, accelerating', 's', 'with both accelerations held until either stands'],
-  ['ttc_2d', 'TTC, any direction', 's', 'until footprints touch at constant velocity and heading'],
-  ['drac', 'DRAC', 'm/s²', 'deceleration to avoid a crash'],
-  ['a_req', 'Required', 'm/s²', 'constant acceleration that just avoids contact'],
-  ['min_distance', 'Distance', 'm', 'of the footprints'],
-  ['pet', 'PET', 's', 'from one leaving the crossing area to the other entering it'],
-];
+// Its value is that of the time gap.
+const TWICE = 'thw';
 
 /**
  * Make the panel.
@@ -74,7 +64,7 @@ export function createCriticality(root, store) {
     const ids = panel.selected.map(({ id }) => id);
     if (ids.join() !== [...shown.keys()].join()) {
       shown.clear();
-      ids.forEach((id) => shown.set(id, new VehicleTable(id)));
+      ids.forEach((id) => shown.set(id, new VehicleTable(id, store.measures)));
       tables.replaceChildren(...[...shown.values()].map((table) => table.root));
     }
     const t = store.displayed(performance.now())?.t ?? 0;
@@ -88,18 +78,21 @@ export function createCriticality(root, store) {
 /** One vehicle's measures: now, and at worst. */
 class VehicleTable {
   #id;
-  /** @type {Map<MeasureName, HTMLElement[]>} */
+  /** @type {Map<Measure, HTMLElement[]>} */
   #cells = new Map();
   #sum = element('p', { class: 'hint' });
 
-  /** @param {string} id of the vehicle */
-  constructor(id) {
+  /**
+   * @param {string} id of the vehicle
+   * @param {Measure[]} measures
+   */
+  constructor(id, measures) {
     this.#id = id;
-    const rows = ROWS.map(([name, title, unit, explanation]) => {
+    const rows = measures.filter(({ name }) => name !== TWICE).map((measure) => {
       const cells = [element('td', {}), element('td', {}), element('td', {})];
-      this.#cells.set(name, cells);
-      return element('tr', { 'data-key': name, title: explanation },
-        element('th', { scope: 'row', text: `${title} [${unit}]` }), ...cells);
+      this.#cells.set(measure, cells);
+      return element('tr', { 'data-key': measure.name, title: measure.definition },
+        element('th', { scope: 'row', text: `${measure.label} [${measure.unit}]` }), ...cells);
     });
     this.root = element('section', { 'data-id': id }, element('h3', { text: id }),
       element('table', { class: 'figures criticality' },
@@ -116,16 +109,17 @@ class VehicleTable {
   update(store, t) {
     const index = store.vehicleIndex(this.#id);
     const told = store.status?.criticality?.[this.#id];
-    const limits = limitsOf(store.status);
-    for (const [name, [now, to, worst]] of this.#cells) {
+    const limits = limitsOf(store.measures, store.status);
+    for (const [measure, [now, to, worst]] of this.#cells) {
+      const { name } = measure;
       const found = store.criticality.at(t, index, name);
       setText(now, fixed(found?.value, 2));
       setText(to, found === null ? NONE : nameOf(store, found.of));
-      setAttribute(now, 'data-late', isCritical(limits, name, found?.value));
-      const past = worstOf(store, told, name, store.criticality.worst(t, index, name));
+      setAttribute(now, 'data-late', isCritical(measure, limits, found?.value));
+      const past = worstOf(store, told, measure, store.criticality.worst(t, index, name));
       setText(worst, past === null ? NONE
         : `${fixed(past.value, 2)} (${past.of}, ${clockTime(past.t)})`);
-      setAttribute(worst, 'data-late', isCritical(limits, name, past?.value));
+      setAttribute(worst, 'data-late', isCritical(measure, limits, past?.value));
     }
     setText(this.#sum, told && told.tet_s !== null
       ? `Below a TTC of ${fixed(limits.ttc, 1)} s for ${fixed(told.tet_s, 1)} s (TET)` : '');
@@ -137,18 +131,17 @@ class VehicleTable {
  *
  * @param {Store} store
  * @param {Criticality|undefined} told
- * @param {MeasureName} name
+ * @param {Measure} measure
  * @param {Worst|null} seen
  * @returns {{value: number, of: string, t: number}|null}
  */
-function worstOf(store, told, name, seen) {
+function worstOf(store, told, { name, worst }, seen) {
   const known = told?.worst[name];
   const own = seen === null ? null : { ...seen, of: nameOf(store, seen.of) };
   if (!known || known.value === null || known.t === null) {
     return own;
   }
-  const greater = name === 'drac';
-  return own !== null && (greater ? own.value > known.value : own.value < known.value)
+  return own !== null && worst * (own.value - known.value) > 0
     ? own : { value: known.value, of: known.of, t: known.t };
 }
 
@@ -159,21 +152,4 @@ function worstOf(store, told, name, seen) {
 function nameOf(store, column) {
   const { vehicles = [], objects = [] } = store.scene ?? {};
   return (vehicles[column] ?? objects[column - vehicles.length])?.id ?? NONE;
-}
-
-/**
- * @param {Limits} limits
- * @param {MeasureName} name
- * @param {number|undefined} value
- */
-function isCritical(limits, name, value) {
-  if (value === undefined) {
-    return false;
-  }
-  switch (name) {
-    case 'ttc': case 'pet': return value < limits[name];
-    case 'drac': return value > limits.drac;
-    case 'gap': case 'min_distance': return value <= 0;
-    default: return false;
-  }
 }

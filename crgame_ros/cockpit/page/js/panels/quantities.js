@@ -4,7 +4,7 @@
 
 import { thin, unwrap } from './series.js';
 
-/** @import { Limits, MeasureName } from '../criticality.js' */
+/** @import { Limits } from '../criticality.js' */
 /** @import { VEHICLE } from '../frames.js' */
 /** @import { History } from '../history.js' */
 /** @import { SceneVehicle } from '../messages.js' */
@@ -25,8 +25,8 @@ const DASHES = ['solid', 'dot'];
  * @property {boolean} [angle] whether whole turns are removed
  * @typedef {{name: string, health: 'lag'|'step_error'}} HealthLine
  * @typedef {{latency: true, name?: string}} LatencyLine
- * @typedef {{critical: MeasureName, name?: string}} CriticalLine
- * @typedef {{limit: keyof Limits, name: string}} LimitLine
+ * @typedef {{critical: string, name?: string}} CriticalLine
+ * @typedef {{limit: string, name: string}} LimitLine
  * @typedef {ColumnLine|HealthLine|LatencyLine|CriticalLine|LimitLine} Line
  */
 
@@ -42,7 +42,7 @@ const DASHES = ['solid', 'dot'];
 
 /**
  * @typedef {{id: string, role: SceneVehicle['role'], color: string, past: History,
- *   critical: (name: MeasureName) => {t: number[], values: number[]}}} PlottedVehicle
+ *   critical: (name: string) => {t: number[], values: number[]}}} PlottedVehicle
  * @typedef {{vehicles: PlottedVehicle[], health: HealthLog, runColor: string,
  *   limitColor: string, limits: Limits}} PlotData
  * @typedef {Pick<ChartView, 'from'|'to'|'shown'>} PlotWindow

@@ -52,7 +52,8 @@ export class ReplayFeed {
       this.#outline = unpack(await answer.arrayBuffer()).map(decodeFrame)
         .filter((frame) => frame?.kind === KIND.STATE);
     }).catch(refused);
-    const log = new CriticalityLog(Infinity, () => this.#askCriticality(log, refused));
+    const log = new CriticalityLog(() => store.measures, Infinity,
+      () => this.#askCriticality(log, refused));
     store.criticality = log;
   }
 
