@@ -28,6 +28,7 @@ from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.game.task_spec import TaskList, TaskSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
+from crgame_ros.schema.bounded import Bounded
 from crgame_ros.schema.json_documents import DocumentReader
 from crgame_ros.schema.reading import read
 from crgame_ros.schema.writing import write
@@ -174,7 +175,7 @@ def objects_document(descriptions: Sequence[ObjectDescription]) -> str:
 
 
 _OBJECTS: DocumentReader[tuple[ObjectDescription, ...]] = DocumentReader(
-    tuple[ObjectDescription, ...], OBJECTS_TOPIC, 'list of objects')
+    Annotated[tuple[ObjectDescription, ...], Bounded(1_000_000)], OBJECTS_TOPIC, 'list of objects')
 
 
 def parse_objects_document(text: str) -> tuple[ObjectDescription, ...]:
@@ -198,9 +199,9 @@ class Signals:
     """
 
     k: int
-    states: dict[str, str]
-    objects: dict[str, Annotated[int, Interval(ge=0, le=ALL_LIGHTS)]] = field(
-        default_factory=dict)
+    states: Annotated[dict[str, str], Bounded(10_000)]
+    objects: Annotated[dict[str, Annotated[int, Interval(ge=0, le=ALL_LIGHTS)]],
+                       Bounded(10_000)] = field(default_factory=dict)
 
 
 _SIGNALS: DocumentReader[Signals] = DocumentReader(Signals, SIGNALS_TOPIC, 'list of states')
@@ -226,7 +227,7 @@ class _FiredEntry:
 @dataclass(frozen=True)
 class _FiredEvents:
     epoch: int
-    fired: tuple[_FiredEntry, ...]
+    fired: Annotated[tuple[_FiredEntry, ...], Bounded(1_000_000)]
 
 
 _CAUSES: dict[str, FiredBy] = {cause: cause for cause in get_args(FiredBy)}

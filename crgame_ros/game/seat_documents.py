@@ -10,6 +10,8 @@ from typing import Annotated, Any
 from annotated_types import Len, Predicate
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.game.game import MAX_VEHICLES
+from crgame_ros.schema.bounded import Bounded
 from crgame_ros.schema.json_documents import DocumentReader
 
 SEATS_TOPIC = '/seats'
@@ -117,7 +119,7 @@ class _SeatEntry:
 
 
 _SEATS: DocumentReader[dict[str, _SeatEntry]] = DocumentReader(
-    dict[VehicleId, _SeatEntry], SEATS_TOPIC, 'list of seats')
+    Annotated[dict[VehicleId, _SeatEntry], Bounded(MAX_VEHICLES)], SEATS_TOPIC, 'list of seats')
 
 
 def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
@@ -166,7 +168,7 @@ _DEMAND: DocumentReader[SeatDemand] = DocumentReader(
 @dataclass(frozen=True)
 class _Spells:
     epoch: int
-    drivers: tuple[DrivingSpell, ...]
+    drivers: Annotated[tuple[DrivingSpell, ...], Bounded(100_000)]
 
 
 _SPELLS: DocumentReader[_Spells] = DocumentReader(_Spells, DRIVERS_TOPIC, 'list of drivers')

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Len
 from crgame_ros.game.driven_vehicle import VehicleId
 from crgame_ros.game.task_spec import TaskKind
+from crgame_ros.schema.bounded import Bounded
 from crgame_ros.schema.json_documents import DocumentReader
 
 LOG_TOPIC = '/tasks/log'
@@ -115,7 +116,7 @@ class TaskReport:
 @dataclass(frozen=True)
 class _Log:
     epoch: int
-    entries: tuple[TaskEntry, ...]
+    entries: Annotated[tuple[TaskEntry, ...], Bounded(10_000)]
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,8 @@ class TaskState:
     """
 
     epoch: int
-    running: tuple[str, ...]
-    open: tuple[OpenPrompt, ...]  # noqa: A003
+    running: Annotated[tuple[str, ...], Bounded(10_000)]
+    open: Annotated[tuple[OpenPrompt, ...], Bounded(10_000)]  # noqa: A003
 
 
 _LOG: DocumentReader[_Log] = DocumentReader(_Log, LOG_TOPIC, 'log of tasks')

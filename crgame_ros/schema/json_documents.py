@@ -47,7 +47,8 @@ class DocumentReader(Generic[T]):
         except ValidationError as error:
             first = error.errors(include_url=False, include_context=False, include_input=False)[0]
             place = '.'.join(map(str, first['loc'])) or 'all of it'
-            said = 'has another form' if first['type'] == 'predicate_failed' else first['msg']
+            said = 'has another form' if first['type'] == 'predicate_failed' \
+                else first['msg'].removeprefix('Value error, ')
             raise InputError(f'is no {self._what} ({place}: {said})', self._topic,
                              self._remedy) from None
         except (ValueError, RecursionError) as error:

@@ -4,6 +4,7 @@
 
 from typing import Annotated, Any, Literal
 
+from crgame_ros.schema.bounded import Bounded
 from crgame_ros.schema.messages import HexKey, Message, MessageId, MessageReader, Words
 from pydantic import AfterValidator, Field, StringConstraints
 
@@ -22,7 +23,7 @@ ShortText = Annotated[Words, StringConstraints(max_length=200)]
 Remark = Annotated[Words, StringConstraints(max_length=20_000), AfterValidator(_not_blank)]
 Seconds = Annotated[float, Field(ge=0.0, le=1e11)]
 Milliseconds = Annotated[float, Field(ge=0.0, le=60_000.0)]
-Choices = Annotated[list[ShortText], Field(max_length=500)]
+Choices = Annotated[list[ShortText], Bounded(500)]
 
 
 class Ping(Message):
@@ -93,14 +94,14 @@ class Finish(Message):
     type: Literal['finish'] = 'finish'  # noqa: A003
     item: ShortText
     answers: Annotated[dict[ShortText, int | float | Words | Choices | None],
-                       Field(max_length=_MAX_ANSWERS)] = {}
+                       Bounded(_MAX_ANSWERS)] = {}
     shown_at: Seconds
     answered_at: Seconds
     taken_s: Seconds
-    after_s: Annotated[dict[ShortText, Seconds], Field(max_length=_MAX_ANSWERS)] = {}
+    after_s: Annotated[dict[ShortText, Seconds], Bounded(_MAX_ANSWERS)] = {}
     agreed: bool | None = None
     device: ShortText | None = None
-    moved: Annotated[list[ShortText], Field(max_length=50)] = []
+    moved: Annotated[list[ShortText], Bounded(50)] = []
 
     def told(self) -> dict[str, Any]:
         """Return what is recorded beside the answers."""
