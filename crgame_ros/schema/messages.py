@@ -80,7 +80,7 @@ def _whole_text(given: object) -> object:
 
 
 # True or false; pages write 1 and 0 as well.
-Flag = Annotated[bool, BeforeValidator(_flag)]
+Flag = Annotated[bool, BeforeValidator(_flag, json_schema_input_type=bool | int)]
 # What a person has typed.
 Words = Annotated[str, BeforeValidator(_whole_text)]
 # Number of a message to which the page expects a reply.

@@ -15,8 +15,7 @@
 export {};
 
 /** @import { PeopleMessage, Rights, YouMessage } from './people_messages.js' */
-/** @import { GameTask, TaskReportMessage, TasksMessage } from './tasks/task_messages.js' */
-/** @import { Viewpoint } from './view3d/cameras.js' */
+/** @import { GameTask, TasksMessage } from './tasks/task_messages.js' */
 
 /**
  * @typedef {object} Shape
@@ -347,32 +346,15 @@ export {};
  */
 
 /**
- * Messages from the page.
+ * Messages from the page, as the server declares them; requests get their number when they are
+ * sent.
  *
- * @typedef {{away: true}|({keys: number[]}|{axes: number[]}) & {reverse: number, lights: number[],
- *   put_back: number}} Hands  `lights`: which of LIGHT_BUTTONS are held; `put_back`: whether the
- *   vehicle is to be put back on its lane
- * @typedef {'start'|'pause'|'step'|'reset'|'stop'} RunAction
- * @typedef {{type: 'input', seat: string} & Hands} InputMessage
- * @typedef {{type: 'layers', predictions?: boolean, perception?: string,
- *   scans?: boolean}} LayersMessage
- * @typedef {{type: 'sound', on: number, volume: number, rumble: number}} SoundMessage
- * @typedef {{type: 'view', shown: Viewpoint|'map', inset: number, plans: number,
- *   mirrors: number, bare: number, across_deg: number|null, screen_width_m: number|null,
- *   eye_distance_m: number|null, width_px: number, height_px: number, ratio: number,
- *   rate_hz: number|null, renderer: string, software: number}} ViewMessage
- * @typedef {InputMessage|LayersMessage|SoundMessage|ViewMessage|TaskReportMessage
- *   |{type: 'name', name: string}
- *   |{type: 'person', key: string, fresh: boolean}|{type: 'device', device: string}
- *   |{type: 'ping', t: number, round_trip_ms?: number}} TellingMessage
- * @typedef {{type: 'release'|'ask', seat: string}|{type: 'claim', seat: string, device: string}
- *   |{type: 'hand_over', seat: string, to: string}
- *   |{type: 'answer', seat: string, accept: boolean}
- *   |{type: 'ready', seat: string, ready: boolean}|{type: 'role', role: string}
- *   |{type: 'control', action: RunAction, all?: boolean}
- *   |{type: 'rate', factor: number}|{type: 'planner', av: string, run: boolean}
- *   |{type: 'trigger', event: string}} RequestMessage
- * @typedef {TellingMessage|(RequestMessage & {id: number})} PageMessage
+ * @typedef {import('./page_messages.js').PageMessage} PageMessage
+ * @typedef {import('./page_messages.js').Unnumbered<PageMessage>} RequestMessage
+ * @typedef {Omit<import('./page_messages.js').Input, 'type'|'seat'>} Hands
+ * @typedef {import('./page_messages.js').Control['action']} RunAction
+ * @typedef {import('./page_messages.js').SeenView} ViewMessage
+ * @typedef {import('./page_messages.js').Role['role']} RoleName
  */
 
 /**

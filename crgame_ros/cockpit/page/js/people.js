@@ -7,6 +7,7 @@ import { oneLine } from './panels/format.js';
 
 /** @import { Connection } from './connection.js' */
 /** @import { DeviceDelay, Present } from './people_messages.js' */
+/** @import { RoleName } from './messages.js' */
 /** @import { Store } from './store.js' */
 
 /** @type {[role: string, text: string][]} */
@@ -101,7 +102,7 @@ class People {
     // A select that keeps the focus would take the driving keys.
     this.#role.blur();
     sessionStorage.setItem(ROLE, this.#role.value);
-    this.#requestRole(this.#role.value);
+    this.#requestRole(/** @type {RoleName} */ (this.#role.value));
   }
 
   /** Restore the chosen role: a new connection begins with all granted rights. */
@@ -110,11 +111,11 @@ class People {
       ?? new URLSearchParams(window.location.search).get('role');
     if (this.#store.me.id !== '' && this.#store.mode === 'live' && role !== this.#refused
         && ROLES.some(([known]) => known === role)) {
-      this.#requestRole(/** @type {string} */ (role));
+      this.#requestRole(/** @type {RoleName} */ (role));
     }
   }
 
-  /** @param {string} role */
+  /** @param {RoleName} role */
   async #requestRole(role) {
     const { ok, text } = await this.#connection.request({ type: 'role', role });
     if (!ok) {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The WebSocket to the desk's server: it reconnects and estimates the server's clock. */
 
+/** @import { ExperimenterMessage, ParticipantMessage, Ping } from './page_messages.js' */
+
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 2000;
 const PING_EVERY_MS = 1000;
@@ -9,7 +11,7 @@ const LONGEST_TOLD_MS = 60_000;
 
 /**
  * @typedef {{opened: (again: boolean) => void, lost: () => void,
- *   received: (message: any) => void, pinged?: () => Record<string, unknown>}} Listener
+ *   received: (message: any) => void, pinged?: () => Partial<Ping>}} Listener
  *   `pinged` returns the data to send with each ping
  */
 
@@ -45,7 +47,7 @@ export class DeskConnection {
   }
 
   /**
-   * @param {Record<string, unknown>} message with its `type`
+   * @param {ParticipantMessage|ExperimenterMessage} message
    * @returns {boolean} false when there is no connection
    */
   send(message) {

@@ -8,6 +8,7 @@ import { entryWords, timeOfDay } from './log_words.js';
 import { askReason } from './reason_dialog.js';
 
 /** @import { ExperimenterDocument, ItemRow } from './experimenter_messages.js' */
+/** @import { ExperimenterMessage, Unnumbered } from './page_messages.js' */
 
 const MARKER_KEYS = ['F1', 'F2', 'F3', 'F4', 'F5', 'F6', 'F7', 'F8', 'F9'];
 
@@ -69,7 +70,7 @@ class ExperimenterPage {
     });
   }
 
-  /** @param {Record<string, unknown>} message */
+  /** @param {Unnumbered<ExperimenterMessage>} message */
   #send(message) {
     this.#lastId += 1;
     const sent = this.#connection.send({ ...message, id: this.#lastId });

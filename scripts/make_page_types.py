@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Write the types of the pages' messages in TypeScript from the classes that read them.
+
+    python3 scripts/make_page_types.py            write the files
+    python3 scripts/make_page_types.py --check    say whether they are up to date, change nothing
+"""
+
+import argparse
+import json
+from pathlib import Path
+import sys
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from crgame_ros.cockpit.page_messages import PageMessage  # noqa: E402
+from crgame_ros.study.desk.messages import (  # noqa: E402
+    ExperimenterMessage,
+    ParticipantMessage,
+)
+from pydantic import TypeAdapter  # noqa: E402
+
+FILES = {
+    'crgame_ros/cockpit/page/js/page_messages.d.ts': {'PageMessage': PageMessage},
+    'crgame_ros/study/desk/page/js/page_messages.d.ts': {
+        'ParticipantMessage': ParticipantMessage, 'ExperimenterMessage': ExperimenterMessage}}
+HEAD = """\
+// SPDX-FileCopyrightText: 2026 The crgame_ros authors
+// SPDX-License-Identifier: Apache-2.0
+/** What the server takes from pages. Written by scripts/make_page_types.py: do not edit. */
+
+/** Messages that get a reply, before they have a number. */
+export type Unnumbered<T> = T extends { id: number } ? Omit<T, 'id'> : never;
+"""
+WIDTH = 99
+
+
+def typescript(schema: dict[str, Any]) -> str:
+    """Return the type that a JSON Schema describes."""
+    if '$ref' in schema:
+        return str(schema['$ref']).rpartition('/')[2]
+    if 'const' in schema:
+        return _literal(schema['const'])
+    if 'enum' in schema:
+        return ' | '.join(map(_literal, schema['enum']))
+    if 'anyOf' in schema:
+        return ' | '.join(dict.fromkeys(' | '.join(map(typescript, schema['anyOf'])).split(' | ')))
+    match schema.get('type'):
+        case 'array':
+            entries = schema.get('prefixItems') or [schema['items']]
+            types = list(dict.fromkeys(' | '.join(map(typescript, entries)).split(' | ')))
+            return f'{types[0]}[]' if len(types) == 1 else f'({" | ".join(types)})[]'
+        case 'object':
+            return f'Record<string, {typescript(schema["additionalProperties"])}>'
+        case 'integer':
+            return 'number'
+        case kind:
+            return str(kind)
+
+
+def _literal(value: object) -> str:
+    return f"'{value}'" if isinstance(value, str) else json.dumps(value)
+
+
+def interface(name: str, schema: dict[str, Any]) -> str:
+    """Return the interface of a message; a key with a default may be left out."""
+    needed = {'type', *schema.get('required', ())}
+    lines = [f'  {key}{"" if key in needed else "?"}: {typescript(part)};'
+             for key, part in schema['properties'].items()]
+    first = schema['description'].splitlines()[0]
+    return '\n'.join((f'\n/** {first} */', f'export interface {name} {{', *lines, '}', ''))
+
+
+def types_of(unions: dict[str, Any]) -> str:
+    """Return the file with some unions of messages."""
+    known: dict[str, dict[str, Any]] = {}
+    ends = ''
+    for name, union in unions.items():
+        schema = TypeAdapter(union).json_schema()
+        known |= schema['$defs']
+        members = [typescript(part) for part in schema['anyOf']]
+        line = f'\nexport type {name} ='
+        for member in members:
+            if len(line.splitlines()[-1]) + len(member) + 4 > WIDTH:
+                line += '\n '
+            line += f' | {member}' if not line.endswith('=') else f' {member}'
+        ends += line + ';\n'
+    return HEAD + ''.join(interface(name, known[name]) for name in sorted(known)) + ends
+
+
+def main() -> int:
+    """Write the files, or check them."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--check', action='store_true', help='change nothing')
+    check = parser.parse_args().check
+    code = 0
+    for name, unions in FILES.items():
+        path, text = ROOT / name, types_of(unions)
+        if path.is_file() and path.read_text(encoding='utf-8') == text:
+            continue
+        if check:
+            print(f'{name} is out of date: run scripts/make_page_types.py')
+            code = 1
+        else:
+            path.write_text(text, encoding='utf-8')
+            print(path)
+    return code
+
+
+if __name__ == '__main__':
+    sys.exit(main())
