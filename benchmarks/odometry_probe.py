@@ -12,12 +12,12 @@ class OdometryProbe:
     """Notes when the odometry of each step of hv0 arrives, and how its front wheels turn in it."""
 
     def __init__(self) -> None:
-        from crgame_ros.ros.spinning import prompt_executor
         from nav_msgs.msg import Odometry
         import rclpy
+        from rclpy.experimental import EventsExecutor
         from sensor_msgs.msg import JointState
         self.node = rclpy.create_node('odometry_probe')
-        self._executor = prompt_executor()
+        self._executor = EventsExecutor()
         self._executor.add_node(self.node)
         self._arrived: dict[int, float] = {}
         self._rates: dict[int, float] = {}
