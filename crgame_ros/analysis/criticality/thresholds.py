@@ -34,10 +34,10 @@ class Thresholds(NamedTuple):
         """
         Return how far a value is towards its threshold (0 to 1) or beyond (above 1).
 
-        Without a threshold it is 0; where two vehicles touch it is infinite.
+        Without a threshold, and for NaN, it is 0; where two vehicles touch it is infinite.
         """
         limit = self.of(measure)
-        if limit is None:
+        if limit is None or math.isnan(value):
             return 0.0
         if measure == 'drac':
             return value / limit

@@ -5,6 +5,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 import contextlib
+from functools import partial
 from itertools import count
 import json
 import logging
@@ -117,19 +118,16 @@ class DeskSocket:
                         f'{MAX_MALFORMED} messages that cannot be read')
 
     def _handle(self, client: Client, text: str) -> None:
+        # It is read first: errors of what is done by it are no fault of the message.
         try:
-            if self._is_experimenter:
-                order = parse_experimenter(text)
-            else:
-                message = parse_participant(text)
+            do = partial(self._pages.experimenter_says, client, parse_experimenter(text)) \
+                if self._is_experimenter \
+                else partial(self._pages.participant_says, client, parse_participant(text))
         except InputError as error:
             self._malformed += 1
             _log.info('%s: %s', client.id, error)
             return
-        if self._is_experimenter:
-            self._pages.experimenter_says(client, order)
-        else:
-            self._pages.participant_says(client, message)
+        do()
 
 
 def _end_with(writer: asyncio.Task[None], client: Client) -> None:
