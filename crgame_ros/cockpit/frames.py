@@ -18,7 +18,7 @@ PREDICTION_COLUMNS = 3
 ESTIMATE_WIDTH = 8
 # Values of a scan before its ranges: x, y, yaw, first angle, increment, longest range, period.
 SCAN_WIDTH = 7
-# Values of a vehicle's criticality: its index, then value and other object of ten measures.
+# Values of a vehicle's criticality: its index, then value and other object of each measure.
 CRITICALITY_COLUMNS = 1 + 2 * len(MEASURED)
 
 _FLOAT = np.dtype('<f8')

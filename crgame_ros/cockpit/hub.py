@@ -30,7 +30,7 @@ SILENT_S = 180.0
 SCENE = 'scene'
 # The measures of criticality, for pages.
 _MEASURES = [
-    {'name': name, 'label': measure.label, 'unit': measure.unit.replace('^2', '²'),
+    {'name': name, 'label': measure.label, 'unit': measure.symbol,
      'worst': measure.worst, 'limit': USUAL.of(name), 'definition': measure.definition}
     for name, measure in MEASURED.items()]
 

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 import unicodedata
 
 from crgame_ros.cockpit.rights import ROLES
-from crgame_ros.game.task_documents import LONGEST_MS, MAX_NUMBER, PageTimes
+from crgame_ros.game.driven_vehicle import VehicleId
+from crgame_ros.game.task_documents import Milliseconds, PageTimes, PromptNumber
 from crgame_ros.schema.messages import Flag, HexKey, Message, MessageId, MessageReader
 from crgame_ros.timing.real_time_factor import MAX_REAL_TIME_FACTOR, MIN_REAL_TIME_FACTOR
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator, StringConstraints
@@ -43,11 +44,9 @@ def _cleaned(given: object, length: int) -> object:
     return clean_text(given, length) if isinstance(given, str) else given
 
 
-Vehicle = Annotated[str, StringConstraints(pattern='^(hv|av)[0-9]{1,3}$')]
 Av = Annotated[str, StringConstraints(pattern='^av[0-9]{1,3}$')]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Delay = Annotated[float, Field(ge=0.0, le=60_000.0)]
-Milliseconds = Annotated[float, Field(ge=-LONGEST_MS, le=LONGEST_MS)]
 Device = Annotated[str, BeforeValidator(partial(_cleaned, length=MAX_DEVICE))]
 # A list becomes a tuple, although values must have their very type otherwise.
 Keys = Annotated[tuple[Flag, Flag, Flag, Flag], Field(strict=False)]
@@ -77,7 +76,7 @@ class Input(Message):
     """
 
     type: Literal['input'] = 'input'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
     keys: Keys | None = None
     axes: Axes | None = None
     away: Literal[True] | None = None
@@ -96,7 +95,7 @@ class Claim(Request):
     """A driver wants a seat."""
 
     type: Literal['claim'] = 'claim'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
     device: Device = ''
 
 
@@ -104,14 +103,14 @@ class Release(Request):
     """A driver gives a seat back."""
 
     type: Literal['release'] = 'release'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
 
 
 class Ask(Request):
     """A driver asks the driver in a seat for it."""
 
     type: Literal['ask'] = 'ask'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
 
 
 class HandOver(Request):
@@ -122,7 +121,7 @@ class HandOver(Request):
     """
 
     type: Literal['hand_over'] = 'hand_over'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
     to: Annotated[str, StringConstraints(pattern='^c[0-9]{1,9}$')]
 
 
@@ -130,7 +129,7 @@ class Answer(Request):
     """A driver takes an offered seat, or does not."""
 
     type: Literal['answer'] = 'answer'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
     accept: Flag
 
 
@@ -138,7 +137,7 @@ class Ready(Request):
     """A driver in a seat is ready for the start, or not any more."""
 
     type: Literal['ready'] = 'ready'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
     ready: Flag
 
 
@@ -293,9 +292,9 @@ class TaskDone(Message):
     """What the page has shown, or the driver has answered; times as in `PageTimes`."""
 
     type: Literal['task'] = 'task'  # noqa: A003
-    seat: Vehicle
+    seat: VehicleId
     task: Annotated[str, StringConstraints(pattern='^[a-z0-9_-]{1,40}$')]
-    number: Annotated[int, Field(ge=0, le=MAX_NUMBER)]
+    number: PromptNumber
     what: Literal['shown', 'answer']
     response_ms: Milliseconds | None = None
     delay_ms: Milliseconds | None = None

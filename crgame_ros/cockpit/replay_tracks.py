@@ -16,7 +16,7 @@ from crgame_ros.game.documents import (
 )
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
-from crgame_ros.game.seat_documents import parse_seats_document, parse_tenants
+from crgame_ros.game.seat_documents import parse_seats
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status, Status
 from crgame_ros.recording.reader import DecodedMessage
@@ -229,8 +229,8 @@ class TrackCollector:
 
 def _seats(text: str) -> dict[str, dict[str, str]]:
     """Read the drivers of the seats, by name if the driver was at a page."""
-    seats: dict[str, dict[str, str]] = parse_seats_document(text)
-    for name, tenant in parse_tenants(text).items():
+    seats, tenants = parse_seats(text)
+    for name, tenant in tenants.items():
         if tenant.here:
             seats[name]['holder_name'] = tenant.person.name
     return seats

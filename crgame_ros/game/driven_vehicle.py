@@ -17,7 +17,7 @@ from crgame_ros.vehicle.state import STATE_WIDTH, VehicleState
 
 # Parameters of a vehicle that are not numbers.
 TEXTS = ('name', 'steering_ratio', 'type', 'powertrain')
-VEHICLE_ID = re.compile(r'(hv|av)\d{1,3}')
+VEHICLE_ID = re.compile(r'(hv|av)[0-9]{1,3}')
 VehicleId = Annotated[str, Predicate(VEHICLE_ID.fullmatch)]
 
 

@@ -11,7 +11,7 @@ from annotated_types import Len, Predicate
 from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import VehicleId
 from crgame_ros.game.game import MAX_VEHICLES
-from crgame_ros.schema.bounded import Bounded
+from crgame_ros.schema.bounded import Bounded, Exact
 from crgame_ros.schema.json_documents import DocumentReader
 
 SEATS_TOPIC = '/seats'
@@ -75,7 +75,7 @@ class SeatDemand:
     person: SeatPerson | None = None
     displaced: str | None = None
     left: str | None = None
-    ready: bool | None = None
+    ready: Annotated[bool, Exact()] | None = None
 
 
 @dataclass
@@ -114,33 +114,26 @@ class _SeatEntry:
     source: str
     driver: str
     person: SeatPerson | None = None
-    here: bool = False
-    ready: bool = False
+    here: Annotated[bool, Exact()] = False
+    ready: Annotated[bool, Exact()] = False
 
 
 _SEATS: DocumentReader[dict[str, _SeatEntry]] = DocumentReader(
     Annotated[dict[VehicleId, _SeatEntry], Bounded(MAX_VEHICLES)], SEATS_TOPIC, 'list of seats')
 
 
-def parse_seats_document(text: str) -> dict[str, dict[str, str]]:
+def parse_seats(text: str) -> tuple[dict[str, dict[str, str]], dict[str, SeatOccupant]]:
     """
     Read `/seats`.
 
-    :return: source and driver of each seat, by vehicle.
+    :return: source and driver of each seat, and its present or last occupant, by vehicle.
     :raises InputError: if it does not follow the contract.
     """
-    return {name: {'source': entry.source, 'driver': entry.driver}
-            for name, entry in _SEATS.read(text).items()}
-
-
-def parse_tenants(text: str) -> dict[str, SeatOccupant]:
-    """
-    Read the occupants of the seats from `/seats`.
-
-    :raises InputError: if it does not follow the contract.
-    """
-    return {name: SeatOccupant(entry.person, entry.here, entry.ready)
-            for name, entry in _SEATS.read(text).items() if entry.person is not None}
+    entries = _SEATS.read(text)
+    return ({name: {'source': entry.source, 'driver': entry.driver}
+             for name, entry in entries.items()},
+            {name: SeatOccupant(entry.person, entry.here, entry.ready)
+             for name, entry in entries.items() if entry.person is not None})
 
 
 def demand_text(demand: SeatDemand) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from annotated_types import Interval, Len
 from crgame_ros.game.driven_vehicle import VehicleId
 from crgame_ros.game.task_spec import TaskKind
-from crgame_ros.schema.bounded import Bounded
+from crgame_ros.schema.bounded import Bounded, Exact
 from crgame_ros.schema.json_documents import DocumentReader
 
 LOG_TOPIC = '/tasks/log'
@@ -19,8 +19,8 @@ REPORT_TOPIC = '/tasks/report'
 MAX_NUMBER = 1_000_000
 # Longest time in a page's report [ms].
 LONGEST_MS = 600_000.0
-PromptNumber = Annotated[int, Interval(ge=0, le=MAX_NUMBER)]
-Milliseconds = Annotated[float, Interval(ge=-LONGEST_MS, le=LONGEST_MS)]
+PromptNumber = Annotated[int, Exact(), Interval(ge=0, le=MAX_NUMBER)]
+Milliseconds = Annotated[float, Exact(), Interval(ge=-LONGEST_MS, le=LONGEST_MS)]
 
 # Kinds of task entries: the task begins or ends; a stimulus or request comes, is shown, or is
 # over; the driver answers (`unrequested` answers had no stimulus).

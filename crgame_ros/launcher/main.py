@@ -29,6 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Imported first, so that help and errors work in an environment without packages.
         from crgame_ros.launcher.arguments import parse_arguments
         parse_arguments(['--help'])
+    from crgame_ros.launcher.interruption import print_now
     from crgame_ros.launcher.launch import launch
     from crgame_ros.ros.node_main import end_with_parent
     end_with_parent()
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return launch(arguments)
     except KeyboardInterrupt:
-        print(ENDED_EARLY, flush=True)
+        print_now(ENDED_EARLY)
         return 0
 
 

@@ -17,7 +17,7 @@ from crgame_ros.driver.source import (
 )
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.documents import GameDocument, parse_game_document
-from crgame_ros.game.seat_documents import parse_seats_document
+from crgame_ros.game.seat_documents import parse_seats
 from crgame_ros.registry import POLICY
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.device_delay import DeviceDelay
@@ -146,7 +146,7 @@ class DriverNode(PromptNode):
     def _on_seats(self, message: String) -> None:
         """Stop publishing while another driver has the seat."""
         try:
-            seat = parse_seats_document(message.data).get(self._vehicle_id)
+            seat = parse_seats(message.data)[0].get(self._vehicle_id)
             self._silent = seat is not None and seat['source'] != GAME
         except InputError as error:
             complain(self, 'seats', str(error))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A mark that bounds what reading a list or mapping costs, whoever has sent it."""
+"""Marks for types that pydantic reads: bounds of what reading costs, and exact types."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -31,3 +31,11 @@ class Bounded:
             return given
         return {'type': 'function-before', 'schema': schema,
                 'function': {'type': 'no-info', 'function': check}}
+
+
+class Exact:
+    """A mark for the type of a value that must have it: no text is a number, no flag either."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return the schema of the marked type, for pydantic."""
+        return handler(source) | {'strict': True}

@@ -7,6 +7,7 @@ import json
 from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
 from crgame_ros.errors import InputError
+from crgame_ros.schema.faults import first_fault
 
 if TYPE_CHECKING:  # It takes a tenth of a second to import, and many commands read no document.
     from pydantic import TypeAdapter
@@ -45,11 +46,9 @@ class DocumentReader(Generic[T]):
         try:
             return self._adapter.validate_python(json.loads(text))
         except ValidationError as error:
-            first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-            place = '.'.join(map(str, first['loc'])) or 'all of it'
-            said = 'has another form' if first['type'] == 'predicate_failed' \
-                else first['msg'].removeprefix('Value error, ')
-            raise InputError(f'is no {self._what} ({place}: {said})', self._topic,
+            fault = first_fault(error)
+            place = '.'.join(map(str, fault.place)) or 'all of it'
+            raise InputError(f'is no {self._what} ({place}: {fault.said})', self._topic,
                              self._remedy) from None
         except (ValueError, RecursionError) as error:
             raise InputError(f'is no {self._what} (no JSON)', self._topic,

@@ -6,6 +6,7 @@ import json
 from typing import Annotated, Any, Generic, TypeVar
 
 from crgame_ros.errors import InputError
+from crgame_ros.schema.faults import first_fault
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -46,8 +47,7 @@ class MessageReader(Generic[T]):
         """
         Read a message.
 
-        :raises InputError: if it is malformed, with the key. The sent value is not repeated: it
-            may be long, and others may read the log.
+        :raises InputError: if it is malformed, with the key.
         """
         try:
             # Unlike pydantic's own, this parser lets through half a surrogate pair.
@@ -59,12 +59,12 @@ class MessageReader(Generic[T]):
 
 
 def _refusal(error: ValidationError) -> InputError:
-    first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-    if first['type'].startswith('union_tag'):
+    fault = first_fault(error)
+    if fault.kind.startswith('union_tag'):
         return InputError('is unknown', 'type')
     # The first part is the message's type; a message without a type has no place.
-    place = [part for part in first['loc'][1:2] if isinstance(part, str)]
-    said = first['msg'].removeprefix('Input ').removeprefix('Value error, ')
+    place = [part for part in fault.place[1:2] if isinstance(part, str)]
+    said = fault.said.removeprefix('Input ')
     return InputError(said[:1].lower() + said[1:], place[0] if place else 'message')
 
 

@@ -9,7 +9,7 @@ from crgame_ros.cockpit.seat_table import KEEP_S, SeatTable
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import (
-    parse_seats_document,
+    parse_seats,
     SeatDemand,
     SeatOccupant,
     SeatPerson,
@@ -274,8 +274,9 @@ def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: s
 @pytest.mark.parametrize('text', [
     '', '[]', '7', '[' * 100_000, '{"hv0": 3}', '{"hv0": {"source": "game"}}',
     '{"hv0": {"source": 1, "driver": "idle"}}', '{"a b": {"source": "game", "driver": "idle"}}',
-    '{"hv0000": {"source": "game", "driver": "idle"}}'])
+    '{"hv0000": {"source": "game", "driver": "idle"}}',
+    '{"hv0": {"source": "game", "driver": "idle", "here": 1}}'])
 def test_seats_that_are_none_are_refused(text: str) -> None:
     """A bad name would become a topic, and a missing source an error during the drive."""
     with pytest.raises(InputError, match='/seats: is no list of seats'):
-        parse_seats_document(text)
+        parse_seats(text)

@@ -295,7 +295,10 @@ def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenar
     report = TaskReport('hv0', 'light', 4, 'answer', PageTimes(250.5, 30.0, 16.7, 0.0))
     assert parse_report(report_text(report)) == report
     content = json.loads(report_text(report))
-    for wrong in ({'seat': '../x'}, {'number': -1}, {'number': 1e9}, {'what': 'begin'},
+    for wrong in ({'seat': '../x'}, {'seat': 'hv\u0661'}, {'number': -1}, {'number': 1e9},
+                  {'number': True}, {'number': '4'},
+                  {'times': {**content['times'], 'response_ms': True}},
+                  {'what': 'begin'},
                   {'times': {**content['times'], 'response_ms': 1e12}},
                   {'times': {**content['times'], 'response_ms': 'x'}}, {'times': None}):
         with pytest.raises(InputError):

@@ -57,6 +57,11 @@ class Measure(NamedTuple):
     label: str
     definition: str
 
+    @property
+    def symbol(self) -> str:
+        """Return the unit as people write it."""
+        return self.unit.replace('^2', '²')
+
     def matters(self, value: float) -> bool:
         """Return whether a value is worth telling: longer times come from equal speeds."""
         return self.unit != 's' or value < LONGEST_S

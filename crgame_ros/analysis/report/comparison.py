@@ -104,7 +104,7 @@ def _latency(run: ReportRun) -> str:
 
 
 def _plots(runs: Sequence[ReportRun]) -> Iterator[Plot]:
-    units = {name: MEASURES[name].unit.replace('^2', '²') for name in PLOTTED}
+    units = {name: MEASURES[name].symbol for name in PLOTTED}
     yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
         :, i, StateColumn.SPEED], None)
     for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),

@@ -67,7 +67,7 @@ def _worst(run: ReportRun, vehicle: VehicleCriticality,
             continue
         word = f'<span title="{plain(measure.definition)}">{measure.label}</span>'
         yield (word, marked(number(worst.value), limits.exceeded(name, worst.value)),
-               measure.unit.replace('^2', '²'), named(run, worst.other),
+               measure.symbol, named(run, worst.other),
                moment(run, worst.time_s))
 
 
@@ -99,7 +99,7 @@ def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:
         values = run.course[:, place]
         if not np.isfinite(values).any():
             continue
-        unit = MEASURES[name].unit.replace('^2', '²')
+        unit = MEASURES[name].symbol
         yield Plot(name.replace('_', '-'), MEASURES[name].label, unit, tuple(
             PlotLine(item.id, run.times_s, values[i], run.colours[item.id], dash_of(item.role))
             for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),

@@ -5,10 +5,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import (
-    Criticality,
-    MEASURES,
-)
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.pictures.critical_moments import (
     critical_moments,
     Moment,
@@ -40,8 +37,7 @@ def story_moments(record: RunRecord, criticality: Criticality,
     found = list(critical_moments(record, criticality,
                                   [Touch.from_entry(item) for item in contacts]))
     found += [Moment(worst.time_s, f'{MEASURES[name].label} of {vehicle.vehicle_id} to '
-                     f'{worst.other} is {worst.value:.2f} '
-                     + MEASURES[name].unit.replace('^2', '²'),
+                     f'{worst.other} is {worst.value:.2f} {MEASURES[name].symbol}',
                      (vehicle.vehicle_id, worst.other))
               for vehicle in criticality.report() for name, worst in vehicle.worst.items()
               if name != TWICE and MEASURES[name].matters(worst.value)]

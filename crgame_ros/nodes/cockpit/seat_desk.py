@@ -23,12 +23,7 @@ from crgame_ros.cockpit.seat_orders import SeatOrders
 from crgame_ros.cockpit.seat_table import SeatTable
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.seat_documents import (
-    parse_seats_document,
-    parse_tenants,
-    SeatDemand,
-    SeatPerson,
-)
+from crgame_ros.game.seat_documents import parse_seats, SeatDemand, SeatPerson
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints
@@ -145,7 +140,7 @@ class SeatDesk:
 
         :raises InputError: if it does not follow the contract.
         """
-        seats, tenants = parse_seats_document(text), parse_tenants(text)
+        seats, tenants = parse_seats(text)
         self._awaited.answered(seats, tenants)
         self.table.update(seats, self._awaited, tenants)
         # Made before the first claim, because discovery of a new publisher takes a while.

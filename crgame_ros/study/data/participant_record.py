@@ -189,7 +189,7 @@ class ParticipantRecord:
         told = entry.get('attempt')
         before = [each for each in self.attempts if each.item == item and
                   each.started_at <= entry['at']]
-        return told if isinstance(told, int) else before[-1].attempt if before else 1
+        return told if told is not None else before[-1].attempt if before else 1
 
     def _attempts(self) -> Iterator[TrialAttempt]:
         openly: TrialAttempt | None = None
@@ -238,10 +238,9 @@ def read_participant(study: StudyFile, folder: Path) -> ParticipantRecord | None
     begun = next((entry for entry in entries if entry['entry'] == SessionEvent.BEGUN), None)
     if begun is None:
         return None
-    place = begun.get('place')
-    items = session_of(study, place) if isinstance(place, int) and place >= 0 else ()
-    if [item.id for item in items] != begun.get('items'):
+    items = session_of(study, begun['place'])
+    if [item.id for item in items] != begun['items']:
         raise InputError('began with another plan than that of the study file', str(folder),
                          'put back the study file that the sessions were run with')
-    return ParticipantRecord(str(begun.get('participant') or folder.name), int(place or 0), folder,
-                             study, {item.id: item for item in items}, entries)
+    return ParticipantRecord(begun['participant'] or folder.name, begun['place'], folder, study,
+                             {item.id: item for item in items}, entries)

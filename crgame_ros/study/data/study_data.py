@@ -132,7 +132,7 @@ def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[di
     for answered in record.answered:
         scale = asked.find(answered.item)
         times = _times(record, answered)
-        after_s = answered.told.get('after_s')
+        after_s = answered.told.get('after_s') or {}
         for question, answer in answered.answers.items():
             value = plain_answer(answer)
             yield {'participant': record.id, 'item': answered.item.id,
@@ -141,7 +141,7 @@ def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[di
                    'question': question,
                    'number' if isinstance(value, int | float) else 'text': value,
                    'answered': utc(answered.at), 'answered_s': answered.at, **times,
-                   'after_s': after_s.get(question) if isinstance(after_s, dict) else None}
+                   'after_s': after_s.get(question)}
 
 
 def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, Any]:
