@@ -45,10 +45,10 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import TrafficLights
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.fleet.adoption import Adopted
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.spawning import CAR
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world_view import WorldView
 import matplotlib as mpl
 from matplotlib import pyplot as plt
 import numpy as np

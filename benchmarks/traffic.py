@@ -44,9 +44,9 @@ from crgame_ros.game.objects import ObjectDescription, Role  # noqa: E402, I100
 from crgame_ros.game.traffic_spec import TrafficSpec  # noqa: E402
 from crgame_ros.geometry.shape import Shape  # noqa: E402
 from crgame_ros.roads.network import RoadNetwork  # noqa: E402
-from crgame_ros.traffic.adoption import Adopted  # noqa: E402
+from crgame_ros.traffic.fleet.adoption import Adopted  # noqa: E402
+from crgame_ros.traffic.fleet.world_view import WorldView  # noqa: E402
 from crgame_ros.traffic.traffic import Traffic  # noqa: E402
-from crgame_ros.traffic.world_view import WorldView  # noqa: E402
 from scenario_traffic import BLOCK, LANE_WIDTH, loaded, motorway, town  # noqa: E402
 from traffic_others import timed  # noqa: E402
 

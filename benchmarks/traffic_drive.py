@@ -13,9 +13,9 @@ from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.simulation.traffic_setup import adopted_columns, MOTION_RATE
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.fleet.adoption import Adopted
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world_view import WorldView
 from judge.history import FloatArray, History
 import numpy as np
 

@@ -29,7 +29,9 @@ AT_THE_TOP = {'cli', 'doctor', 'new_command', 'page_libraries_command', 'replay_
 FOLDERS = (
     LOWEST, 'schema', 'geometry', 'vehicle', 'game', 'roads', 'scenario', 'waypoints',
     'occupancy', 'scripted', 'messages', 'driver', 'timing', 'drivability', 'control',
-    'planner', 'perception', 'policy', 'traffic', 'simulation', 'recording',
+    'planner', 'perception', 'policy', 'traffic/compiling', 'traffic/lanes', 'traffic/fleet',
+    'traffic/motion', 'traffic/following', 'traffic/crossing', 'traffic/changing', 'traffic',
+    'simulation', 'recording',
     'analysis/criticality', 'analysis/behaviour', 'analysis/scores', 'analysis/tables',
     'analysis/pictures', 'analysis/report', 'analysis', 'evaluation/results',
     'evaluation/summary', 'evaluation', 'study', 'study/data', 'cockpit', 'cockpit/runs',

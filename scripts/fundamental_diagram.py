@@ -10,9 +10,9 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.spawning import Adopted
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 from numpy.typing import NDArray
 from scenario_traffic import loaded, rings

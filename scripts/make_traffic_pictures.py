@@ -9,8 +9,8 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.paths import scenarios_directory, share_directory
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world_view import WorldView
 from fundamental_diagram import equilibrium_density, Flow, measure
 import matplotlib
 from matplotlib.axes import Axes

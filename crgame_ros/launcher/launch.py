@@ -36,7 +36,7 @@ from crgame_ros.ros.run_profile import (
     write_run_profile,
 )
 from crgame_ros.ros.shared_memory import remove_stale
-from crgame_ros.traffic.kernel_cache import compile_now, compiling_when_idle
+from crgame_ros.traffic.compiling.kernel_cache import compile_now, compiling_when_idle
 
 # Time for a node to end in good order, even on a busy machine [s].
 GRACE_S = 10.0

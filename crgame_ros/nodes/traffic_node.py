@@ -24,10 +24,10 @@ from crgame_ros.scenario.obstacles import ScenarioObstacles
 from crgame_ros.simulation.traffic_setup import make_traffic
 from crgame_ros.simulation.world import TrafficOrders
 from crgame_ros.simulation.world_reader import WorldReader
-from crgame_ros.traffic.kernel_cache import compile_now
+from crgame_ros.traffic.compiling.kernel_cache import compile_now
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.traffic import Traffic
 from crgame_ros.traffic.warm_up import drive_everything
-from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 from rclpy.node import Node
 

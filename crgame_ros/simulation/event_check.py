@@ -106,7 +106,7 @@ def check_changes(game: Game, where: str, agents: Sequence[str]) -> None:
             raise InputError(f'there is no agent "{event.action.agent}"', place,
                              f'{_listed(agents)}; use {ALL_AGENTS} for all of them')
         # This imports numba, which only runs with agents should wait for.
-        from crgame_ros.traffic.car_following import CAR_FOLLOWING
+        from crgame_ros.traffic.following.car_following import CAR_FOLLOWING
         CAR_FOLLOWING.create(game.traffic.model, {**game.traffic.options, **event.action.options},
                              place)
 

@@ -18,8 +18,8 @@ from crgame_ros.simulation.world_reader import joints_of, WorldReader
 from crgame_ros.vehicle.state import VehicleState
 
 if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
+    from crgame_ros.traffic.fleet.world_view import WorldView
     from crgame_ros.traffic.traffic import Traffic
-    from crgame_ros.traffic.world_view import WorldView
 
 # Agents move at this rate, independent of the simulation's rate [Hz] (FS III).
 MOTION_RATE = 100.0
@@ -49,7 +49,7 @@ def adopted_columns(spec: TrafficSpec | None, obstacles: ScenarioObstacles, netw
     """
     if spec is None or spec.recorded != 'reactive':
         return ()
-    from crgame_ros.traffic.adoption import adoptable
+    from crgame_ros.traffic.fleet.adoption import adoptable
     parts = Counter(map(whole_id, obstacles.ids))
     return tuple(column for column, item in enumerate(obstacles.descriptions)
                  if item.id not in kept and parts[whole_id(item.id)] == 1
@@ -69,8 +69,8 @@ def make_traffic(spec: TrafficSpec, loaded: LoadedScenario, network: RoadNetwork
     :param world: everything but agents at the first tick.
     :param seed: of the game; the traffic's own seed takes precedence.
     """
-    from crgame_ros.traffic.adoption import Adopted
-    from crgame_ros.traffic.kernel_cache import compile_now
+    from crgame_ros.traffic.compiling.kernel_cache import compile_now
+    from crgame_ros.traffic.fleet.adoption import Adopted
     from crgame_ros.traffic.traffic import Traffic
     compile_now()
     tracks = [Adopted(obstacles.descriptions[column], obstacles.first_step(column),

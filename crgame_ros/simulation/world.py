@@ -23,8 +23,8 @@ from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
 if TYPE_CHECKING:  # Both import numba: only runs with agents should wait for that.
+    from crgame_ros.traffic.fleet.world_view import WorldView
     from crgame_ros.traffic.traffic import Traffic
-    from crgame_ros.traffic.world_view import WorldView
 
 
 class TrafficOrders:

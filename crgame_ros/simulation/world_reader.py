@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from crgame_ros.traffic.world_view import WorldView
+    from crgame_ros.traffic.fleet.world_view import WorldView
 
 FloatArray = NDArray[np.float64]
 Joints = Sequence[Sequence[float]] | FloatArray
@@ -68,7 +68,7 @@ class WorldReader:
         :param objects: all objects.
         """
         # This imports numba, which only runs with agents should wait for.
-        from crgame_ros.traffic.world_view import WorldView
+        from crgame_ros.traffic.fleet.world_view import WorldView
         poses, rates = driven_centers(positions, velocities, self._ahead)
         return WorldView(k, np.concatenate((poses, objects.poses[self._columns])),
                          np.concatenate((rates, objects.velocities[self._columns])),

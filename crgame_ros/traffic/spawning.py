@@ -8,20 +8,20 @@ import math
 from crgame_ros.game.object_spec import MOVER_TYPES
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.traffic.adoption import Adopted, fits
-from crgame_ros.traffic.agents import Agents, NONE
-from crgame_ros.traffic.conflicts import Conflicts, NARROW
-from crgame_ros.traffic.drivers import DesiredSpeeds
-from crgame_ros.traffic.encounters import is_in_the_way
-from crgame_ros.traffic.junctions import hold_before
-from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_graph import FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import ahead, corridors, nearest, own_ways
-from crgame_ros.traffic.longitudinal import COASTING, Longitudinal
-from crgame_ros.traffic.placement import Bodies, place
-from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.stop_lines import StopLines
-from crgame_ros.traffic.world_view import with_agents
+from crgame_ros.traffic.crossing.junctions import hold_before
+from crgame_ros.traffic.crossing.stop_lines import StopLines
+from crgame_ros.traffic.fleet.adoption import Adopted, fits
+from crgame_ros.traffic.fleet.agents import Agents, NONE
+from crgame_ros.traffic.fleet.routes import Routes
+from crgame_ros.traffic.fleet.world_view import with_agents
+from crgame_ros.traffic.following.drivers import DesiredSpeeds
+from crgame_ros.traffic.following.encounters import is_in_the_way
+from crgame_ros.traffic.following.leaders import ahead, corridors, nearest, own_ways
+from crgame_ros.traffic.following.longitudinal import COASTING, Longitudinal
+from crgame_ros.traffic.lanes.conflicts import Conflicts, NARROW
+from crgame_ros.traffic.lanes.lane_cells import LaneCells
+from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.lanes.placement import Bodies, place
 import numpy as np
 
 # Gap between agents at the start: a distance [m], and a time at their speeds [s].

@@ -10,21 +10,31 @@ from crgame_ros.game.events import ALL_AGENTS, TrafficChange
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.agents import Agents, centers_of, FREE, NONE
-from crgame_ros.traffic.changing import LaneChanges
-from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.courtesy import fading, note_leaders
-from crgame_ros.traffic.crossings import AT_LINE, Crossings
-from crgame_ros.traffic.crosswalks import Crosswalks
-from crgame_ros.traffic.drivers import DesiredSpeeds, Drivers
-from crgame_ros.traffic.encounters import brush
-from crgame_ros.traffic.exit_room import queues
-from crgame_ros.traffic.junctions import arrivals, passages
-from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_change_intents import Situations
-from crgame_ros.traffic.lane_graph import driving_side, FloatArray, IntArray, LaneGraph
-from crgame_ros.traffic.leaders import (
+from crgame_ros.traffic.changing.changing import LaneChanges
+from crgame_ros.traffic.changing.courtesy import fading, note_leaders
+from crgame_ros.traffic.changing.lane_change_intents import Situations
+from crgame_ros.traffic.crossing.crossings import AT_LINE, Crossings
+from crgame_ros.traffic.crossing.crosswalks import Crosswalks
+from crgame_ros.traffic.crossing.exit_room import queues
+from crgame_ros.traffic.crossing.junctions import arrivals, passages
+from crgame_ros.traffic.crossing.meetings import CrossingRules, Situation
+from crgame_ros.traffic.crossing.stop_lines import StopLines
+from crgame_ros.traffic.crossing.waiting import (
+    break_circles,
+    hopeless,
+    INSISTS,
+    LAST_RESORT,
+    note_standing,
+    TURNS_OFF,
+    WAITS,
+)
+from crgame_ros.traffic.fleet.adoption import Adopted
+from crgame_ros.traffic.fleet.agents import Agents, centers_of, FREE, NONE
+from crgame_ros.traffic.fleet.routes import leaving, Routes
+from crgame_ros.traffic.fleet.world_view import Others, standing_entries, with_agents, WorldView
+from crgame_ros.traffic.following.drivers import DesiredSpeeds, Drivers
+from crgame_ros.traffic.following.encounters import brush
+from crgame_ros.traffic.following.leaders import (
     ahead,
     Corridors,
     corridors,
@@ -37,27 +47,17 @@ from crgame_ros.traffic.leaders import (
     Ways,
     ways,
 )
-from crgame_ros.traffic.longitudinal import before_lines, halt, Longitudinal, smooth
-from crgame_ros.traffic.meetings import CrossingRules, Situation
-from crgame_ros.traffic.motion import Motion
-from crgame_ros.traffic.movements import Movements
-from crgame_ros.traffic.placement import Bodies, Entries, place
-from crgame_ros.traffic.routes import leaving, Routes
+from crgame_ros.traffic.following.longitudinal import before_lines, halt, Longitudinal, smooth
+from crgame_ros.traffic.following.swept_paths import SweptPaths
+from crgame_ros.traffic.following.tight_lanes import find_tight_lanes
+from crgame_ros.traffic.lanes.conflicts import Conflicts
+from crgame_ros.traffic.lanes.lane_cells import LaneCells
+from crgame_ros.traffic.lanes.lane_graph import driving_side, FloatArray, IntArray, LaneGraph
+from crgame_ros.traffic.lanes.movements import Movements
+from crgame_ros.traffic.lanes.placement import Bodies, Entries, place
+from crgame_ros.traffic.motion.motion import Motion
+from crgame_ros.traffic.motion.swerving import Swerving
 from crgame_ros.traffic.spawning import is_long, slot_descriptions, Spawner, trial_shapes
-from crgame_ros.traffic.stop_lines import StopLines
-from crgame_ros.traffic.swept_paths import SweptPaths
-from crgame_ros.traffic.swerving import Swerving
-from crgame_ros.traffic.tight_lanes import find_tight_lanes
-from crgame_ros.traffic.waiting import (
-    break_circles,
-    hopeless,
-    INSISTS,
-    LAST_RESORT,
-    note_standing,
-    TURNS_OFF,
-    WAITS,
-)
-from crgame_ros.traffic.world_view import Others, standing_entries, with_agents, WorldView
 import numpy as np
 from numpy.typing import NDArray
 

@@ -14,7 +14,7 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.schema.reading import read
 from crgame_ros.scripted.objects import follow, ScriptedObjects
-from crgame_ros.traffic.car_following import IntelligentDriver
+from crgame_ros.traffic.following.car_following import IntelligentDriver
 from crgame_ros.vehicle.idm_model import IdmParameters
 import numpy as np
 from numpy.typing import NDArray

@@ -12,9 +12,9 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.fleet.adoption import Adopted
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -27,7 +27,7 @@ CAR = Shape.rectangle(4.5, 1.8)
 STEP_S = 0.1
 MODEL_WITHOUT_LEADERS = '''
 import numpy as np
-from crgame_ros.traffic.car_following import AdaptiveCruise
+from crgame_ros.traffic.following.car_following import AdaptiveCruise
 
 
 class Free(AdaptiveCruise):

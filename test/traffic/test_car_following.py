@@ -3,7 +3,7 @@
 """Car following (FS 3 and Treiber 2000) against the equations, and in motion."""
 
 from crgame_ros.errors import InputError
-from crgame_ros.traffic.car_following import (
+from crgame_ros.traffic.following.car_following import (
     AdaptiveCruise,
     CAR_FOLLOWING,
     CarFollowing,

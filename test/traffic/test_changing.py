@@ -8,7 +8,7 @@ from pathlib import Path
 from commonroad.scenario.scenario import Scenario
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.fleet.adoption import Adopted
 import numpy as np
 import pytest
 import traffic_support as support

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.conflicts import Conflicts, roundabouts
-from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.lanes.conflicts import Conflicts, roundabouts
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
 import numpy as np
 import pytest
 import shapely

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cooperative lane changes: the gap that courtesy opens, and the shock wave that it spares."""
 
-from crgame_ros.traffic import courtesy
-from crgame_ros.traffic.car_following import AdaptiveCruise
-from crgame_ros.traffic.courtesy import CourtesyRules, fading
-from crgame_ros.traffic.lane_change import GapAcceptance
+from crgame_ros.traffic.changing import courtesy
+from crgame_ros.traffic.changing.courtesy import CourtesyRules, fading
+from crgame_ros.traffic.following.car_following import AdaptiveCruise
+from crgame_ros.traffic.motion.lane_change import GapAcceptance
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -16,7 +16,7 @@ from commonroad.scenario.traffic_sign import TrafficSign, TrafficSignElement, Tr
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.fleet.adoption import Adopted
 import numpy as np
 import pytest
 import traffic_support as support

@@ -9,8 +9,8 @@ from crgame_ros.game.events import TrafficChange
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.warm_up import crossroads, LIGHT
-from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 import pytest
 import traffic_support as support

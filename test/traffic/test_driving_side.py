@@ -11,8 +11,13 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.lane_graph import driving_side, LaneGraph, LEFT_HAND, PRIORITY_TO_THE_RIGHT
+from crgame_ros.traffic.lanes.conflicts import Conflicts
+from crgame_ros.traffic.lanes.lane_graph import (
+    driving_side,
+    LaneGraph,
+    LEFT_HAND,
+    PRIORITY_TO_THE_RIGHT,
+)
 import numpy as np
 import pytest
 import traffic_support as support

@@ -5,8 +5,8 @@
 import math
 
 from crgame_ros.errors import InputError
-from crgame_ros.traffic.elastic_band import _band, Bands, ElasticBand
-from crgame_ros.traffic.passage import Obstacles
+from crgame_ros.traffic.motion.elastic_band import _band, Bands, ElasticBand
+from crgame_ros.traffic.motion.passage import Obstacles
 import numpy as np
 from numpy.typing import NDArray
 import pytest

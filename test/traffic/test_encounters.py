@@ -5,9 +5,9 @@
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.traffic.agents import Agents
-from crgame_ros.traffic.encounters import BEFORE, BESIDE, FIRMEST, needed_braking
-from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.fleet.agents import Agents
+from crgame_ros.traffic.following.encounters import BEFORE, BESIDE, FIRMEST, needed_braking
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
 import numpy as np
 import pytest
 import traffic_support as support

@@ -4,9 +4,9 @@
 
 import math
 
-from crgame_ros.traffic import lane_change
-from crgame_ros.traffic.car_following import AdaptiveCruise
-from crgame_ros.traffic.lane_change import (
+from crgame_ros.traffic.following.car_following import AdaptiveCruise
+from crgame_ros.traffic.motion import lane_change
+from crgame_ros.traffic.motion.lane_change import (
     CHANGE_THRESHOLD,
     GapAcceptance,
     incentive,

@@ -7,8 +7,8 @@ from pathlib import Path
 from crgame_ros.errors import InputError
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.lane_cells import cell_of, LaneCells
-from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.lanes.lane_cells import cell_of, LaneCells
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
 import numpy as np
 import pytest
 import traffic_support as support

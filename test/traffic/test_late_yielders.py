@@ -11,7 +11,7 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
-from crgame_ros.traffic.meetings import CrossingRules
+from crgame_ros.traffic.crossing.meetings import CrossingRules
 import numpy as np
 from numpy.typing import NDArray
 import pytest

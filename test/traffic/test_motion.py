@@ -8,9 +8,9 @@ from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.traffic.agents import Agents
-from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.motion import move
+from crgame_ros.traffic.fleet.agents import Agents
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
+from crgame_ros.traffic.motion.motion import move
 import numpy as np
 import pytest
 from traffic_drive import drive

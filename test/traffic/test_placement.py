@@ -6,9 +6,9 @@ from pathlib import Path
 
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.lane_cells import LaneCells
-from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.placement import Bodies, place
+from crgame_ros.traffic.lanes.lane_cells import LaneCells
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
+from crgame_ros.traffic.lanes.placement import Bodies, place
 import numpy as np
 import pytest
 

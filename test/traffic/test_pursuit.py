@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fleet of kinematic bicycles against the scalar model, circles and a swerve."""
 
-from crgame_ros.traffic import pursuit
-from crgame_ros.traffic.elastic_band import ElasticBand
-from crgame_ros.traffic.passage import Obstacles
+from crgame_ros.traffic.lanes import pursuit
+from crgame_ros.traffic.motion.elastic_band import ElasticBand
+from crgame_ros.traffic.motion.passage import Obstacles
 from crgame_ros.vehicle.kinematic_single_track import integrate
 import numpy as np
 from numpy.typing import NDArray

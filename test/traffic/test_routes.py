@@ -7,9 +7,9 @@ from pathlib import Path
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import find_route
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.conflicts import Conflicts
-from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.routes import Routes
+from crgame_ros.traffic.fleet.routes import Routes
+from crgame_ros.traffic.lanes.conflicts import Conflicts
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
 import numpy as np
 import traffic_support as support
 

@@ -10,7 +10,7 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
 from crgame_ros.scenario.obstacles import ScenarioObstacles
-from crgame_ros.traffic.adoption import adoptable, Adopted
+from crgame_ros.traffic.fleet.adoption import adoptable, Adopted
 import numpy as np
 import pytest
 import traffic_support as support

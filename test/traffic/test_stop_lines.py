@@ -18,10 +18,10 @@ from commonroad.scenario.traffic_light import (
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.leaders import Ways
-from crgame_ros.traffic.movements import Movements
-from crgame_ros.traffic.stop_lines import StopLines
+from crgame_ros.traffic.crossing.stop_lines import StopLines
+from crgame_ros.traffic.following.leaders import Ways
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
+from crgame_ros.traffic.lanes.movements import Movements
 import numpy as np
 import pytest
 import shapely

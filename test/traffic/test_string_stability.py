@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A platoon behind a braking leader: disturbances fade with h = T, and grow with a great h."""
 
-from crgame_ros.traffic.car_following import AdaptiveCruise
+from crgame_ros.traffic.following.car_following import AdaptiveCruise
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -3,12 +3,12 @@
 """How fast a swerve may be driven: the tables of `Swerving` against bicycles that drive it."""
 
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.traffic.lane_graph import LaneGraph
-from crgame_ros.traffic.passage import Obstacles
-from crgame_ros.traffic.placement import Entries
-from crgame_ros.traffic.pursuit import pursuit_distance
-from crgame_ros.traffic.routes import Routes
-from crgame_ros.traffic.swerving import CUT, cutting_speed, pursued, Swerving
+from crgame_ros.traffic.fleet.routes import Routes
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
+from crgame_ros.traffic.lanes.placement import Entries
+from crgame_ros.traffic.lanes.pursuit import pursuit_distance
+from crgame_ros.traffic.motion.passage import Obstacles
+from crgame_ros.traffic.motion.swerving import CUT, cutting_speed, pursued, Swerving
 import numpy as np
 import pytest
 from test_pursuit import move, steer

@@ -7,9 +7,9 @@ from pathlib import Path
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
-from crgame_ros.traffic.lane_graph import LaneGraph
+from crgame_ros.traffic.following.tight_lanes import find_tight_lanes
+from crgame_ros.traffic.lanes.lane_graph import LaneGraph
 from crgame_ros.traffic.spawning import CAR, LARGE_CAR, trial_shapes, TRUCK
-from crgame_ros.traffic.tight_lanes import find_tight_lanes
 from judge.motion import off_road
 from judge.roads import JudgedRoads
 from judge.verdict import judge

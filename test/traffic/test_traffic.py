@@ -9,8 +9,8 @@ from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.speed_limits import set_speed_limit
-from crgame_ros.traffic.adoption import Adopted
-from crgame_ros.traffic.car_following import CarFollowing
+from crgame_ros.traffic.fleet.adoption import Adopted
+from crgame_ros.traffic.following.car_following import CarFollowing
 import numpy as np
 import pytest
 import traffic_support as support

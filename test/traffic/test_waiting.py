@@ -16,9 +16,9 @@ from commonroad.scenario.state import InitialState, KSState
 from commonroad.scenario.trajectory import Trajectory
 from crgame_ros.cli import main
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.crossing.waiting import LAST_RESORT
+from crgame_ros.traffic.fleet.adoption import Adopted
 from crgame_ros.traffic.traffic import SIGHT
-from crgame_ros.traffic.waiting import LAST_RESORT
 import numpy as np
 import pytest
 from traffic_support import CAR, driving, human, lane_strip, roads, Run

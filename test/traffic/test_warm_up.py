@@ -10,9 +10,11 @@ import shutil
 import subprocess
 import sys
 
-from crgame_ros.traffic import kernel_cache
+from crgame_ros.traffic.compiling import kernel_cache
 import pytest
 
+WAITING = 'crgame_ros.traffic.crossing.waiting'
+LANE_TABLE = 'crgame_ros.traffic.lanes.lane_table'
 # Counts what each compiled function has been compiled or loaded for, before and after drives.
 SCRIPT = """
 import importlib, json, pkgutil, sys
@@ -20,8 +22,8 @@ from pathlib import Path
 sys.path[:0] = sys.argv[1:2]
 import crgame_ros.traffic
 from crgame_ros.traffic.warm_up import drive_everything
-modules = [importlib.import_module(f'crgame_ros.traffic.{x.name}')
-           for x in pkgutil.iter_modules(crgame_ros.traffic.__path__)]
+modules = [importlib.import_module(x.name) for x in pkgutil.walk_packages(
+    crgame_ros.traffic.__path__, 'crgame_ros.traffic.')]
 def count():
     return {f'{x.__module__}.{x.__name__}': len(x.overloads)
             for module in modules for x in vars(module).values() if hasattr(x, 'overloads')}
@@ -50,21 +52,21 @@ def test_a_run_compiles_and_loads_nothing_more(maps: Path,
     assert functions > 40 and more == {}
 
 
-@pytest.mark.parametrize('file', ['traffic/agents.py', 'vehicle/state.py'])
+@pytest.mark.parametrize('file', ['traffic/fleet/agents.py', 'vehicle/state.py'])
 def test_what_is_compiled_in_names_the_cache(file: str, tmp_path: Path,
                                              monkeypatch: pytest.MonkeyPatch) -> None:
     """`waiting` uses agents and a threshold: code compiled with others is not loaded again."""
-    package = Path(kernel_cache.__file__).parents[1]
+    package = Path(kernel_cache.__file__).parents[2]
     for folder in ('traffic', 'vehicle'):
         shutil.copytree(package / folder, tmp_path / folder,
                         ignore=shutil.ignore_patterns('__pycache__'))
-    monkeypatch.setattr(kernel_cache, '_HERE', tmp_path / 'traffic')
-    before = kernel_cache.digest.__wrapped__('waiting')
-    assert before == kernel_cache.digest('waiting')
+    monkeypatch.setattr(kernel_cache, '_PACKAGE', tmp_path)
+    before = kernel_cache.digest.__wrapped__(WAITING)
+    assert before == kernel_cache.digest(WAITING)
     with (tmp_path / file).open('a') as changed:
         changed.write('# Changed.\n')
-    assert kernel_cache.digest.__wrapped__('waiting') != before
-    assert kernel_cache.digest.__wrapped__('lane_table') == kernel_cache.digest('lane_table')
+    assert kernel_cache.digest.__wrapped__(WAITING) != before
+    assert kernel_cache.digest.__wrapped__(LANE_TABLE) == kernel_cache.digest(LANE_TABLE)
 
 
 @pytest.mark.exhaustive

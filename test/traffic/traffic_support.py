@@ -15,9 +15,9 @@ from crgame_ros.geometry.shape import Shape
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.traffic.adoption import Adopted
+from crgame_ros.traffic.fleet.adoption import Adopted
+from crgame_ros.traffic.fleet.world_view import WorldView
 from crgame_ros.traffic.traffic import Traffic
-from crgame_ros.traffic.world_view import WorldView
 import numpy as np
 import shapely
 from shapely import affinity

@@ -13,7 +13,7 @@ from crgame_ros.simulation.traffic_setup import TrafficSetup
 import numpy as np
 
 if TYPE_CHECKING:
-    from crgame_ros.traffic.world_view import WorldView
+    from crgame_ros.traffic.fleet.world_view import WorldView
 
 # Agents with late states go on for this long [s], then brake to a stop [m/s^2].
 ROLLS_ON_S = 0.5

@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compilation of the loops over agents with numba and a cache on disk."""
+
+from collections.abc import Callable
+from typing import Any, cast, TypeVar
+
+from crgame_ros.traffic.compiling.kernel_cache import cache_root, digest
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+
+def vectorized(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
+    """Compile a function of numbers [float64] into one of arrays that broadcast."""
+    _choose_cache(function)
+    count = function.__code__.co_argcount
+    result: Callable[..., NDArray[np.float64]] = numba.vectorize(
+        [numba.float64(*[numba.float64] * count)], cache=True)(function)
+    return result
+
+
+def _choose_cache(function: Callable[..., Any]) -> None:
+    folder = cache_root() / f'compiled-{digest(function.__module__)}'
+    vars(numba.config)['CACHE_DIR'] = str(folder)
+
+
+def inlined(function: Function) -> Function:
+    """
+    Compile a function inline into its callers.
+
+    It is meant for small functions in inner loops: a call passes tables by value, which are some
+    hundred words.
+    """
+    _choose_cache(function)
+    return cast(Function, numba.njit(error_model='numpy', inline='always')(function))
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function of numbers and arrays; divisions by zero give inf and NaN, as numpy's."""
+    _choose_cache(function)
+    return cast(Function, numba.njit(cache=True, error_model='numpy')(function))
+
+
+def bare(function: Function) -> Function:
+    """
+    Compile a function that makes no arrays, without counting references to its arguments.
+
+    numba counts references to each array of a table wherever the table is used. That takes more
+    time than the rest of a short loop.
+    """
+    _choose_cache(function)
+    # numba does not document `_nrt`.
+    options: dict[str, Any] = {'cache': True, 'error_model': 'numpy', '_nrt': False}
+    return cast(Function, numba.njit(**options)(function))

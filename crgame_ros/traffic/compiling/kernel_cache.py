@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The cache of compiled loops over agents; this module loads no compiler."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+import hashlib
+from importlib.metadata import version
+import os
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+_PACKAGE = Path(__file__).resolve().parents[2]
+_HERE = _PACKAGE / 'traffic'
+_IMPORT = re.compile(r'^from (crgame_ros\.(?:traffic|vehicle)(?:\.\w+)+) import', re.MULTILINE)
+
+
+@cache
+def cache_root() -> Path:
+    """Return the folder of all compiled code: beside the sources, or else the user's cache."""
+    chosen = os.environ.get('NUMBA_CACHE_DIR')
+    if chosen:
+        return Path(chosen)
+    beside = _HERE / '__pycache__'
+    if os.access(beside if beside.exists() else _HERE, os.W_OK):
+        return beside
+    return Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'crgame_ros'
+
+
+@cache
+def digest(module: str) -> str:
+    """Return a short digest of a module and of all modules of agents that it builds upon."""
+    pending, seen = [module], dict[str, bytes]()
+    while pending:
+        name = pending.pop()
+        if name not in seen:
+            path = _PACKAGE.joinpath(*name.split('.')[1:])
+            seen[name] = path.with_suffix('.py').read_bytes()
+            pending += _IMPORT.findall(seen[name].decode('utf-8'))
+    result = hashlib.sha256(version('numba').encode())
+    for name in sorted(seen):
+        result.update(seen[name])
+    return result.hexdigest()[:12]
+
+
+def marker() -> Path:
+    """Return the file that marks that everything is compiled."""
+    return cache_root() / f'compiled-{digest("crgame_ros.traffic.warm_up")}.done'
+
+
+_COMPILE = (sys.executable, '-m', 'crgame_ros.traffic.warm_up')
+
+
+def compile_now() -> None:
+    """Compile what is not compiled yet, in a process of its own, which prints messages."""
+    if not marker().exists():
+        # A session of its own: Ctrl-C ends it through this process, without a traceback.
+        subprocess.run(_COMPILE, check=False, start_new_session=True)
+
+
+@contextmanager
+def compiling_when_idle() -> Iterator[None]:
+    """Compile what is not compiled yet, in idle processor time and without output."""
+    if marker().exists():
+        yield
+        return
+    process = subprocess.Popen(
+        [*_COMPILE, '--idle'], start_new_session=True, stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.wait()

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Room behind junctions: the queues there, and the room promised to agents let in."""
+
+import math
+from typing import NamedTuple
+
+from crgame_ros.traffic.compiling.compiled import compiled
+from crgame_ros.traffic.crossing.junctions import Passages
+from crgame_ros.traffic.crossing.meetings import CrossingRules, Situation
+from crgame_ros.traffic.fleet.agents import AgentTable
+from crgame_ros.traffic.following.leaders import Pairs, Ways
+from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray
+from crgame_ros.traffic.lanes.placement import Entries
+import numpy as np
+
+# A leader that is faster is not expected to stop [m/s].
+DRIVES_ON = 3.0
+# Gap between vehicles in a queue [m].
+QUEUE_GAP = 2.0
+
+
+@compiled
+def queues(agents: AgentTable, slots: IntArray, pairs: Pairs, entries: Entries,
+           passage: Passages) -> tuple[FloatArray, FloatArray]:
+    """
+    Find the queues ahead of agents (A), before a junction or behind it.
+
+    A leader that drives on makes room, but no farther than to its own waiting place before its
+    next junction. The vehicles in between queue behind it.
+
+    :return: `Situation.rear_stop` and `Situation.queued`
+    """
+    rear_stop, queued = np.full(len(slots), math.inf), np.full(len(slots), math.inf)
+    between = np.zeros(len(slots))
+    row = np.full(len(agents.x), -1, np.int64)
+    for i, slot in enumerate(slots):
+        row[slot] = i
+    for p in range(len(pairs.agent)):
+        i, n = pairs.agent[p], pairs.entry[p]
+        speed, owner = max(entries.speed[n], 0.0), entries.owner[n]
+        stops = pairs.distance[p] + speed**2 / 6.0 if speed <= DRIVES_ON else math.inf
+        if owner >= 0 and not entries.crosses[n]:
+            stops = min(stops, pairs.distance[p] + max(passage.hold[row[owner]], 0.0))
+        rear_stop[i] = min(rear_stop[i], stops - between[i])
+        if not entries.crosses[n]:
+            between[i] += entries.front[n] - entries.rear[n] + QUEUE_GAP
+            if agents.grant[owner] < 0 if owner >= 0 else speed < DRIVES_ON:
+                queued[i] = min(queued[i], pairs.gap[p])
+    return rear_stop, queued
+
+
+class Promises(NamedTuple):
+    """
+    Room promised to agents that were let into junctions and have not left them yet.
+
+    :param behind: (L) at the beginning of each lane behind a junction [m]
+    :param through: (L) the part of it promised to agents that get there through each lane [m]
+    """
+
+    behind: FloatArray
+    through: FloatArray
+
+
+@compiled
+def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, step: int,
+            i: int) -> None:
+    """Reserve room for an agent behind the junction that ends at a step of its way."""
+    if 0 <= step < way.depth[i] - 1:
+        room = agents.length[slot] + QUEUE_GAP
+        promised.behind[way.lane[i, step + 1]] += room
+        promised.through[way.lane[i, step]] += room
+
+
+@compiled
+def is_full(rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int, way: Ways,
+            passage: Passages, at: Situation, i: int) -> bool:
+    """
+    Return whether there is no room for an agent behind its next junction.
+
+    In a roundabout agents close up, so that those behind them get to their exits.
+    """
+    step = passage.last[i]
+    # Agents that go there through the same lane are leaders and already count in `rear_stop`.
+    taken = 0.0
+    if 0 <= step < way.depth[i] - 1:
+        taken = promised.behind[way.lane[i, step + 1]] - promised.through[way.lane[i, step]]
+    return bool(not passage.ring[i] and at.rear_stop[i] - taken
+                < passage.end[i] + agents.length[slot] + rules.room)
