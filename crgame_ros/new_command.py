@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
+from crgame_ros.whole_file import write_text
 
 if TYPE_CHECKING:
     from crgame_ros.game.game import Game, PoseSpawn
@@ -57,7 +58,7 @@ def _new(values: argparse.Namespace) -> int:
                    title=game.title or f'{setup.loaded.benchmark_id}, {len(humans)} in seats')
     # Place the vehicles as a reader of the file will.
     build_setup(game, setup.loaded)
-    _write(out, game.dump())
+    write_text(game.dump(), out)
     print(f'{out}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s)')
     for notice in setup.notices:
         print(f'note: {notice}')
@@ -95,11 +96,3 @@ def _pose(state: 'VehicleState') -> 'PoseSpawn':
                      round(state.speed, 2))
 
 
-def _write(path: Path, text: str) -> None:
-    part = path.with_name(f'{path.name}.part')
-    try:
-        part.write_text(text, encoding='utf-8')
-        part.replace(path)
-    except OSError as error:
-        raise InputError(f'cannot be written ({error.strerror})', str(path),
-                         'name another file with --out') from error

@@ -6,8 +6,8 @@ import argparse
 import json
 from pathlib import Path
 
-from crgame_ros.errors import InputError
 from crgame_ros.schema.file_kinds import FILE_KINDS
+from crgame_ros.whole_file import write_text
 
 DESCRIPTION = """\
 Write the JSON Schema (draft 2020-12) of a kind of file, with which editors complete and check it.
@@ -39,10 +39,6 @@ def run(values: argparse.Namespace) -> int:
     if values.out is None:
         print(text, end='')
         return 0
-    try:
-        values.out.write_text(text, encoding='utf-8')
-    except OSError as error:
-        raise InputError(f'cannot be written ({error.strerror})', str(values.out),
-                         'choose another file with --out') from error
+    write_text(text, values.out)
     print(values.out)
     return 0

@@ -2,40 +2,72 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writing files that are complete or absent, even if the process or the machine stops."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 import glob
 import os
 from pathlib import Path
 
+from crgame_ros.errors import InputError
+
+
+def write_text(text: str, path: Path) -> None:
+    """
+    Write a file completely or not at all.
+
+    :raises InputError: if it cannot be written; an existing file is unchanged.
+    """
+    write_bytes(text.encode(), path)
+
+
+def write_bytes(content: bytes, path: Path) -> None:
+    """Write a file as `write_text` does."""
+    try:
+        write_whole(content, path)
+    except OSError as error:
+        raise InputError(f'cannot be written ({error.strerror})', str(path),
+                         'choose a folder that can be written') from error
+
 
 def write_whole(content: bytes, path: Path) -> None:
     """
-    Write a file under another name, and rename it once all of it is on the disk.
+    Write a file completely or not at all.
 
     :raises OSError: if it cannot be written; an existing file is unchanged.
     """
-    temporary = part_of(path)
+    with whole_file(path) as part:
+        part.write_bytes(content)
+
+
+@contextmanager
+def whole_file(path: Path, suffix: str = '.part') -> Iterator[Path]:
+    """
+    Yield the name under which to write a file, which is renamed once all of it is on the disk.
+
+    :param suffix: of that name.
+    :raises OSError: if it cannot be written; an existing file is unchanged.
+    """
+    part = part_of(path, suffix)
     try:
-        with temporary.open('wb') as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
+        yield part
+        _sync(part, os.O_RDONLY)
+        part.replace(path)
         sync_folder(path.parent)
     finally:
-        temporary.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
 
 
-def part_of(path: Path) -> Path:
+def part_of(path: Path, suffix: str = '.part') -> Path:
     """
     Return the name under which this process writes a file before it is whole.
 
     What killed processes have left of the same file is removed.
     """
-    for left in path.parent.glob(f'.{glob.escape(path.name)}.*.part'):
-        pid = left.name.split('.')[-2]
+    for left in path.parent.glob(f'.{glob.escape(path.name)}.*{suffix}'):
+        pid = left.name.removesuffix(suffix).rpartition('.')[2]
         if pid.isdecimal() and not Path('/proc', pid).exists():
             left.unlink(missing_ok=True)
-    return path.with_name(f'.{path.name}.{os.getpid()}.part')
+    return path.with_name(f'.{path.name}.{os.getpid()}{suffix}')
 
 
 def sync_folder(folder: Path) -> None:
@@ -44,7 +76,11 @@ def sync_folder(folder: Path) -> None:
 
     :raises OSError: if the folder cannot be read.
     """
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+
+def _sync(path: Path, flags: int) -> None:
+    handle = os.open(path, flags)
     try:
         os.fsync(handle)
     finally:

@@ -14,10 +14,10 @@ from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory, share_directory
-from crgame_ros.recording.export import write_bytes
 from crgame_ros.recording.run_record import run_record_of, RunRecord
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
+from crgame_ros.whole_file import write_bytes
 from matplotlib.figure import Figure
 
 # Of PNG on a page that is read on a screen [dots per inch].

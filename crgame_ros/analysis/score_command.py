@@ -126,7 +126,8 @@ def _score_solutions(values: argparse.Namespace, scored: 'ScoredScenario') -> 'P
 def _write(found: 'list[PlannerScores]', out: Path) -> None:
     """Write the scenario, the solutions of a run's vehicles, and all scores."""
     from crgame_ros.analysis.scores.solution_file import dated, solution_name, solution_text
-    from crgame_ros.recording.export import prepare_folder, write_text
+    from crgame_ros.recording.export import prepare_folder
+    from crgame_ros.whole_file import write_text
     prepare_folder(out)
     when = datetime.now()
     scores = found[0]

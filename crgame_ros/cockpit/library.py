@@ -18,6 +18,7 @@ from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.planner.registry import planner_names
 from crgame_ros.scenario import guard
+from crgame_ros.whole_file import write_whole
 from crgame_ros.yaml_text import read_yaml
 
 DRIVERS = ('auto', 'cockpit', 'idle')
@@ -234,11 +235,9 @@ class Library:
 
     def _store_game(self, text: bytes) -> Path:
         path = self._games / f'{hashlib.sha256(text).hexdigest()[:16]}.yaml'
-        part = path.with_name(f'{path.stem}.{secrets.token_hex(4)}.part')
         try:
             self._games.mkdir(parents=True, exist_ok=True)
-            part.write_bytes(text)
-            os.replace(part, path)
+            write_whole(text, path)
         except OSError as error:
             raise CrgameError(f'the game cannot be written ({error.strerror})') from error
         return path

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import zlib
 
 from crgame_ros.errors import InputError
-from crgame_ros.recording.export import write_bytes
+from crgame_ros.whole_file import write_bytes
 
 # Prefix of a reference to a file in the store, followed by its digest and its original name.
 PREFIX = 'content:'

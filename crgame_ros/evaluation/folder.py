@@ -14,9 +14,10 @@ from crgame_ros.evaluation.cell_grid import CellGrid
 from crgame_ros.evaluation.content import ContentStore
 from crgame_ros.evaluation.plan import EvaluationPlan
 from crgame_ros.evaluation.results.cell_rows import TABLES_OF_CELLS
-from crgame_ros.recording.export import prepare_folder, write_text
+from crgame_ros.recording.export import prepare_folder
 from crgame_ros.schema.writing import write
 from crgame_ros.version import __version__
+from crgame_ros.whole_file import write_text
 
 GRID_FILE, FILES, REPORTS = 'evaluation.json', 'files', 'reports'
 FORMAT = 1

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from crgame_ros.recording.epochs import epoch_numbers
 from crgame_ros.recording.exceptions import RunTooShortError
-from crgame_ros.recording.export import export_scenario, scenario_path, write_text
+from crgame_ros.recording.export import export_scenario, scenario_path
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
+from crgame_ros.whole_file import write_text
 
 
 @dataclass(frozen=True)

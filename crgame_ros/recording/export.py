@@ -28,7 +28,7 @@ from crgame_ros.scenario.export_ids import IdPool
 from crgame_ros.scenario.export_network import schema_errors, used_ids, write_roads
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
 from crgame_ros.scenario.recorded_humans import human_note, SOURCE_MARK, without_human_notes
-from crgame_ros.whole_file import write_whole
+from crgame_ros.whole_file import write_text
 from lxml import etree
 import numpy as np
 from numpy.typing import NDArray
@@ -257,24 +257,6 @@ def prepare_folder(out: Path) -> None:
     except OSError as error:
         raise InputError(f'cannot be written to ({error.strerror})', str(folder),
                          'choose another folder') from error
-
-
-def write_text(text: str, path: Path) -> None:
-    """
-    Write a file completely or not at all.
-
-    :raises InputError: if it cannot be written.
-    """
-    write_bytes(text.encode(), path)
-
-
-def write_bytes(content: bytes, path: Path) -> None:
-    """Write a file as `write_text` does."""
-    try:
-        write_whole(content, path)
-    except OSError as error:
-        raise InputError(f'cannot be written ({error.strerror})', str(path),
-                         'choose a folder that can be written') from error
 
 
 def _header(log: RunTrajectories, loaded: LoadedScenario, problems: int,

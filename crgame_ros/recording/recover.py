@@ -6,7 +6,6 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
-import os
 from pathlib import Path
 import sqlite3
 from typing import Any, BinaryIO
@@ -24,6 +23,7 @@ from crgame_ros.recording.metadata import (
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.storage import McapStorage, merge_topics, RosbagsStorage
 from crgame_ros.recording.writer import CHUNK_BYTES
+from crgame_ros.whole_file import whole_file
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata
@@ -155,19 +155,13 @@ def _finish(path: Path, progress: Callable[[float], object] | None) -> int | Non
     if source.complete and not damaged:
         return None
     source.segments = [segment for segment in source.segments if segment not in damaged]
-    temporary = path.with_name(f'.{path.name}.part')
-    try:
-        with temporary.open('wb') as stream:
+    with whole_file(path) as part:
+        with part.open('wb') as stream:
             count, lost = _copy(source, stream, progress)
-            stream.flush()
-            os.fsync(stream.fileno())
-        copy = McapFile(temporary)
+        copy = McapFile(part)
         if not copy.complete or sum(copy.tally().counts.values()) != count:
-            raise RecordingError(temporary, 'what was written does not read back',
+            raise RecordingError(part, 'what was written does not read back',
                                  'check the disk; the recording is as it was')
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
     return source.useless_bytes + lost + sum(segment.size for segment in damaged)
 
 

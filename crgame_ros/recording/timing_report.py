@@ -18,7 +18,6 @@ from crgame_ros.messages.status_values import BRAKING, read_status
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
-from crgame_ros.recording.export import write_text
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_plans import OpenRequests
 from crgame_ros.recording.run_cycles import read_cycles
@@ -30,6 +29,7 @@ from crgame_ros.simulation.contacts import Contact, find_contacts, Motions
 from crgame_ros.timing.late_steps import LateSteps
 from crgame_ros.timing.metrics import slowness, TimingMetrics
 from crgame_ros.vehicle.state import StateColumn
+from crgame_ros.whole_file import write_text
 import numpy as np
 from numpy.typing import NDArray
 from shapely.errors import GEOSException

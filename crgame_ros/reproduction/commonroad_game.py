@@ -15,7 +15,7 @@ from crgame_ros.analysis.pictures.profiles_figure import profiles_figure
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.pictures.timing_figure import timing_figure
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.recording.export import write_bytes, write_scenario, write_text
+from crgame_ros.recording.export import write_scenario
 from crgame_ros.recording.run_record import RunRecord
 from crgame_ros.reproduction.encounter import Encounter
 from crgame_ros.reproduction.expectation import Judgement
@@ -36,6 +36,7 @@ from crgame_ros.reproduction.synchronization import (
     Synchronization,
 )
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
+from crgame_ros.whole_file import write_bytes, write_text
 from matplotlib.figure import Figure
 import numpy as np
 

@@ -17,11 +17,11 @@ from typing import Any
 
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS
 from crgame_ros.errors import InputError
-from crgame_ros.recording.export import write_text
 from crgame_ros.reproduction.commonroad_game import EvaluationPart, EvaluationRequest
 from crgame_ros.reproduction.expectation import Judgement
 from crgame_ros.reproduction.synchronization import PAPER_TABLE
 from crgame_ros.version import __version__
+from crgame_ros.whole_file import write_text
 
 # Captions of the figures, by file name: which figure of the paper each corresponds to.
 CAPTIONS = {

@@ -63,8 +63,8 @@ def run(values: argparse.Namespace) -> int:
 def _to_scenario(values: argparse.Namespace) -> None:
     # Imported here, so that other commands do not load these libraries.
     from crgame_ros.waypoints.export import Drive, export_roads
-    from crgame_ros.waypoints.file import write_whole
     from crgame_ros.waypoints.roads import WaypointRoads
+    from crgame_ros.whole_file import write_text
     if values.all:
         raise InputError('only lanelets can be left out', '--all', 'leave the option out')
     if (values.start is None) != (values.goal is None):
@@ -78,7 +78,7 @@ def _to_scenario(values: argparse.Namespace) -> None:
     made = export_roads(roads, values.out.stem, kind, drive,
                         str(values.source))
     _make_folder(values.out)
-    write_whole(values.out, made.xml_text)
+    write_text(made.xml_text, values.out)
     renamed = {lane: made.lanelets(lane) for lane in roads.lane_ids
                if made.lanelets(lane) != (lane,)}
     for lane, lanelets in list(renamed.items())[:_TOLD]:

@@ -10,8 +10,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from crgame_ros import whole_file
 from crgame_ros.errors import InputError, short
+from crgame_ros.whole_file import write_text
 import numpy as np
 from numpy.typing import NDArray
 
@@ -157,17 +157,4 @@ def write_lane_rows(path: Path, lanes: Mapping[int, LaneRows]) -> None:
             limit = row[3] if math.isfinite(row[3]) else ''
             writer.writerow((lane, *row[:3], limit, *links))
             links = [''] * len(links)
-    write_whole(path, text.getvalue())
-
-
-def write_whole(path: Path, text: str) -> None:
-    """
-    Write a file completely or not at all.
-
-    :raises InputError: if it cannot be written.
-    """
-    try:
-        whole_file.write_whole(text.encode(), path)
-    except OSError as error:
-        raise InputError(f'cannot write it ({error.strerror})', str(path),
-                         'choose another place') from error
+    write_text(text.getvalue(), path)

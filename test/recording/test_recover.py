@@ -302,7 +302,7 @@ def test_leftover_of_a_killed_recovery_does_no_harm(tmp_path: Path, samples: Any
     record(tmp_path / 'run', samples)
     file = tmp_path / 'run' / 'run_0.mcap'
     file.write_bytes(file.read_bytes()[:-1000])
-    (tmp_path / 'run' / '.run_0.mcap.part').write_bytes(b'half a copy')
+    (tmp_path / 'run' / '.run_0.mcap.999999999.part').write_bytes(b'half a copy')
     assert BagReader(file).message_count == 600
     assert recover(tmp_path / 'run').messages == 600
     assert sorted(contents(tmp_path / 'run')) == ['metadata.yaml', 'run_0.mcap']

@@ -253,7 +253,7 @@ def test_files_that_are_no_tables_are_refused(tmp_path: Path) -> None:
         large.truncate(33 << 20)
     with pytest.raises(InputError, match='larger than 32 MiB'):
         WaypointRoads.from_csv(file)
-    with pytest.raises(InputError, match='cannot write'):
+    with pytest.raises(InputError, match='cannot be written'):
         roads_of(OWN[0])[1].to_csv(tmp_path / 'none' / 'roads.csv')
 
 

@@ -180,7 +180,8 @@ def _timing(runs: Sequence['FigureRun'], folder: Path, wanted: Sequence[str],
     """
     from crgame_ros.analysis.pictures.timing_figure import timing_figure
     from crgame_ros.analysis.pictures.timing_table import TimingTable
-    from crgame_ros.recording.export import prepare_folder, write_text
+    from crgame_ros.recording.export import prepare_folder
+    from crgame_ros.whole_file import write_text
     try:
         timed = [run.timed for run in runs]
     except InputError as error:
@@ -203,7 +204,8 @@ def _timing(runs: Sequence['FigureRun'], folder: Path, wanted: Sequence[str],
 
 def _write(figure: 'Figure', place: Path, formats: Sequence[str], caption: str) -> None:
     from crgame_ros.analysis.pictures.figure_style import figure_bytes
-    from crgame_ros.recording.export import prepare_folder, write_bytes
+    from crgame_ros.recording.export import prepare_folder
+    from crgame_ros.whole_file import write_bytes
     prepare_folder(place.parent)
     for file_format in formats:
         path = place.with_name(f'{place.name}.{file_format}')

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 import math
-import os
 from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any
@@ -15,6 +14,7 @@ from crgame_ros.analysis.pictures.frame_axes import draw_frame
 from crgame_ros.analysis.pictures.frame_window import FrameWindow
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.errors import InputError
+from crgame_ros.whole_file import whole_file
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -50,9 +50,9 @@ def write_video(scene: FrameScene, path: Path,
     figure, windows = _prepared(path.suffix, scene.windows(
         rows, standing=False, reach=VIDEO_REACH))
     writer = _writer(path.suffix, 1.0 / (stride * step_s))
-    temporary = path.with_name(f'.{path.stem}.{os.getpid()}.part{path.suffix}')
     try:
-        with paper_style(), writer.saving(figure, str(temporary), _INCH_PX):
+        with paper_style(), whole_file(path, f'.part{path.suffix}') as part, \
+                writer.saving(figure, str(part), _INCH_PX):
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             for number, (row, window) in enumerate(zip(rows, windows, strict=True)):
                 # Creating axes is slow, so they are reused.
@@ -63,15 +63,12 @@ def write_video(scene: FrameScene, path: Path,
                            f'{frame.time_s:.1f} s')
                 writer.grab_frame()
                 progress((number + 1) / len(rows))
-        temporary.replace(path)
     except CalledProcessError as error:
         raise InputError('ffmpeg could not write it', str(path),
                          'see that it has libx264, or name a *.gif') from error
     except OSError as error:
         raise InputError(f'cannot be written ({error.strerror or error})', str(path),
                          'choose a folder that can be written') from error
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

@@ -27,8 +27,8 @@ from crgame_ros.analysis.report.story_section import story_section
 from crgame_ros.analysis.report.text import free, NOTHING, number
 from crgame_ros.analysis.report.timing_section import plan_section, timing_section
 from crgame_ros.errors import InputError
-from crgame_ros.recording.export import write_text
 from crgame_ros.software import software
+from crgame_ros.whole_file import write_text
 import numpy as np
 from numpy.typing import NDArray
 

@@ -34,8 +34,8 @@ from crgame_ros.analysis.tables.writer import (
     TableWriter,
 )
 from crgame_ros.errors import InputError
-from crgame_ros.recording.export import prepare_folder, write_text
-from crgame_ros.whole_file import part_of
+from crgame_ros.recording.export import prepare_folder
+from crgame_ros.whole_file import part_of, write_text
 import pyarrow as pa
 
 _LARGEST_PACKAGE = 10_000_000

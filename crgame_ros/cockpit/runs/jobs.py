@@ -17,10 +17,10 @@ from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
 from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.job_loop import serve_jobs
 from crgame_ros.errors import CrgameError
-from crgame_ros.recording.export import write_text
 from crgame_ros.recording.run_record import read_run_record
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
+from crgame_ros.whole_file import write_text
 import numpy as np
 
 # Time limit of a job [s]: runs can last hours, and several can be compared.

@@ -21,6 +21,7 @@ from crgame_ros.evaluation.results.cell_rows import (
     TABLES_OF_CELLS,
     VEHICLES_OF_CELLS,
 )
+from crgame_ros.whole_file import write_whole
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -203,9 +204,7 @@ def _lines(cells: Iterable[Mapping[str, Any]]) -> str:
 
 
 def _write_lines(path: Path, cells: Iterable[Mapping[str, Any]]) -> None:
-    part = path.with_suffix('.part')
-    part.write_text(_lines(cells), encoding='utf-8')
-    part.replace(path)
+    write_whole(_lines(cells).encode(), path)
 
 
 def _part_names(folder: Path) -> list[str]:

@@ -28,8 +28,8 @@ from crgame_ros.evaluation.summary.tables import (
     SummaryCell,
     SummaryTable,
 )
-from crgame_ros.recording.export import write_text
 from crgame_ros.version import __version__
+from crgame_ros.whole_file import write_text
 import numpy as np
 
 # Sizes in the picture, which is scaled as a whole [px].

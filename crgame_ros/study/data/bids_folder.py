@@ -12,11 +12,12 @@ from typing import Any
 
 from crgame_ros.analysis.tables.column import Column, FLAG
 from crgame_ros.errors import InputError
-from crgame_ros.recording.export import prepare_folder, write_text
+from crgame_ros.recording.export import prepare_folder
 from crgame_ros.study.data.participant_record import ParticipantRecord
 from crgame_ros.study.data.session_events_table import EVENTS_OF_SESSIONS
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.version import __version__
+from crgame_ros.whole_file import write_text
 
 # https://bids-specification.readthedocs.io/en/v1.10.0/
 VERSION = '1.10.0'

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import fcntl
 import json
-import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -20,10 +19,11 @@ from crgame_ros.analysis.tables.data_package import (
 from crgame_ros.analysis.tables.run_tables import TABLES
 from crgame_ros.analysis.tables.writer import Format, NOT_A_NUMBER, TableWriter
 from crgame_ros.errors import InputError
-from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
+from crgame_ros.recording.export import prepare_folder
 from crgame_ros.study.data.paper_section import provenance_of
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, parquet_of_table
+from crgame_ros.whole_file import whole_file, write_bytes, write_text
 from crgame_ros.yaml_text import read_text
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -61,17 +61,13 @@ def write_run_tables(trials: Sequence[CountedTrial], out: Path, study: str) -> d
     written = []
     for declaration in DECLARATIONS:
         path = out / f'{declaration.name}.parquet'
-        part = out / f'.{path.name}.{os.getpid()}.part'
         try:
-            with TableWriter(declaration, part, 'parquet') as writer:
+            with whole_file(path) as part, TableWriter(declaration, part, 'parquet') as writer:
                 for trial in measured:
                     _add(trial, declaration.name, writer)
-            part.replace(path)
         except OSError as error:
             raise InputError(f'cannot be written ({error.strerror})', str(path),
                              'make room, or make the folder writable') from error
-        finally:
-            part.unlink(missing_ok=True)
         written.append(WrittenTable(declaration, path, path.name, writer.rows))
     package = data_package(written, 'parquet', f'{study}-runs') | {
         'title': f'Runs of the study {study}', MADE_OF: made_of}

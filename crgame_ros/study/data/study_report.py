@@ -8,11 +8,11 @@ from typing import Any
 
 from crgame_ros.analysis.report.document import plain_document
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
-from crgame_ros.recording.export import write_text
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.data.timing_quality import bounds_told
+from crgame_ros.whole_file import write_text
 
 _STYLE = Path(__file__).resolve().parent / 'page' / 'study.css'
 _TROUBLES = {

@@ -11,12 +11,13 @@ from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDecl
 from crgame_ros.analysis.tables.data_package import data_package, PACKAGE_FILE, WrittenTable
 from crgame_ros.analysis.tables.vehicles import VEHICLES
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.recording.export import prepare_folder, write_bytes, write_text
+from crgame_ros.recording.export import prepare_folder
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
 from crgame_ros.study.data.study_row_table import csv_of_table, table_of_rows, with_unit
 from crgame_ros.study.data.trials_table import PARTICIPANT, TRIAL
+from crgame_ros.whole_file import write_bytes, write_text
 import pyarrow.parquet as pq
 
 # Columns of the vehicles' tables that are compared directly.
