@@ -66,6 +66,8 @@ TOOLS = (
           'crgame_ros.ros.profile_command'),
     _Tool('page-libraries', 'fetch three.js and Plotly, which draw the 3D view and plots',
           'crgame_ros.page_libraries_command'),
+    _Tool('models', 'planners, trackers, sensors and other parts to name, and their options',
+          'crgame_ros.models_command'),
     _Tool('schema', 'what a game file and other files may say, for editors',
           'crgame_ros.schema_command'))
 DESCRIPTION = """\
@@ -215,6 +217,7 @@ def _offline(values: argparse.Namespace) -> int:
     if values.out is not None:
         for notice in run.exported(values.out)[1]:
             print(f'note: {notice}', file=sys.stderr)
+    assert run.outcome is not None
     return tell_outcome(say, run.outcome, run.usual_criticality, scores=run.drive_scores)
 
 

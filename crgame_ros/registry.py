@@ -37,14 +37,18 @@ class ModelRegistry:
     :param built_in: `module:Class` by name
     :param base: the class that all of them derive from
     :param document: the page of the documentation on writing one
+    :param given: arguments of constructors from the program, which are no options
+    :param left_out: where an option that is None comes from
     """
 
     def __init__(self, group: str, kind: str, built_in: Mapping[str, str], base: type,
-                 document: str | None = None) -> None:
+                 document: str = '', given: tuple[str, ...] = (),
+                 left_out: str = 'none') -> None:
         self.entry_point_group = f'crgame_ros.{group}'
         self.kind = kind
         self.built_in = dict(built_in)
         self._base = base
+        self.document, self.given, self.left_out = document, given, left_out
         self._remedy = f'see {document}' if document else 'define it'
 
     def names(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ import re
 import sys
 from typing import Any, get_args, get_origin
 
+from crgame_ros.models_command import options_of, purpose_of, REGISTRIES, registry_of
 from crgame_ros.schema.declaration import (
     choices_of,
     form_of,
@@ -55,7 +56,23 @@ def reference() -> str:
             if kind not in done:
                 done.add(kind)
                 parts += [f'{"##" if kind is top else "###"} {label}', summary(kind), table(kind)]
-    return '\n\n'.join(parts) + '\n'
+    return '\n\n'.join([*parts, *model_parts()]) + '\n'
+
+
+def model_parts() -> Iterator[str]:
+    """Yield the options of everything that a game may name."""
+    yield ('## Options of models\n\nOf the planners, trackers and so on that ship; '
+           '`crgame models` lists your own as well.')
+    for kind in REGISTRIES:
+        registry = registry_of(kind)
+        for name in registry.names():
+            yield f'### {kind.replace("-", " ")} `{name}`'
+            yield escaped(purpose_of(registry.find(name)))
+            if options := options_of(registry, name):
+                rows = [('option', 'value', 'default', 'meaning'), ('---',) * 4, *(
+                    (f'`{each.name}`', escaped(each.wanted), each.default or 'needed',
+                     escaped(each.meaning)) for each in options)]
+                yield '\n'.join(f'| {" | ".join(row)} |' for row in rows)
 
 
 def sections(label: str, kind: Any) -> Iterator[tuple[str, Any]]:

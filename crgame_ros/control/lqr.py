@@ -33,7 +33,7 @@ LARGEST_APPROACH = 0.3
 
 class LqrTracker(Tracker):
     """
-    Linear quadratic regulator on the lateral error of FS equation 2.
+    The linear quadratic regulator on the lateral error of FS equation 2.
 
     Snider's error model has tyre forces; FS 2 has slip and a steering lag instead, so that the
     errors against the plan are the offset e (left of the path), the heading error psi and the

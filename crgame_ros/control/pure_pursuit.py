@@ -18,7 +18,7 @@ SHALLOW = 3.0
 
 class PurePursuitTracker(Tracker):
     """
-    Geometric path tracking, CMU-RI-TR-09-08, section 2.2.
+    Pure pursuit: geometric path tracking, CMU-RI-TR-09-08, section 2.2.
 
     An arc of the rear axle starts along the heading and meets the plan's point at the distance l_d
     and the angle alpha. Its curvature is 2 sin(alpha) / l_d, so that delta = atan(2 L sin(alpha) /
@@ -37,9 +37,9 @@ class PurePursuitTracker(Tracker):
 
     :param vehicle: parameters of the vehicle
     :param dt_s: time between calls [s]
-    :param look_ahead_time: k [s]
-    :param shortest_look_ahead: [m]
-    :param longest_look_ahead: [m]
+    :param look_ahead_time: look-ahead distance over speed, k [s]
+    :param shortest_look_ahead: shortest look-ahead distance [m]
+    :param longest_look_ahead: longest look-ahead distance [m]
     :param speed_gain: k_v of speed control [1/s]
     :param integral_gain: k_i of speed control [1/s^2]
     :param position_gain: k_s of speed control [1/s]

@@ -89,4 +89,5 @@ TRACKERS = ModelRegistry(
     'trackers', 'tracker',
     {'lqr': 'crgame_ros.control.lqr:LqrTracker',
      'pure-pursuit': 'crgame_ros.control.pure_pursuit:PurePursuitTracker'},
-    Tracker, 'docs/control.md')
+    Tracker, 'docs/control.md', ('vehicle', 'dt_s'),
+    'in config/control.yaml')

@@ -72,7 +72,7 @@ class Sensor(ABC):
 
 SENSORS = ModelRegistry(
     'sensors', 'sensor', {'ray-caster': 'crgame_ros.perception.ray_caster:RayCaster'}, Sensor,
-    'docs/perception.md')
+    'docs/perception.md', ('spec',))
 
 
 def create_sensor(spec: SensorSpec, where: str = '') -> Sensor:

@@ -167,7 +167,7 @@ class IdmPlanner(PathPlanner):
     the lane's end.
 
     :param v0: desired speed; None takes speed limits, goal and initial speed [m/s]
-    :param time_headway: T [s]
+    :param time_headway: desired time headway T [s]
     :param s0: gap at standstill [m]
     :param a: maximum acceleration [m/s^2]
     :param b: comfortable deceleration [m/s^2]

@@ -56,9 +56,9 @@ class PurePursuitSettings:
     """
     Look-ahead distance l_d = k v of pure pursuit, between its bounds (Snider 2009, section 2.2).
 
-    :param look_ahead_time: k [s]
-    :param shortest_look_ahead: [m]
-    :param longest_look_ahead: [m]
+    :param look_ahead_time: look-ahead distance over speed, k [s]
+    :param shortest_look_ahead: shortest look-ahead distance [m]
+    :param longest_look_ahead: longest look-ahead distance [m]
     """
 
     look_ahead_time: Annotated[float, Within(0.05, 10.0)]

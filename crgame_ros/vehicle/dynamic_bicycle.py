@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 class DynamicBicycle(VehicleModel):
     """
-    FS equation 2.
+    The dynamic bicycle of FS equation 2: slip, and delays of steering and acceleration.
 
     States: rear-axle position x, y [m], heading theta [rad], steering angle delta [rad], speed v
     [m/s], acceleration a [m/s^2]. Inputs: commanded steering angle delta_c and acceleration a_c,
@@ -29,9 +29,9 @@ class DynamicBicycle(VehicleModel):
     Options that are None come from `config/control.yaml`.
 
     :param vehicle: parameters of the vehicle
-    :param slip: G_s in [0, 1], 1 without slip [-]
-    :param steering_lag: T_delta [s]
-    :param acceleration_lag: T_a [s]
+    :param slip: gain G_s of the yaw rate in [0, 1], 1 without slip [-]
+    :param steering_lag: time constant T_delta of the steering angle [s]
+    :param acceleration_lag: time constant T_a of the acceleration [s]
     """
 
     def __init__(self, vehicle: VehicleParameters, slip: float | None = None,

@@ -118,4 +118,4 @@ VEHICLE_MODELS = ModelRegistry(
     'vehicle_models', 'vehicle model',
     {'ks': 'crgame_ros.vehicle.models:KinematicSingleTrack',
      'dynamic-bicycle': 'crgame_ros.vehicle.dynamic_bicycle:DynamicBicycle'},
-    VehicleModel, 'docs/control.md')
+    VehicleModel, 'docs/control.md', ('vehicle',), 'in config/control.yaml')

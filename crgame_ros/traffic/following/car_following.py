@@ -227,15 +227,15 @@ class AdaptiveCruise(CarFollowing):
     Here an agent begins as soon as the constant deceleration (v - v_leader)^2 / (2 (gap - s0))
     reaches its comfortable one, and keeps to that (ours). A platoon never comes near it.
 
-    :param time_gap: T; with it and s0 a lane carries 2,040 cars an hour at 50 km/h and 2,400 at
-        120 km/h, as in the Highway Capacity Manual (docs/traffic.md) [s]
-    :param h: None is T [s]
+    :param time_gap: desired time gap T; with it and s0 a lane carries 2,040 cars an hour at
+        50 km/h and 2,400 at 120 km/h, as in the Highway Capacity Manual (docs/traffic.md) [s]
+    :param h: time gap of the control error (FS 3); None is T [s]
     :param gain: lambda, the rate at which spacing errors decay (ours) [1/s]
-    :param standstill_gap: s0, as in Treiber et al. (2000) [m]
-    :param max_acceleration: [m/s^2]
+    :param standstill_gap: gap at standstill s0, as in Treiber et al. (2000) [m]
+    :param max_acceleration: greatest acceleration [m/s^2]
     :param comfortable_deceleration: used to slow down to the desired speed, and from which braking
         for a slower leader begins (ours) [m/s^2]
-    :param max_deceleration: [m/s^2]
+    :param max_deceleration: hardest braking [m/s^2]
     :param speed_time: time constant of approaching the desired speed (ours) [s]
     """
 
@@ -296,11 +296,11 @@ class IntelligentDriver(CarFollowing):
     the law keeps much more than s0 + T v; with T = 1.0 s a lane carries as much as with `acc`, and
     some vehicles stop 0.1 m nearer than s0.
 
-    :param time_gap: T [s]
-    :param standstill_gap: s0 [m]
-    :param max_acceleration: a [m/s^2]
-    :param comfortable_deceleration: b [m/s^2]
-    :param max_deceleration: [m/s^2]
+    :param time_gap: desired time gap T [s]
+    :param standstill_gap: gap at standstill s0 [m]
+    :param max_acceleration: greatest acceleration a [m/s^2]
+    :param comfortable_deceleration: comfortable deceleration b [m/s^2]
+    :param max_deceleration: hardest braking [m/s^2]
     """
 
     name: ClassVar[str] = 'idm'
