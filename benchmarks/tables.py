@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 
-from crgame_ros.game.documents import objects_document
+from crgame_ros.game.documents import GAME, OBJECTS
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
@@ -25,7 +25,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.time_controller import Cycle
@@ -105,10 +105,9 @@ class SyntheticRun:
         setup, scheduler = self.setup, self.scheduler
         for topic, text in (
                 ('/scenario/xml', setup.loaded.xml_text),
-                ('/scenario/objects', objects_document(
+                ('/scenario/objects', OBJECTS.write(
                     (*setup.vehicle_descriptions, *self.objects))),
-                ('/scenario/game', game_document(
-                    setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))):
+                ('/scenario/game', GAME.write(describe_game( setup)))):
             yield topic, STRING, EPOCH_NS, encode(STRING, text)
         names = [name for item in setup.vehicle_ids for name in vehicle_joint_names(item)]
         rows, columns = CycleRows(['hv0'], 1), STORE.types['std_msgs/msg/MultiArrayDimension']

@@ -13,13 +13,12 @@ from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.shown_paths import without_paths
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.planner.registry import create_planner
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 
 UPLOAD = 'upload'
@@ -44,8 +43,7 @@ def preview(path: Path, kind: str) -> dict[str, Any]:
     :raises InputError: if it cannot be used.
     """
     setup = _setup(path, kind)
-    document = parse_game_document(
-        game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    document = describe_game(setup)
     states = setup.obstacles.states_at(setup.scheduler.k0)
     vehicles = [[*vehicle.state, *[None] * 4] for vehicle in setup.vehicles]
     objects = [[*pose, *velocity] for pose, velocity in zip(

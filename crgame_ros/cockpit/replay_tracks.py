@@ -9,14 +9,10 @@ from typing import Any
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import (
-    GameDocument,
-    parse_events_document,
-    parse_signals_document,
-)
+from crgame_ros.game.documents import EVENTS, GameDocument, SIGNALS
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
-from crgame_ros.game.seat_documents import parse_seats
+from crgame_ros.game.seat_documents import SEATS
 from crgame_ros.messages.cdr import stamp_of
 from crgame_ros.messages.status_values import read_status, Status
 from crgame_ros.recording.reader import DecodedMessage
@@ -203,15 +199,15 @@ class TrackCollector:
     def _add_latched(self, kind: str, text: str, newest: int | None) -> None:
         try:
             if kind == 'signals':
-                signals = parse_signals_document(text)
+                signals = SIGNALS.read(text)
                 n = (signals.k - self._scheduler.k0) * self._scheduler.steps_per_tick
                 self._put(kind, max(n, 0), asdict(signals))
             elif kind == 'seats':
                 self._put(kind, newest or 0, {'seats': _seats(text)})
             else:
-                epoch, fired = parse_events_document(text)
-                if epoch == self._game.epoch:
-                    self._add_fired(fired, newest or 0)
+                events = EVENTS.read(text)
+                if events.epoch == self._game.epoch:
+                    self._add_fired(events.fired, newest or 0)
         except InputError:
             # Any node may publish on a topic; other content is skipped.
             return
@@ -229,8 +225,6 @@ class TrackCollector:
 
 def _seats(text: str) -> dict[str, dict[str, str]]:
     """Read the drivers of the seats, by name if the driver was at a page."""
-    seats, tenants = parse_seats(text)
-    for name, tenant in tenants.items():
-        if tenant.here:
-            seats[name]['holder_name'] = tenant.person.name
-    return seats
+    return {name: {'source': entry.source, 'driver': entry.driver}
+            | ({'holder_name': entry.person.name} if entry.here and entry.person else {})
+            for name, entry in SEATS.read(text).items()}

@@ -13,7 +13,7 @@ from commonroad.planning.planning_problem import PlanningProblem
 from commonroad.scenario.lanelet import Lanelet, LaneletNetwork, LineMarking
 from commonroad.scenario.traffic_light import TrafficLight
 from commonroad.scenario.traffic_sign import TrafficSign
-from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.documents import document_entry, GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.perception_spec import PerceptionSpec
@@ -242,11 +242,11 @@ def scene_document(loaded: LoadedScenario, objects: Sequence[ObjectDescription],
             'epoch': game.epoch, 'dt_s': game.scheduler.dt_s,
             'dt_c_s': game.scheduler.time_step_s, 'k0': game.scheduler.k0,
             'clock_offset_s': game.scheduler.clock_offset_ns / 1e9,
-            'duration_s': game.duration_s},
+            'duration_s': game.duration},
         'drivers': {human.id: human.driver for human in game.humans},
         'planners': {av.id: av.planner for av in game.avs},
         'occupancy': game.occupancy is not None,
-        'events': list(game.event_entries), 'sound': game.sound,
+        'events': [document_entry(event) for event in game.events], 'sound': game.sound,
         'contact': game.drivability.contact,
         'tasks': [_task(task) for task in game.tasks], 'language': game.language}
     finite: Document = _finite(document)

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from crgame_ros.driver.source import COCKPIT
-from crgame_ros.game.seat_documents import SeatDemand, SeatOccupant
+from crgame_ros.game.seat_documents import SeatDemand, SeatEntry
 
 # Interval of repetition [s]: an order sent while the simulation loads another game is lost.
 AGAIN_S = 0.5
 GIVE_UP_S = 10.0
 
-Seats = Mapping[str, Mapping[str, str]]
-Tenants = Mapping[str, SeatOccupant]
+Seats = Mapping[str, SeatEntry]
 
 
 @dataclass
@@ -37,24 +36,23 @@ class SeatOrders:
         """Return whether an order about a seat is pending."""
         return seat in self._orders
 
-    def note(self, demand: SeatDemand, seats: Seats, tenants: Tenants, now_s: float) -> None:
+    def note(self, demand: SeatDemand, seats: Seats, now_s: float) -> None:
         """
         Record an order that is sent now: a person takes a seat or gives it back.
 
         :param seats: content of `/seats`; an order that is already fulfilled needs no answer.
-        :param tenants: occupants of the seats.
         :param now_s: steady clock [s].
         """
         seat = demand.seat
-        if seat in self._orders or not _is_so(demand, seats.get(seat), tenants.get(seat)):
+        if seat in self._orders or not _is_so(demand, seats.get(seat)):
             self._orders[seat] = _Order(demand, now_s, now_s)
 
-    def answered(self, seats: Seats, tenants: Tenants) -> None:
+    def answered(self, seats: Seats) -> None:
         """Remove the orders that the new content of `/seats` fulfils or makes void."""
         self._orders = {
             seat: order for seat, order in self._orders.items()
-            if seat in seats and not _is_so(order.demand, seats[seat], tenants.get(seat))
-            and not _is_in_vain(order.demand, tenants.get(seat))}
+            if seat in seats and not _is_so(order.demand, seats[seat])
+            and not _is_in_vain(order.demand, seats[seat])}
 
     def due(self, now_s: float) -> list[SeatDemand]:
         """
@@ -72,20 +70,19 @@ class SeatOrders:
         return due
 
 
-def _is_so(demand: SeatDemand, entry: Mapping[str, str] | None,
-           tenant: SeatOccupant | None) -> bool:
+def _is_so(demand: SeatDemand, entry: SeatEntry | None) -> bool:
     """Return whether an order is fulfilled."""
     if entry is None:
         return False
-    drives = entry['source'] == COCKPIT
+    drives = entry.source == COCKPIT
     if demand.source == COCKPIT:
         return drives and (demand.person is None or (
-            tenant is not None and tenant.here and tenant.person.id == demand.person.id))
+            entry.here and entry.person is not None and entry.person.id == demand.person.id))
     # If the game's driver is the cockpit, a seat that is given back stays the cockpit's, empty.
-    return not drives or (entry['driver'] == COCKPIT and tenant is None)
+    return not drives or (entry.driver == COCKPIT and entry.person is None)
 
 
-def _is_in_vain(demand: SeatDemand, tenant: SeatOccupant | None) -> bool:
+def _is_in_vain(demand: SeatDemand, entry: SeatEntry) -> bool:
     """Return whether a person at another cockpit has taken the seat first."""
-    return demand.source == COCKPIT and demand.person is not None and tenant is not None \
-        and tenant.here and tenant.person.id not in (demand.person.id, demand.displaced)
+    return demand.source == COCKPIT and demand.person is not None and entry.person is not None \
+        and entry.here and entry.person.id not in (demand.person.id, demand.displaced)

@@ -11,7 +11,7 @@ from typing import Any
 from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import SeatOccupant
+from crgame_ros.game.seat_documents import SeatEntry, SeatOccupant
 
 # How long a seat is kept for a driver whose connection has broken [s].
 KEEP_S = 60.0
@@ -32,29 +32,30 @@ class SeatTable:
     """
     The seats of a run as the browser sees them.
 
-    :param seats: content of `/seats`: source and driver by vehicle.
+    :param seats: content of `/seats`.
     :param held: the seats that clients of this server hold.
-    :param tenants: the people in the seats according to `/seats`, here and at other cockpits.
     :param absent_s: since when absent drivers are absent, by seat; steady clock [s].
     """
 
-    seats: dict[str, dict[str, str]] = field(default_factory=dict)
+    seats: dict[str, SeatEntry] = field(default_factory=dict)
     held: dict[str, HeldSeat] = field(default_factory=dict)
-    tenants: dict[str, SeatOccupant] = field(default_factory=dict)
     absent_s: dict[str, float] = field(default_factory=dict)
 
-    def update(self, seats: Mapping[str, Mapping[str, str]], awaited: Container[str] = (),
-               tenants: Mapping[str, SeatOccupant] | None = None) -> list[HeldSeat]:
+    @property
+    def tenants(self) -> dict[str, SeatOccupant]:
+        """Return the people in the seats, here and at other cockpits."""
+        return {name: occupant for name, entry in self.seats.items()
+                if (occupant := entry.occupant) is not None}
+
+    def update(self, seats: Mapping[str, SeatEntry],
+               awaited: Container[str] = ()) -> list[HeldSeat]:
         """
         Update the table with the content of `/seats`.
 
         :param awaited: seats with a pending order, whose content is out of date.
-        :param tenants: occupants of the seats; None leaves them as they were.
         :return: the seats that were taken away from outside, which are no longer held.
         """
-        self.seats = {name: dict(entry) for name, entry in seats.items()}
-        if tenants is not None:
-            self.tenants = dict(tenants)
+        self.seats = dict(seats)
         gone = [item for name, item in self.held.items()
                 if name not in self.seats or (name not in awaited and self._is_taken(item))]
         for item in gone:
@@ -62,9 +63,9 @@ class SeatTable:
         return gone
 
     def _is_taken(self, item: HeldSeat) -> bool:
-        tenant = self.tenants.get(item.id)
-        return self.seats[item.id]['source'] != COCKPIT or (
-            tenant is not None and tenant.here and tenant.person.id != item.person)
+        entry = self.seats[item.id]
+        return entry.source != COCKPIT or (
+            entry.here and entry.person is not None and entry.person.id != item.person)
 
     def note_absent(self, lost: Mapping[str, bool], now_s: float) -> None:
         """
@@ -90,8 +91,7 @@ class SeatTable:
     def seat_kept_for(self, person: str) -> str | None:
         """Return the seat that a person had and may take again; None if there is none."""
         return next((name for name, tenant in self.tenants.items()
-                     if tenant.person.id == person and name in self.seats
-                     and self.seats[name]['source'] == COCKPIT), None)
+                     if tenant.person.id == person and self.seats[name].source == COCKPIT), None)
 
     def claim(self, client: str, seat: str, names: Mapping[str, str], *, person: str = '',
               may_displace: bool = True, now_s: float = 0.0) -> HeldSeat:
@@ -115,10 +115,10 @@ class SeatTable:
         return holder
 
     def _check_tenant(self, seat: str, person: str, may_displace: bool, now_s: float) -> None:
-        tenant = self.tenants.get(seat)
-        if tenant is None or tenant.person.id == person or self.seats[seat]['source'] != COCKPIT:
+        entry = self.seats[seat]
+        if entry.person is None or entry.person.id == person or entry.source != COCKPIT:
             return
-        name = tenant.person.name or 'another person'
+        name = entry.person.name or 'another person'
         if seat not in self.absent_s:
             raise InputError(f'{name} drives in another cockpit', seat, 'ask them')
         left_s = self.kept_for(seat, now_s)
@@ -139,10 +139,10 @@ class SeatTable:
         holder = self.held.get(seat)
         if holder is not None and holder.holder != client:
             raise InputError('another person has the seat', seat, 'ask for it')
-        if holder is None and entry.get('source') != COCKPIT:
+        if holder is None and entry.source != COCKPIT:
             raise InputError('no person at this cockpit has the seat', seat)
-        if holder is None and seat in self.tenants and seat not in self.absent_s:
-            raise InputError(f'{self.tenants[seat].person.name} drives in another cockpit', seat)
+        if holder is None and entry.person is not None and seat not in self.absent_s:
+            raise InputError(f'{entry.person.name} drives in another cockpit', seat)
         return self.held.pop(seat, None)
 
     def offer(self, client: str, seat: str, to: str) -> HeldSeat:
@@ -220,11 +220,11 @@ class SeatTable:
 
     def _entry(self, name: str, names: Mapping[str, str], lost: Mapping[str, bool],
                now_s: float) -> dict[str, Any]:
-        entry, held, tenant = self.seats[name], self.held.get(name), self.tenants.get(name)
+        entry, held = self.seats[name], self.held.get(name)
         content: dict[str, Any] = {
-            'source': entry.get('source', ''), 'driver': short_source(entry.get('driver', '')),
+            'source': entry.source, 'driver': short_source(entry.driver),
             'holder': None, 'holder_name': None, 'requests': [], 'others': [], 'kept': None,
-            'offer': None, 'ready': tenant is not None and tenant.here and tenant.ready,
+            'offer': None, 'ready': entry.here and entry.ready,
             'device': '', 'lost': lost.get(name, False)}
         if held is not None:
             content |= {
@@ -234,17 +234,17 @@ class SeatTable:
                                    and item not in held.requests), names)}
             if held.offered_to is not None:
                 content['offer'], = _people([held.offered_to], names)
-        elif tenant is not None and entry.get('source') == COCKPIT:
+        elif entry.person is not None and entry.source == COCKPIT:
             left_s = math.ceil(self.kept_for(name, now_s))
             if name not in self.absent_s:
-                content |= {'holder': tenant.person.id, 'holder_name': tenant.person.name}
+                content |= {'holder': entry.person.id, 'holder_name': entry.person.name}
             elif left_s:
-                content['kept'] = {'name': tenant.person.name, 'for_s': left_s}
-        if tenant is not None and content['holder'] is not None:
-            content['device'] = tenant.person.device
+                content['kept'] = {'name': entry.person.name, 'for_s': left_s}
+        if entry.person is not None and content['holder'] is not None:
+            content['device'] = entry.person.device
         return content
 
-    def _known(self, seat: str) -> dict[str, str]:
+    def _known(self, seat: str) -> SeatEntry:
         if seat not in self.seats:
             raise InputError('there is no such seat', str(seat)[:40],
                              'it has ' + ', '.join(self.seats))

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 from crgame_ros.errors import InputError, short
 from crgame_ros.game.traffic_spec import ReactionTime, Share, SpeedFactor
 from crgame_ros.schema.declaration import Form
+from crgame_ros.schema.document_marks import Otherwise
 from crgame_ros.schema.marks import Advice, Keyed, Listed, Named, Parts, Within, Wording
 
 MAX_EVENTS = 100
@@ -303,7 +304,7 @@ class FiredEvent:
     name: str
     n: int
     k: int
-    by: FiredBy
+    by: Annotated[FiredBy, Otherwise('condition')]
 
     @classmethod
     def contact(cls, vehicle_id: str, other_id: str, n: int, k: int) -> 'FiredEvent':

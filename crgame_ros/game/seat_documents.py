@@ -2,21 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The persons in seats as JSON text: parts of `/seats`, `/seats/order` and `/seats/drivers`."""
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-import json
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated
 
 from annotated_types import Len, Predicate
-from crgame_ros.errors import InputError
 from crgame_ros.game.driven_vehicle import VehicleId
 from crgame_ros.game.game import MAX_VEHICLES
-from crgame_ros.schema.bounded import Bounded, Exact
-from crgame_ros.schema.json_documents import DocumentReader
+from crgame_ros.schema.document_marks import Bounded, Exact
+from crgame_ros.schema.json_documents import JsonDocument
 
-SEATS_TOPIC = '/seats'
-ORDER_TOPIC = '/seats/order'
-DRIVERS_TOPIC = '/seats/drivers'
 MAX_SOURCE_LENGTH = 40
 # Printable, in one line.
 SourceName = Annotated[str, Len(1, MAX_SOURCE_LENGTH), Predicate(str.isprintable)]
@@ -77,6 +71,11 @@ class SeatDemand:
     left: str | None = None
     ready: Annotated[bool, Exact()] | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse an order without content."""
+        if (self.source, self.person, self.left, self.ready) == (None,) * 4:
+            raise ValueError('should order something')
+
 
 @dataclass
 class DrivingSpell:
@@ -99,17 +98,29 @@ class DrivingSpell:
     until_n: int | None = None
 
 
-def seat_entry(source: str, driver: str, tenant: SeatOccupant | None) -> dict[str, Any]:
-    """Return a seat's entry of `/seats`."""
-    entry: dict[str, Any] = {'source': source, 'driver': driver}
-    if tenant is not None:
-        entry.update(person=asdict(tenant.person), here=tenant.here, ready=tenant.ready)
-    return entry
+@dataclass(frozen=True)
+class DrivingSpells:
+    """
+    Who has driven in a run so far.
+
+    :param epoch: of the run.
+    :param drivers: their spells, in order.
+    """
+
+    epoch: int
+    drivers: Annotated[tuple[DrivingSpell, ...], Bounded(100_000)]
 
 
 @dataclass(frozen=True)
-class _SeatEntry:
-    """An entry of `/seats`; without a person, nobody has sat there."""
+class SeatEntry:
+    """
+    A seat at present.
+
+    :param source: the source of its commands.
+    :param driver: the driver source named by the game.
+    :param person: the present or last occupant; None if nobody has sat there.
+    :param here: as in `SeatOccupant`, as is `ready`.
+    """
 
     source: str
     driver: str
@@ -117,67 +128,15 @@ class _SeatEntry:
     here: Annotated[bool, Exact()] = False
     ready: Annotated[bool, Exact()] = False
 
-
-_SEATS: DocumentReader[dict[str, _SeatEntry]] = DocumentReader(
-    Annotated[dict[VehicleId, _SeatEntry], Bounded(MAX_VEHICLES)], SEATS_TOPIC, 'list of seats')
-
-
-def parse_seats(text: str) -> tuple[dict[str, dict[str, str]], dict[str, SeatOccupant]]:
-    """
-    Read `/seats`.
-
-    :return: source and driver of each seat, and its present or last occupant, by vehicle.
-    :raises InputError: if it does not follow the contract.
-    """
-    entries = _SEATS.read(text)
-    return ({name: {'source': entry.source, 'driver': entry.driver}
-             for name, entry in entries.items()},
-            {name: SeatOccupant(entry.person, entry.here, entry.ready)
-             for name, entry in entries.items() if entry.person is not None})
+    @property
+    def occupant(self) -> SeatOccupant | None:
+        """Return the present or last occupant."""
+        return None if self.person is None else SeatOccupant(self.person, self.here, self.ready)
 
 
-def demand_text(demand: SeatDemand) -> str:
-    """Return an order as JSON."""
-    content = {key: value for key, value in asdict(demand).items() if value is not None}
-    return json.dumps(content)
-
-
-def parse_demand(text: str) -> SeatDemand:
-    """
-    Read an order.
-
-    :raises InputError: if it is malformed.
-    """
-    demand = _DEMAND.read(text)
-    if (demand.source, demand.person, demand.left, demand.ready) == (None,) * 4:
-        raise InputError('is no order', ORDER_TOPIC, 'give seat and source')
-    return demand
-
-
-_DEMAND: DocumentReader[SeatDemand] = DocumentReader(
-    SeatDemand, ORDER_TOPIC, 'order', 'give seat and source')
-
-
-@dataclass(frozen=True)
-class _Spells:
-    epoch: int
-    drivers: Annotated[tuple[DrivingSpell, ...], Bounded(100_000)]
-
-
-_SPELLS: DocumentReader[_Spells] = DocumentReader(_Spells, DRIVERS_TOPIC, 'list of drivers')
-
-
-def spells_document(epoch: int, spells: Iterable[DrivingSpell]) -> str:
-    """Return the text of `/seats/drivers`."""
-    return json.dumps(asdict(_Spells(epoch, tuple(spells))))
-
-
-def parse_spells(text: str) -> tuple[int, tuple[DrivingSpell, ...]]:
-    """
-    Read `/seats/drivers`.
-
-    :return: the epoch, and its driving spells.
-    :raises InputError: if it is not what `spells_document` writes.
-    """
-    found = _SPELLS.read(text)
-    return found.epoch, found.drivers
+SEATS: JsonDocument[dict[str, SeatEntry]] = JsonDocument(
+    Annotated[dict[VehicleId, SeatEntry], Bounded(MAX_VEHICLES)], '/seats', 'list of seats')
+ORDER: JsonDocument[SeatDemand] = JsonDocument(
+    SeatDemand, '/seats/order', 'order', 'give seat and source')
+DRIVERS: JsonDocument[DrivingSpells] = JsonDocument(
+    DrivingSpells, '/seats/drivers', 'list of drivers')

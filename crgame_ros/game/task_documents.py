@@ -2,20 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The messages about tasks between the simulation and pages: log, state and reports."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-import json
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from annotated_types import Interval, Len
 from crgame_ros.game.driven_vehicle import VehicleId
 from crgame_ros.game.task_spec import TaskKind
-from crgame_ros.schema.bounded import Bounded, Exact
-from crgame_ros.schema.json_documents import DocumentReader
+from crgame_ros.schema.document_marks import Bounded, Exact
+from crgame_ros.schema.json_documents import JsonDocument
 
-LOG_TOPIC = '/tasks/log'
-STATE_TOPIC = '/tasks/state'
-REPORT_TOPIC = '/tasks/report'
 MAX_NUMBER = 1_000_000
 # Longest time in a page's report [ms].
 LONGEST_MS = 600_000.0
@@ -114,7 +109,14 @@ class TaskReport:
 
 
 @dataclass(frozen=True)
-class _Log:
+class TaskLog:
+    """
+    What is new in the tasks of a run.
+
+    :param epoch: of the run.
+    :param entries: of one step, in order.
+    """
+
     epoch: int
     entries: Annotated[tuple[TaskEntry, ...], Bounded(10_000)]
 
@@ -122,7 +124,7 @@ class _Log:
 @dataclass(frozen=True)
 class TaskState:
     """
-    The content of `/tasks/state`.
+    The running tasks and open prompts of a run.
 
     :param epoch: of the run.
     :param running: names of the running tasks.
@@ -134,50 +136,7 @@ class TaskState:
     open: Annotated[tuple[OpenPrompt, ...], Bounded(10_000)]  # noqa: A003
 
 
-_LOG: DocumentReader[_Log] = DocumentReader(_Log, LOG_TOPIC, 'log of tasks')
-_STATE: DocumentReader[TaskState] = DocumentReader(TaskState, STATE_TOPIC, 'state of tasks')
-_REPORT: DocumentReader[TaskReport] = DocumentReader(TaskReport, REPORT_TOPIC, 'report of a page')
-
-
-def log_document(epoch: int, entries: Sequence[TaskEntry]) -> str:
-    """Return the text of `/tasks/log`: the entries of one step."""
-    return json.dumps(asdict(_Log(epoch, tuple(entries))))
-
-
-def parse_log(text: str) -> tuple[int, tuple[TaskEntry, ...]]:
-    """
-    Read `/tasks/log`.
-
-    :return: the epoch, and the entries, in order.
-    :raises InputError: if it is not what `log_document` writes.
-    """
-    found = _LOG.read(text)
-    return found.epoch, found.entries
-
-
-def state_document(state: TaskState) -> str:
-    """Return the text of `/tasks/state`."""
-    return json.dumps(asdict(state))
-
-
-def parse_state(text: str) -> TaskState:
-    """
-    Read `/tasks/state`.
-
-    :raises InputError: if it is not what `state_document` writes.
-    """
-    return _STATE.read(text)
-
-
-def report_text(report: TaskReport) -> str:
-    """Return the text of `/tasks/report`."""
-    return json.dumps(asdict(report))
-
-
-def parse_report(text: str) -> TaskReport:
-    """
-    Read `/tasks/report`.
-
-    :raises InputError: if it is not what `report_text` writes.
-    """
-    return _REPORT.read(text)
+TASK_LOG: JsonDocument[TaskLog] = JsonDocument(TaskLog, '/tasks/log', 'log of tasks')
+TASK_STATE: JsonDocument[TaskState] = JsonDocument(TaskState, '/tasks/state', 'state of tasks')
+TASK_REPORT: JsonDocument[TaskReport] = JsonDocument(
+    TaskReport, '/tasks/report', 'report of a page')

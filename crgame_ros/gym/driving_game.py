@@ -10,6 +10,7 @@ from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.drivability.permanent_obstacles import PERMANENT_OBSTACLE, PermanentObstacles
 from crgame_ros.driver.source import DriverSource
 from crgame_ros.errors import InputError
+from crgame_ros.game.driven_vehicle import DrivenHuman
 from crgame_ros.game.objects import ObjectStates
 from crgame_ros.geometry.outline import Footprint, Primitive
 from crgame_ros.geometry.reference_point import shifted
@@ -30,7 +31,7 @@ from crgame_ros.roads.boundary import RoadBoundary
 from crgame_ros.simulation.engine import Simulation, StepResult
 from crgame_ros.simulation.observer import RunObserver
 from crgame_ros.simulation.offline import offline_driver, perceive, PlannerSeat, show
-from crgame_ros.simulation.setup import AvSetup, HumanSetup, Setup
+from crgame_ros.simulation.setup import AvSetup, Setup
 from crgame_ros.timing.publishing import steps_between_messages
 from crgame_ros.vehicle.driver_command import DriverCommand
 from crgame_ros.vehicle.state import VehicleState
@@ -151,7 +152,7 @@ class AgentSeat:
 
     id: str  # noqa: A003
     row: int
-    vehicle: HumanSetup | AvSetup
+    vehicle: DrivenHuman | AvSetup
     view: SeatView
     guide: RouteGuide
     inverse: PedalInverse

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, TypeVar
 
 from crgame_ros.drivability.monitor import road_transforms
 from crgame_ros.errors import InputError
+from crgame_ros.game.driven_vehicle import DrivenHuman
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game, HumanSpec
 from crgame_ros.geometry.rigid_transform import RigidTransform
@@ -17,12 +18,12 @@ from crgame_ros.paths import scenarios_directory
 from crgame_ros.policy.route_guide import RouteGuide
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Within
-from crgame_ros.simulation.setup import AvSetup, build_setup, HumanSetup, Setup
+from crgame_ros.simulation.setup import AvSetup, build_setup, Setup
 from crgame_ros.simulation.traffic_setup import TrafficSetup
 from crgame_ros.vehicle.state import VehicleState
 import numpy as np
 
-Vehicle = TypeVar('Vehicle', HumanSetup, AvSetup)
+Vehicle = TypeVar('Vehicle', AvSetup, DrivenHuman)
 # Upper bound of the seeds that an environment draws for games.
 SEEDS = 2**31
 

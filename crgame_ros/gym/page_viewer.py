@@ -24,11 +24,10 @@ from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.documents import parse_game_document
 from crgame_ros.gym.av_pilot import stacked
 from crgame_ros.gym.driving_game import DrivingGame
 from crgame_ros.messages.status_values import Status
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn
@@ -110,8 +109,7 @@ class PageViewer:
         self._epoch += 1
         self._due_s = time.monotonic()
         setup = game.setup
-        document = parse_game_document(game_document(
-            setup, epoch=self._epoch, clock_offset_ns=0, real_time_factor=1.0))
+        document = describe_game(setup, epoch=self._epoch)
         scene = scene_document(setup.loaded, setup.descriptions, document)
         self._status.begin(setup.vehicle_ids)
         self._status.add(Status('sim_node: run', 0, 'running', {}), 0.0)

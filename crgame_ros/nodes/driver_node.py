@@ -16,8 +16,8 @@ from crgame_ros.driver.source import (
     parse_source,
 )
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import GameDocument, parse_game_document
-from crgame_ros.game.seat_documents import parse_seats
+from crgame_ros.game.documents import GAME, GameDocument
+from crgame_ros.game.seat_documents import SEATS
 from crgame_ros.registry import POLICY
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.device_delay import DeviceDelay
@@ -26,7 +26,7 @@ from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.live_force import LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.seat import GAME
+from crgame_ros.ros.seat import GAME_DRIVER
 from crgame_ros.ros.spinning import PromptNode, spin_promptly
 from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -103,7 +103,7 @@ class DriverNode(PromptNode):
 
     def _on_game(self, message: String) -> None:
         try:
-            game = parse_game_document(message.data)
+            game = GAME.read(message.data)
             human = game.human(self._vehicle_id)
             if human is None:
                 self.get_logger().warning(f'{self._vehicle_id} takes no part in this game')
@@ -146,8 +146,8 @@ class DriverNode(PromptNode):
     def _on_seats(self, message: String) -> None:
         """Stop publishing while another driver has the seat."""
         try:
-            seat = parse_seats(message.data)[0].get(self._vehicle_id)
-            self._silent = seat is not None and seat['source'] != GAME
+            seat = SEATS.read(message.data).get(self._vehicle_id)
+            self._silent = seat is not None and seat.source != GAME_DRIVER
         except InputError as error:
             complain(self, 'seats', str(error))
 
@@ -177,7 +177,7 @@ class DriverNode(PromptNode):
         scheduler = self._game.scheduler
         stamp_ns = scheduler.stamp_ns(self._cycle)
         command = self._driver.command(self._cycle, scheduler.dt_s)
-        self._commands.publish(to_joy(command, stamp_ns, GAME))
+        self._commands.publish(to_joy(command, stamp_ns, GAME_DRIVER))
         if self._driver.input_s is not None:
             self._delay.published(self._driver.input_s, time.monotonic(), self._cycle)
             self._driver.input_s = None

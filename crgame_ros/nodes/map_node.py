@@ -5,7 +5,7 @@
 from array import array
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.documents import GAME
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.occupancy.occupancy import OccupancyGrid
 from crgame_ros.occupancy.tiles import TiledOccupancy
@@ -64,7 +64,7 @@ class MapNode(Node):
 
     def _open(self, text: str) -> None:
         """Open the map of a new game; reopen it even if the file is the same."""
-        path = parse_game_document(text).occupancy
+        path = GAME.read(text).occupancy
         if path is None:
             self._clear()
         else:

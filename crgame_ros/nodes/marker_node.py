@@ -6,7 +6,7 @@ from contextlib import suppress
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import parse_signals_document, Signals
+from crgame_ros.game.documents import SIGNALS, Signals
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.world_messages import WorldMessages
 from crgame_ros.nodes.markers.markers import SceneMarkers
@@ -186,7 +186,7 @@ class MarkerNode(Node):
 
     def _read_signals(self, text: str) -> None:
         try:
-            self._shown = parse_signals_document(text)
+            self._shown = SIGNALS.read(text)
         except InputError as error:
             self.get_logger().error(str(error))
 

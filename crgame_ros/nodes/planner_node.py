@@ -7,8 +7,7 @@ import math
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import GameDocument, parse_events_document
-from crgame_ros.game.events import FiredEvent
+from crgame_ros.game.documents import EVENTS, FiredEvents, GameDocument
 from crgame_ros.geometry.rigid_transform import RigidTransform
 from crgame_ros.messages.joint_messages import from_joint_trajectory, MAP
 from crgame_ros.messages.joints import plan_to_joints
@@ -59,7 +58,7 @@ class PlannerNode(Node):
         self._game: GameDocument | None = None
         self._transform = RigidTransform(0.0, 0.0, 0.0)
         self._manager: PlannerManager | None = None
-        self._events: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
+        self._events = FiredEvents(-1, ())
         self._reader: RequestReader | None = None
         self._frames_skipped = False
         self._message: SeriesMessage | None = None
@@ -90,7 +89,7 @@ class PlannerNode(Node):
 
     def _on_events(self, message: String) -> None:
         try:
-            self._events = parse_events_document(message.data)
+            self._events = EVENTS.read(message.data)
         except InputError as error:
             self._refusals.note('/scenario/events', str(error))
             return
@@ -98,10 +97,9 @@ class PlannerNode(Node):
 
     def _apply_events(self) -> None:
         """Apply the events of the present run to the planner."""
-        epoch, fired = self._events
-        if self._manager is None or self._game is None or epoch != self._game.epoch:
+        if self._manager is None or self._game is None or self._events.epoch != self._game.epoch:
             return
-        for text in self._manager.apply([event.name for event in fired]):
+        for text in self._manager.apply([event.name for event in self._events.fired]):
             self.get_logger().info(f'{self._vehicle_id}: {text} by an event')
 
     def _on_frame_skip(self, message: Bool) -> None:

@@ -9,13 +9,7 @@ from pathlib import Path
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import (
-    GAME_TOPIC,
-    GameDocument,
-    parse_game_document,
-    parse_run_state,
-    RUN_STATE_TOPIC,
-)
+from crgame_ros.game.documents import GAME, GameDocument, RUN_STATE
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.contract import load_contract, Topic
 from crgame_ros.paths import numbered
@@ -134,7 +128,7 @@ class RecorderNode(Node):
             self._write_waiting(self._topics[CLOCK_TOPIC])
         # The game is read last, so that a new bag begins with the documents that belong to it.
         latched = [recorded for recorded in self._topics.values() if recorded.latched]
-        for recorded in sorted(latched, key=lambda item: item.name == GAME_TOPIC):
+        for recorded in sorted(latched, key=lambda item: item.name == GAME.topic):
             self._write_waiting(recorded)
         if self._writer is not None:
             try:
@@ -153,14 +147,14 @@ class RecorderNode(Node):
         if self._ended_s is None:
             return
         # If others speak of runs, only a silent clock proves the end, even on a busy machine.
-        drain_s = SILENCE_S if self._several_publish(RUN_STATE_TOPIC) else DRAIN_S
+        drain_s = SILENCE_S if self._several_publish(RUN_STATE.topic) else DRAIN_S
         if time.monotonic() - self._ended_s <= drain_s:
             return
         if self._moved_s - self._ended_s > 0.5 * DRAIN_S:
             # The last cycles come just after the end; these come later.
             self._ended_s = None
             self._endpoints.refusals.note(
-                RUN_STATE_TOPIC, f'{RUN_STATE_TOPIC}: the end of a run that goes on')
+                RUN_STATE.topic, f'{RUN_STATE.topic}: the end of a run that goes on')
             return
         self._close()
 
@@ -201,13 +195,13 @@ class RecorderNode(Node):
                 published_ns, received_ns, time.time_ns(), time.monotonic_ns())
             if recorded.latched:
                 before, recorded.latest = recorded.latest, (data, published_ns, received_ns)
-                if recorded.name == GAME_TOPIC and data != self._game_text:
+                if recorded.name == GAME.topic and data != self._game_text:
                     self._begin_bag(data)
                     if data != self._game_text:
                         # Refused: a later part begins with the game of the run.
                         recorded.latest = before
                     continue
-                if recorded.name == RUN_STATE_TOPIC:
+                if recorded.name == RUN_STATE.topic:
                     self._note_end(data)
             elif recorded.name == CLOCK_TOPIC:
                 self._heard_s = time.monotonic()
@@ -249,9 +243,9 @@ class RecorderNode(Node):
     def _note_end(self, data: bytes) -> None:
         """Note the end of the run; a late message may report that of the previous run."""
         try:
-            state = parse_run_state(deserialize_message(data, String).data)
+            state = RUN_STATE.read(deserialize_message(data, String).data)
         except InputError as error:
-            self._endpoints.refusals.note(RUN_STATE_TOPIC, str(error))
+            self._endpoints.refusals.note(RUN_STATE.topic, str(error))
             return
         run = state.simulation, state.epoch
         if state.state != 'ended':
@@ -273,12 +267,12 @@ class RecorderNode(Node):
         """
         try:
             # Parsed before the bag is closed: an invalid game must not end the recording.
-            game = parse_game_document(deserialize_message(game_data, String).data)
+            game = GAME.read(deserialize_message(game_data, String).data)
             offset_ns = game.scheduler.clock_offset_ns
             if self._goes_on and (offset_ns <= self._offset_ns
-                                  or self._several_publish(GAME_TOPIC)):
+                                  or self._several_publish(GAME.topic)):
                 self._endpoints.refusals.note(
-                    GAME_TOPIC, f'{GAME_TOPIC}: another game of a run that goes on')
+                    GAME.topic, f'{GAME.topic}: another game of a run that goes on')
                 return
             self._close()
             self._game_text, self._run = game_data, (game.simulation, game.epoch)
@@ -375,8 +369,8 @@ def _simulation_in(bag: Path) -> str | None:
     """Return the simulation whose run is in a bag; None if it has not come that far."""
     try:
         with BagReader(bag) as reader:
-            for message in reader.decoded([GAME_TOPIC]):
-                return parse_game_document(message.message.data).simulation
+            for message in reader.decoded([GAME.topic]):
+                return GAME.read(message.message.data).simulation
     except InputError:
         pass
     return None

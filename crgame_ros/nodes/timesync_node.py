@@ -5,7 +5,7 @@
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import GameDocument, parse_game_document
+from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.game import TimingSpec
 from crgame_ros.ros.complaints import complain
 from crgame_ros.ros.endpoints import Endpoints
@@ -81,7 +81,7 @@ class TimesyncNode(Node):
 
     def _begin(self, text: str) -> None:
         try:
-            self._game = parse_game_document(text)
+            self._game = GAME.read(text)
             self._time = RunTime()
             self._begin_anew(self._game)
         except (CrgameError, TypeError) as error:

@@ -6,8 +6,8 @@ import gc
 import time
 
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import parse_events_document
-from crgame_ros.game.events import FiredEvent, TrafficOrder
+from crgame_ros.game.documents import EVENTS, FiredEvents
+from crgame_ros.game.events import TrafficOrder
 from crgame_ros.game.objects import ObjectStates, Role
 from crgame_ros.game.traffic_spec import TrafficSpec
 from crgame_ros.messages.joints import object_joint_names
@@ -56,7 +56,7 @@ class TrafficNode(Node):
         self._traffic: Traffic | None = None
         self._k = 0
         self._ticks = 0
-        self._fired: tuple[int, tuple[FiredEvent, ...]] = (-1, ())
+        self._events_so_far = FiredEvents(-1, ())
         self._obeyed: set[str] = set()
 
     def run(self, stop: StopFlag) -> None:
@@ -85,7 +85,7 @@ class TrafficNode(Node):
     def _knows_the_events(self) -> bool:
         """Return whether this run's events have been received, which agents need to continue."""
         game = self._scenario.game if self._scenario is not None else None
-        return game is None or not game.events or self._fired[0] == game.epoch
+        return game is None or not game.events or self._events_so_far.epoch == game.epoch
 
     def _begin_anew(self) -> None:
         """Restart the same run."""
@@ -94,7 +94,7 @@ class TrafficNode(Node):
 
     def _receive_events(self, text: str) -> None:
         try:
-            self._fired = parse_events_document(text)
+            self._events_so_far = EVENTS.read(text)
         except InputError as error:
             self._refusals.note('/scenario/events', str(error))
 
@@ -160,10 +160,10 @@ class TrafficNode(Node):
     def _obey(self, traffic: Traffic, k: int) -> None:
         """Apply the events up to a tick to the agents."""
         assert self._scenario is not None
-        epoch, fired = self._fired
+        events = self._events_so_far
         game = self._scenario.game
         actions = {event.name: event.action for event in game.events}
-        for event in fired if epoch == game.epoch else ():
+        for event in events.fired if events.epoch == game.epoch else ():
             action = actions.get(event.name)
             if event.k <= k and event.name not in self._obeyed \
                     and isinstance(action, TrafficOrder):

@@ -8,13 +8,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import (
-    GAME_TOPIC,
-    GameDocument,
-    OBJECTS_TOPIC,
-    parse_game_document,
-    parse_objects_document,
-)
+from crgame_ros.game.documents import GAME, GameDocument, OBJECTS
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.scenario.loading import scenario_digest
@@ -66,7 +60,7 @@ def epoch_numbers(reader: BagReader) -> tuple[int, ...]:
 
     :raises InputError: if a document is missing.
     """
-    games = _games(_documents(reader)[GAME_TOPIC], reader)
+    games = _games(_documents(reader)[GAME.topic], reader)
     return tuple(dict.fromkeys(game.epoch for _, game in games))
 
 
@@ -78,7 +72,7 @@ def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
     :raises InputError: if a document or the epoch is not in the recording.
     """
     texts = _documents(reader)
-    games = _games(texts[GAME_TOPIC], reader)
+    games = _games(texts[GAME.topic], reader)
     chosen = [index for index, (_, game) in enumerate(games)
               if number is None or game.epoch == number]
     if not chosen:
@@ -92,7 +86,7 @@ def read_epoch(reader: BagReader, number: int | None = None) -> Epoch:
     clock_goes_on = after is not None and _offset(after[1]) > _offset(game)
     return Epoch(
         game, _scenario_of(game, texts[XML_TOPIC], reader),
-        _objects_of(game, texts[OBJECTS_TOPIC], log_ns, reader),
+        _objects_of(game, texts[OBJECTS.topic], log_ns, reader),
         log_ns if began_anew else None,
         _offset(after[1]) if after is not None and clock_goes_on else None,
         after[0] if after is not None and not clock_goes_on else None)
@@ -103,9 +97,9 @@ def _games(texts: Sequence[_Text], reader: BagReader) -> list[tuple[int, GameDoc
     found, refusal = [], None
     for log_ns, text in texts:
         try:
-            found.append((log_ns, parse_game_document(text)))
+            found.append((log_ns, GAME.read(text)))
         except InputError as error:
-            reader.foreign[GAME_TOPIC] += 1
+            reader.foreign[GAME.topic] += 1
             refusal = error
     if refusal is not None and not found:
         raise InputError(refusal.what, f'{reader.path}, {refusal.where}',
@@ -119,7 +113,7 @@ def _offset(game: GameDocument) -> int:
 
 def _documents(reader: BagReader) -> dict[str, list[_Text]]:
     """Read every version of the documents, without immediate repetitions."""
-    texts: dict[str, list[_Text]] = {GAME_TOPIC: [], XML_TOPIC: [], OBJECTS_TOPIC: []}
+    texts: dict[str, list[_Text]] = {GAME.topic: [], XML_TOPIC: [], OBJECTS.topic: []}
     for topic, _, log_time_ns, message in reader.readable(texts):
         texts[topic].append(_Text(log_time_ns, str(message.data)))
     for topic, found in texts.items():
@@ -144,12 +138,12 @@ def _objects_of(game: GameDocument, texts: Sequence[_Text], log_ns: int,
     vehicles = [item.id for item in game.vehicles]
     for _, text in sorted(texts, key=lambda found: abs(found.log_time_ns - log_ns)):
         try:
-            descriptions = parse_objects_document(text)
+            descriptions = OBJECTS.read(text)
         except InputError:
-            reader.foreign[OBJECTS_TOPIC] += 1
+            reader.foreign[OBJECTS.topic] += 1
             continue
         if [item.id for item in descriptions if item.role.is_ego] == vehicles:
             return (*(item for item in descriptions if item.role.is_ego),
                     *(item for item in descriptions if not item.role.is_ego))
-    raise InputError(f'{OBJECTS_TOPIC} is that of another run', str(reader.path),
+    raise InputError(f'{OBJECTS.topic} is that of another run', str(reader.path),
                      'record from before the start of the run')

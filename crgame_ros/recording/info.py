@@ -4,16 +4,19 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-import json
 from pathlib import Path
+from typing import Annotated
 
 from crgame_ros.errors import InputError
+from crgame_ros.game.documents import GAME
+from crgame_ros.game.game import MAX_VEHICLES
 from crgame_ros.recording.metadata import BagTopic
 from crgame_ros.recording.reader import BagReader
+from crgame_ros.schema.document_marks import Bounded
+from crgame_ros.schema.json_documents import JsonDocument
 import numpy as np
 import numpy.typing as npt
 
-_GAME_TOPIC = '/scenario/game'
 _GAME_TYPE = 'std_msgs/msg/String'
 _CYCLE_TOPIC = '/timing/cycle'
 _CYCLE_TYPE = 'std_msgs/msg/Float64MultiArray'
@@ -64,6 +67,31 @@ class GameInfo:
     benchmark_id: str
     humans: tuple[tuple[str, str], ...]
     avs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class _Human:
+    id: str  # noqa: A003
+    driver: str
+
+
+@dataclass(frozen=True)
+class _Av:
+    id: str  # noqa: A003
+    planner: str
+
+
+@dataclass(frozen=True)
+class _Game:
+    """The part of the game document that other versions of this program write as well."""
+
+    benchmark_id: str
+    humans: Annotated[tuple[_Human, ...], Bounded(MAX_VEHICLES)]
+    avs: Annotated[tuple[_Av, ...], Bounded(MAX_VEHICLES)]
+
+
+_GAME: JsonDocument[_Game] = JsonDocument(
+    _Game, GAME.topic, 'game of this program', 'record it again with the present version')
 
 
 @dataclass(frozen=True)
@@ -127,18 +155,16 @@ def _holds(reader: BagReader, topic: str, type_name: str) -> bool:
 
 
 def _read_game(reader: BagReader) -> GameInfo | None:
-    if not _holds(reader, _GAME_TOPIC, _GAME_TYPE):
+    if not _holds(reader, GAME.topic, _GAME_TYPE):
         return None
-    latched = reader.latched(_GAME_TOPIC)
+    latched = reader.latched(GAME.topic)
     try:
-        game = json.loads(latched.message.data) if latched else {}
-        return GameInfo(
-            str(game['benchmark_id']),
-            tuple((str(human['id']), str(human['driver'])) for human in game['humans']),
-            tuple((str(av['id']), str(av['planner'])) for av in game['avs']))
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f'{_GAME_TOPIC} is no game of this program ({error!r})',
-                         str(reader.path), 'record it again with the present version') from error
+        game = _GAME.read(latched.message.data if latched else '')
+    except InputError as error:
+        raise InputError(error.what, f'{reader.path}, {error.where}', error.remedy) from error
+    return GameInfo(
+        game.benchmark_id, tuple((human.id, human.driver) for human in game.humans),
+        tuple((av.id, av.planner) for av in game.avs))
 
 
 def _read_cycles(reader: BagReader) -> CycleInfo | None:

@@ -6,12 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import (
-    EVENTS_TOPIC,
-    GAME_TOPIC,
-    parse_events_document,
-    parse_game_document,
-)
+from crgame_ros.game.documents import EVENTS, GAME
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.recording.reader import BagReader
 
@@ -37,21 +32,21 @@ def read_run_events(path: Path, epoch: int | None = None) -> RecordedEvents:
     """
     games, fired = {}, {}
     with BagReader(path, parts=True) as reader:
-        for topic, _, _, message in reader.readable([GAME_TOPIC, EVENTS_TOPIC]):
+        for topic, _, _, message in reader.readable([GAME.topic, EVENTS.topic]):
             try:
-                if topic == GAME_TOPIC:
-                    game = parse_game_document(message.data)
+                if topic == GAME.topic:
+                    game = GAME.read(message.data)
                     games[game.epoch] = game
                 else:
                     # Each message holds all events since the start of its run.
-                    number, events = parse_events_document(message.data)
-                    fired[number] = events
+                    events = EVENTS.read(message.data)
+                    fired[events.epoch] = events.fired
             except InputError:
                 # The message may come from a foreign publisher.
                 continue
     chosen = max(games, default=None) if epoch is None else epoch
     if chosen is None or chosen not in games:
-        raise InputError('no such run in it' if games else f'no {GAME_TOPIC} in it', str(path),
+        raise InputError('no such run in it' if games else f'no {GAME.topic} in it', str(path),
                          'record all topics, from before the start of the run')
     return RecordedEvents(frozenset(event.name for event in games[chosen].events),
                           fired.get(chosen, ()))

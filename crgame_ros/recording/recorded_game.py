@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import GAME_TOPIC, GameDocument
+from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.events import PlannerSwap
 from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game, PoseSpawn
@@ -51,7 +51,7 @@ def read_recorded_game(bag: Path, *, other_planners: bool = False) -> RecordedGa
     """
     with BagReader(bag) as reader:
         run = read_epoch(reader)
-    where = f'{bag}, {GAME_TOPIC}'
+    where = f'{bag}, {GAME.topic}'
     text = run.game.file
     if not text:
         raise InputError('does not hold the game file', where,

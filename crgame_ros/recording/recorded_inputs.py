@@ -10,14 +10,14 @@ from typing import NamedTuple
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.driver.source import parse_source, SourceSpec
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import GameDocument, parse_game_document
+from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.events import AtStep, FiredEvent
 from crgame_ros.game.game import Game
 from crgame_ros.recording.recorded_events import read_run_events
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.run_cycles import replay_inputs
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.simulation.setup import Setup
 import numpy as np
@@ -103,8 +103,7 @@ def replay_notices(setup: Setup) -> tuple[str, ...]:
         bag = _bag(setup, source)
         recorded = read_game_document(bag)
         _check_same(setup, recorded, bag)
-        present = parse_game_document(game_document(
-            setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+        present = describe_game( setup)
         here, there = (document.human(human.id) for document in (present, recorded))
         other = [name for key, name in (('state', 'start'), ('vehicle', 'vehicle'),
                                         ('dynamics', 'vehicle model'))

@@ -5,18 +5,16 @@
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
-import json
 from pathlib import Path
 import re
 import statistics
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import MALFORMED
 from crgame_ros.game.driven_vehicle import VEHICLE_ID
 from crgame_ros.game.events import FiredEvent
-from crgame_ros.game.seat_documents import DRIVERS_TOPIC, DrivingSpell, parse_spells
-from crgame_ros.game.task_documents import LOG_TOPIC, parse_log, TaskEntry
+from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, ORDER
+from crgame_ros.game.task_documents import TASK_LOG, TaskEntry
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.messages.world_messages import VEHICLES_TOPIC
@@ -33,7 +31,6 @@ from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 import numpy as np
 from numpy.typing import NDArray
 
-SEAT_ORDER_TOPIC = '/seats/order'
 _DIAGNOSTICS = '/diagnostics'
 # Statuses of drivers at pages, and of devices at the game's machine.
 _DRIVER = re.compile('(?:cockpit|driver)_node: (.+) driver')
@@ -49,14 +46,14 @@ def read_task_entries(path: Path, epoch: int) -> tuple[TaskEntry, ...]:
     """
     found: list[TaskEntry] = []
     with BagReader(path, parts=True) as reader:
-        for _, _, _, message in reader.readable([LOG_TOPIC]):
+        for _, _, _, message in reader.readable([TASK_LOG.topic]):
             try:
-                number, entries = parse_log(message.data)
+                log = TASK_LOG.read(message.data)
             except InputError:
                 # The message may come from a foreign publisher.
                 continue
-            if number == epoch:
-                found += entries
+            if log.epoch == epoch:
+                found += log.entries
     return tuple(found)
 
 
@@ -84,13 +81,13 @@ def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, .
     :raises InputError: if there is no such run in it.
     """
     with BagReader(path, parts=True) as reader:
-        topic = reader.topics.get(SEAT_ORDER_TOPIC)
+        topic = reader.topics.get(ORDER.topic)
         if topic is None or not topic.message_count:
             return ()
         run = read_epoch(reader, epoch)
         found: list[SeatOrder] = []
         newest: int | None = None
-        for message in reader.messages([SEAT_ORDER_TOPIC, VEHICLES_TOPIC]):
+        for message in reader.messages([ORDER.topic, VEHICLES_TOPIC]):
             if message.topic == VEHICLES_TOPIC:
                 stamp_ns = header_stamp_ns(message.data)
                 held = run.holds(stamp_ns, message.log_time_ns)
@@ -100,22 +97,13 @@ def read_seat_orders(path: Path, epoch: int | None = None) -> tuple[SeatOrder, .
                 # It came before the run's first state, or belongs to another run.
                 continue
             try:
-                found.append(_order(newest, str(reader.decode(message).message.data)))
+                demand = ORDER.read(str(reader.decode(message).message.data))
             except InputError:
                 # The message may come from a foreign publisher.
                 continue
+            if demand.source is not None and VEHICLE_ID.fullmatch(demand.seat):
+                found.append(SeatOrder(newest, demand.seat, demand.source))
         return tuple(found)
-
-
-def _order(n: int, text: str) -> SeatOrder:
-    try:
-        content = json.loads(text)
-        order = SeatOrder(n, content['seat'], content['source'])
-        if not VEHICLE_ID.fullmatch(order.seat) or not isinstance(order.source, str):
-            raise ValueError('no seat, or no source')
-    except MALFORMED as error:
-        raise InputError('is no order', SEAT_ORDER_TOPIC) from error
-    return order
 
 
 class RecordedDriver(NamedTuple):
@@ -142,16 +130,16 @@ def read_drivers(path: Path, epoch: int | None = None) -> tuple[RecordedDriver, 
     :raises InputError: if there is no such run in it.
     """
     with BagReader(path, parts=True) as reader:
-        topic = reader.topics.get(DRIVERS_TOPIC)
+        topic = reader.topics.get(DRIVERS.topic)
         if topic is None or not topic.message_count:
             return ()
         wanted = read_epoch(reader, epoch).game.epoch
         spells: tuple[DrivingSpell, ...] = ()
         # By seat, person and name of the value.
         delays_ms: dict[tuple[str, str, str], list[float]] = defaultdict(list)
-        for message in reader.messages([DRIVERS_TOPIC, _DIAGNOSTICS]):
+        for message in reader.messages([DRIVERS.topic, _DIAGNOSTICS]):
             content = reader.decode(message).message
-            if message.topic == DRIVERS_TOPIC:
+            if message.topic == DRIVERS.topic:
                 spells = _newer(spells, str(content.data), wanted)
             else:
                 for status in map(read_status, content.status):
@@ -168,11 +156,11 @@ def _newer(spells: tuple[DrivingSpell, ...], text: str,
            wanted: int) -> tuple[DrivingSpell, ...]:
     """Return the driving spells of the wanted run; each message holds all so far."""
     try:
-        epoch, newer = parse_spells(text)
+        newer = DRIVERS.read(text)
     except InputError:
         # The message may come from a foreign publisher.
         return spells
-    return newer if epoch == wanted else spells
+    return newer.drivers if newer.epoch == wanted else spells
 
 
 def _note(delays_ms: list[float], text: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.game.documents import GAME_TOPIC, GameDocument, parse_game_document
+from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.messages.joints import (
@@ -34,7 +34,7 @@ from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.resampling import moved_intervals, resample
 from crgame_ros.recording.run_cycles import cycle_tables, table_of
 from crgame_ros.recording.run_points import read_points, TRAJECTORY
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import OfflineResult
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.vehicle.state import StateColumn
@@ -201,7 +201,7 @@ def _spare_states(points: Mapping[str, Mapping[int, FloatArray]], run: Epoch
         return {TICK_STATES_TOPIC: ticks}
     starts = [vehicle_to_joints(item.state) for item in run.game.vehicles]
     return {TICK_STATES_TOPIC: ticks,
-            GAME_TOPIC: {0: np.array(starts).reshape(-1, 3, 4).swapaxes(0, 1).reshape(3, -1)}}
+            GAME.topic: {0: np.array(starts).reshape(-1, 3, 4).swapaxes(0, 1).reshape(3, -1)}}
 
 
 def _ticks(path: Path, run: Epoch, steps: Mapping[str, IntArray],
@@ -231,7 +231,7 @@ def _cycles(reader: BagReader, run: Epoch, points: Mapping[str, dict[int, FloatA
     if later and strange:
         # Without the next game's document, its states would count as late ones of this run.
         notices.append(f'what was recorded after cycle {last_n} is of another run, whose '
-                       f'{GAME_TOPIC} was not recorded: left out')
+                       f'{GAME.topic} was not recorded: left out')
         for found, n in strange:
             del found[n]
     return table
@@ -308,8 +308,7 @@ def trajectories_of(result: OfflineResult) -> RunTrajectories:
     states, ticks = _on_ticks(result.vehicle_states, ns, result.intervals_s, scheduler,
                               ns[::scheduler.steps_per_tick], notices)
     ks = _ks(scheduler, ticks)
-    game = parse_game_document(
-        game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    game = describe_game(setup)
     return RunTrajectories(
         setup.loaded.xml_text, game, setup.descriptions, ks, states, result.vehicle_states[ticks],
         result.object_poses[:len(ks)].reshape(len(ks), -1, 3),

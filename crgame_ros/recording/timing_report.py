@@ -10,7 +10,7 @@ from typing import Any
 
 from crgame_ros.drivability.monitor import VehicleDrivability
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import EVENTS_TOPIC, parse_events_document
+from crgame_ros.game.documents import EVENTS
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.messages.cdr import header_stamp_ns
 from crgame_ros.messages.joints import vehicles_from_joints
@@ -202,7 +202,7 @@ class _Collector:
         self._requests = {f'/{av}/plan_request': av for av in self.avs}
         self._plans = {f'/{av}/plan': av for av in self.avs}
         self._verdicts = {f'/{vehicle}/drivability': vehicle for vehicle in vehicles}
-        self.topics = (_DIAGNOSTICS, EVENTS_TOPIC, *self._requests, *self._plans, *self._verdicts)
+        self.topics = (_DIAGNOSTICS, EVENTS.topic, *self._requests, *self._plans, *self._verdicts)
         self.violations: list[dict[str, Any]] = []
         self.verdicts: list[VehicleDrivability] = []
         self.fired: tuple[FiredEvent, ...] = ()
@@ -222,7 +222,7 @@ class _Collector:
     def add(self, recorded: BagMessage, reader: BagReader) -> None:
         """Process one message; skip those of other runs and malformed ones."""
         topic, _, log_time_ns, data = recorded
-        if topic == EVENTS_TOPIC:
+        if topic == EVENTS.topic:
             self._add_events(recorded, reader)
             return
         stamp_ns = header_stamp_ns(data)
@@ -248,12 +248,12 @@ class _Collector:
     def _add_events(self, recorded: BagMessage, reader: BagReader) -> None:
         """Store the events since the start of the run; each message holds all of them."""
         try:
-            epoch, fired = parse_events_document(reader.decode(recorded).message.data)
+            events = EVENTS.read(reader.decode(recorded).message.data)
         except InputError:
-            reader.foreign[EVENTS_TOPIC] += 1
+            reader.foreign[EVENTS.topic] += 1
             return
-        if epoch == self._run.game.epoch:
-            self.fired = fired
+        if events.epoch == self._run.game.epoch:
+            self.fired = events.fired
 
     def _add_plan(self, av: str, stamp_ns: int, log_time_ns: int) -> None:
         self._answers[av] += 1

@@ -6,11 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import (
-    GameDocument,
-    parse_game_document,
-    parse_objects_document,
-)
+from crgame_ros.game.documents import GAME, GameDocument, OBJECTS
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario, scenario_digest
@@ -63,9 +59,9 @@ class DocumentCollector:
         :raises InputError: if it cannot be read; the previous one stays.
         """
         if kind == 'game':
-            parse_game_document(text)
+            GAME.read(text)
         elif kind == 'objects':
-            parse_objects_document(text)
+            OBJECTS.read(text)
         self._texts[kind] = text
 
     def complete(self) -> ScenarioSet | None:
@@ -76,10 +72,10 @@ class DocumentCollector:
         """
         if len(self._texts) < len(KINDS) or self._texts == self._given:
             return None
-        game = parse_game_document(self._texts['game'])
+        game = GAME.read(self._texts['game'])
         if scenario_digest(self._texts['xml']) != game.scenario_sha256:
             return None
-        objects = parse_objects_document(self._texts['objects'])
+        objects = OBJECTS.read(self._texts['objects'])
         if [item.id for item in objects if item.role.is_ego] \
                 != [item.id for item in game.vehicles]:
             return None

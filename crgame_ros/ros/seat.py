@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import SeatOccupant
+from crgame_ros.game.seat_documents import SeatEntry, SeatOccupant
 from crgame_ros.ros.endpoints import PolledSubscription
 from crgame_ros.ros.messages import from_joy
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # The driver's process does not need it, and it takes long to
 NS = 1e-9
 # The game's own driver, an AV's planner, and the recorded take-over of an AV; any other source
 # names its own driver.
-GAME = 'game'
+GAME_DRIVER = 'game'
 PLANNER = 'planner'
 REPLAY = 'replay'
 # Commands of its driver that a seat reads in one cycle.
@@ -83,6 +83,14 @@ class Seat:
         """Return the source that drives the vehicle, as in /seats."""
         return REPLAY if self.taken_over_again and self.source == PLANNER else self.source
 
+    @property
+    def entry(self) -> SeatEntry:
+        """Return its entry of `/seats`."""
+        if self.tenant is None:
+            return SeatEntry(self.published_source, self.driver)
+        return SeatEntry(self.published_source, self.driver, self.tenant.person,
+                         self.tenant.here, self.tenant.ready)
+
     def obey(self, source: str, now_ns: int) -> None:
         """
         Accept commands from another source; the last command holds until its first one.
@@ -103,7 +111,7 @@ class Seat:
             self._heard_ns = now_ns
 
     def _is_for_us(self, stamp_ns: int, source: str) -> bool:
-        if (source or GAME) != self.source:
+        if (source or GAME_DRIVER) != self.source:
             self.passed_over += 1
             return False
         # Without a stamp, as from `ros2 topic pub`, a command is meant for now.

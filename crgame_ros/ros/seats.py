@@ -4,24 +4,23 @@
 
 from collections.abc import Iterable, Iterator, MutableMapping
 from dataclasses import replace
-import json
 from typing import TYPE_CHECKING
 
 from crgame_ros.driver.source import COCKPIT, parse_source
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import (
+    DRIVERS,
     DrivingSpell,
+    DrivingSpells,
     MAX_SOURCE_LENGTH,
-    ORDER_TOPIC,
-    parse_demand,
-    seat_entry,
+    ORDER,
     SeatDemand,
     SeatOccupant,
     SeatPerson,
-    spells_document,
+    SEATS,
 )
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, SHARED_DEPTH
-from crgame_ros.ros.seat import GAME, PLANNER, Seat
+from crgame_ros.ros.seat import GAME_DRIVER, PLANNER, Seat
 from crgame_ros.vehicle.driver_command import DriverCommand
 
 if TYPE_CHECKING:  # The driver's process needs neither, and they take half a second to load.
@@ -66,7 +65,7 @@ class SeatSpells:
 
     def document(self) -> str:
         """Return the text of `/seats/drivers`."""
-        return spells_document(self._epoch, self._spells)
+        return DRIVERS.write(DrivingSpells(self._epoch, tuple(self._spells)))
 
     def _begin(self, seat: str, spell: DrivingSpell) -> None:
         if len(self._spells) < MAX_SPELLS:
@@ -155,8 +154,7 @@ class Seats:
 
     def document(self) -> str:
         """Return the text of `/seats`."""
-        return json.dumps({seat.id: seat_entry(seat.published_source, seat.driver, seat.tenant)
-                           for seat in self.all})
+        return SEATS.write({seat.id: seat.entry for seat in self.all})
 
     def driven(self) -> Iterator[Driven]:
         """Yield the driver of each seat, except for AVs that follow their plans."""
@@ -191,10 +189,10 @@ class Seats:
         return changed, refusals
 
     def _obey(self, text: str, now_ns: int) -> bool:
-        demand = parse_demand(text)
+        demand = ORDER.read(text)
         seat = next((item for item in self.all if item.id == demand.seat), None)
         if seat is None:
-            raise InputError(f'there is no seat {demand.seat[:MAX_SOURCE_LENGTH]!r}', ORDER_TOPIC,
+            raise InputError(f'there is no seat {demand.seat[:MAX_SOURCE_LENGTH]!r}', ORDER.topic,
                              'it has ' + ', '.join(item.id for item in self.all))
         before = (seat.source, seat.tenant)
         if demand.source is None:
@@ -208,8 +206,8 @@ class Seats:
     def _assign(self, seat: Seat, source: str, now_ns: int) -> None:
         """Assign a seat to another source."""
         if source == PLANNER != seat.home:
-            raise InputError(f'{seat.id} has no planner', ORDER_TOPIC, 'give game')
-        if source in (GAME, PLANNER):
+            raise InputError(f'{seat.id} has no planner', ORDER.topic, 'give game')
+        if source in (GAME_DRIVER, PLANNER):
             # Returned for good: in the next game its own driver has the seat.
             source = seat.home
             self._sources.pop(seat.id, None)
@@ -225,7 +223,7 @@ class Seats:
         sits = None if seat.tenant is None else seat.tenant.person
         taker = demand.person
         if sits is not None and (taker is None or sits.id not in (taker.id, demand.displaced)):
-            raise InputError(f'{sits.name or "another person"} has {seat.id}', ORDER_TOPIC,
+            raise InputError(f'{sits.name or "another person"} has {seat.id}', ORDER.topic,
                              'ask for it')
         if seat.source != COCKPIT:
             self._assign(seat, COCKPIT, now_ns)
@@ -238,7 +236,7 @@ class Seats:
         """Update the person in a seat."""
         tenant = seat.tenant
         if tenant is None:
-            raise InputError(f'no person has {seat.id}', ORDER_TOPIC, 'claim it')
+            raise InputError(f'no person has {seat.id}', ORDER.topic, 'claim it')
         if demand.left is not None and demand.left == tenant.person.id:
             self._settle(seat, replace(tenant, here=False, ready=False))
         elif demand.person is not None and demand.person.id == tenant.person.id:
@@ -252,4 +250,4 @@ class Seats:
 
 def _home(driver: str) -> str:
     """Return the source name of the game's driver."""
-    return COCKPIT if parse_source(driver).kind == COCKPIT else GAME
+    return COCKPIT if parse_source(driver).kind == COCKPIT else GAME_DRIVER

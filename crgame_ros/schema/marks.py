@@ -37,6 +37,21 @@ class Within:
             return False
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Return the schema of the marked number, for pydantic; in JSON null is infinity."""
+        def check(number: float) -> float:
+            if not self.holds(number):
+                raise ValueError(f'should be a number{self}')
+            return number
+        schema = {'type': 'function-after', 'schema': handler(source),
+                  'function': {'type': 'no-info', 'function': check}}
+        if not self.endless:
+            return schema
+        return {'type': 'function-before', 'schema': schema, 'function': {
+            'type': 'no-info', 'function': lambda given: math.inf if given is None else given},
+            'serialization': {'type': 'function-plain', 'function': lambda number:
+                              None if number == math.inf else number}}
+
     def __str__(self) -> str:
         """Return the allowed numbers, as text after the noun."""
         if self.low == -math.inf and self.high == math.inf:

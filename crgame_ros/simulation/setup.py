@@ -13,7 +13,8 @@ from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.driver.source import load_timeline, parse_source
 from crgame_ros.driver.timeline_file import timeline_text
 from crgame_ros.errors import InputError, one_line
-from crgame_ros.game.game import AvSpec, Game, ModelSpec
+from crgame_ros.game.driven_vehicle import DrivenHuman
+from crgame_ros.game.game import AvSpec, Game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.game.scenario_scheduler import ScenarioScheduler
 from crgame_ros.geometry.rigid_transform import RigidTransform
@@ -50,27 +51,6 @@ SAME_PLACE = 1.0
 # lane, and [rad], which makes the same offset 25 m ahead.
 MAX_DISCREPANCY = 0.5
 MAX_TURN = 0.02
-
-
-@dataclass(frozen=True)
-class HumanSetup:
-    """
-    One human's vehicle, placed.
-
-    :param id: hv0, …
-    :param vehicle: its parameters.
-    :param state: its state at n = 0, rear axle, simulation coordinates.
-    :param driver: the driver source that the game names.
-    :param timeline: text of the scripted timeline, empty for any other source.
-    :param dynamics: the model that moves it; None is the KS model of CRG 2-4.
-    """
-
-    id: str  # noqa: A003
-    vehicle: VehicleParameters
-    state: VehicleState
-    driver: str
-    timeline: str = ''
-    dynamics: ModelSpec | None = None
 
 
 @dataclass(frozen=True)
@@ -125,7 +105,7 @@ class Setup:
     loaded: LoadedScenario
     network: RoadNetwork
     obstacles: ScenarioObstacles
-    humans: tuple[HumanSetup, ...]
+    humans: tuple[DrivenHuman, ...]
     avs: tuple[AvSetup, ...]
     scheduler: ScenarioScheduler
     notices: tuple[str, ...] = ()
@@ -165,7 +145,7 @@ class Setup:
         return RoadBoundary(self.loaded.scenario.lanelet_network)
 
     @property
-    def vehicles(self) -> tuple['HumanSetup | AvSetup', ...]:
+    def vehicles(self) -> tuple[DrivenHuman | AvSetup, ...]:
         """Return the driven vehicles: humans, then AVs."""
         return (*self.humans, *self.avs)
 
@@ -223,7 +203,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
     if network.vehicle_type == 'bicycle':
         notices.append(f'{loaded.source}: no lane is for cars: those for bicycles or people '
                        'count, and vehicles are bicycles unless the game names others')
-    humans: list[HumanSetup] = []
+    humans: list[DrivenHuman] = []
     for spec in game.humans:
         parameters = load_vehicle_parameters(spec.vehicle, network.vehicle_type)
         taken = [human.state for human in humans]
@@ -234,7 +214,7 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
         source = parse_source(spec.driver)
         timeline = timeline_text(load_timeline(source, game.base)) \
             if source.has_timeline else ''
-        humans.append(HumanSetup(spec.id, parameters, state,
+        humans.append(DrivenHuman(spec.id, parameters, state,
                                  _from_anywhere(spec.driver, game.base), timeline,
                                  spec.dynamics))
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)

@@ -10,13 +10,13 @@ from typing import Any
 
 from browser_support import Browser
 from crgame_ros.cockpit.scene import scene_document
-from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.page_libraries import find_libraries
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
 from numpy.typing import NDArray
@@ -88,9 +88,9 @@ def scene_of(path: Path) -> Scene:
     game = load_game(path) if path.suffix == '.yaml' else effective_game(
         RunRequest(scenario=path, driver='idle'))
     setup = build_setup(game)
-    text = game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0)
+    text = GAME.write(describe_game(setup))
     scene: Scene = json.loads(json.dumps(scene_document(
-        setup.loaded, setup.descriptions, parse_game_document(text))))
+        setup.loaded, setup.descriptions, GAME.read(text))))
     return scene
 
 

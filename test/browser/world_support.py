@@ -18,9 +18,8 @@ from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import Command, Control, Rate
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.cockpit.server import create_app, listen
-from crgame_ros.game.documents import parse_game_document
 from crgame_ros.game.file import load_game
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 import numpy as np
@@ -43,8 +42,7 @@ class RecordedRun:
         result = run_offline(setup, duration_s=duration_s)
         self.dt_s = setup.scheduler.dt_s
         self.steps_per_tick = setup.scheduler.steps_per_tick
-        game = parse_game_document(game_document(
-            setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+        game = describe_game( setup)
         self.scene = scene_document(setup.loaded, setup.descriptions, game)
         count, vehicles, columns = result.vehicle_states.shape
         self.states: FloatArray = np.full((count, vehicles, STATE_COLUMNS), np.nan)

@@ -10,13 +10,13 @@ import re
 from typing import Any
 
 from crgame_ros.cockpit.scene import scene_document
-from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game
 from crgame_ros.game.perception_spec import PerceptionSpec, SensorSpec
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
 from crgame_ros.paths import scenarios_directory
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 import numpy as np
 import pytest
@@ -33,9 +33,9 @@ TOLERANCE_M = 0.011
 
 
 def document_of(setup: Setup, **changes: Any) -> dict[str, Any]:
-    text = json.loads(game_document(setup, epoch=3, clock_offset_ns=2_500_000_000,
-                                    real_time_factor=1.0))
-    game = parse_game_document(json.dumps(text | changes))
+    text = json.loads(GAME.write(describe_game(setup, epoch=3, clock_offset_ns=2_500_000_000)))
+    known = {key: value for key, value in (text | changes).items() if value is not None}
+    game = GAME.read(json.dumps(known))
     document = scene_document(setup.loaded, setup.descriptions, game)
     # Parsed as in a browser, which refuses NaN and infinities.
     read: dict[str, Any] = json.loads(json.dumps(document, allow_nan=False))

@@ -8,12 +8,7 @@ from crgame_ros.cockpit.seat_orders import AGAIN_S, GIVE_UP_S, SeatOrders
 from crgame_ros.cockpit.seat_table import KEEP_S, SeatTable
 from crgame_ros.driver.keyboard import KeyboardCycles, KeyState
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import (
-    parse_seats,
-    SeatDemand,
-    SeatOccupant,
-    SeatPerson,
-)
+from crgame_ros.game.seat_documents import SeatDemand, SeatEntry, SeatPerson, SEATS
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
 import pytest
 
@@ -26,8 +21,8 @@ THROTTLE = Input(seat='hv0', keys=(True, False, False, False))
 def table() -> SeatTable:
     """Return seats as /seats has them at the start of a game with one human and one AV."""
     table = SeatTable()
-    table.update({'hv0': {'source': 'game', 'driver': 'keys:/home/me/games/cut_in.keys.yaml'},
-                  'av0': {'source': 'planner', 'driver': 'idm'}})
+    table.update({'hv0': SeatEntry('game', 'keys:/home/me/games/cut_in.keys.yaml'),
+                  'av0': SeatEntry('planner', 'idm')})
     return table
 
 
@@ -77,14 +72,14 @@ def test_an_offer_is_declined_withdrawn_or_ends_with_its_receiver(table: SeatTab
             table.accept('c2', 'hv0')
 
 
-def _driven(person: str = 'p1', here: bool = True) -> tuple[dict, dict[str, SeatOccupant]]:
-    return _seats('cockpit'), {'hv0': SeatOccupant(SeatPerson(person, 'Ada'), here)}
+def _driven(person: str = 'p1', here: bool = True) -> dict[str, SeatEntry]:
+    return {'hv0': SeatEntry('cockpit', 'idle', SeatPerson(person, 'Ada'), here)}
 
 
 def test_a_seat_is_kept_for_an_absent_driver(table: SeatTable) -> None:
     """For a minute only its driver and a director can claim it, then every client can."""
-    seats, tenants = _driven(here=False)
-    table.update(seats, (), tenants)
+    seats = _driven(here=False)
+    table.update(seats)
     table.note_absent({}, 100.0)
     assert table.document(NAMES, {}, 110.5)['seats']['hv0']['kept'] == {
         'name': 'Ada', 'for_s': 50}
@@ -100,8 +95,8 @@ def test_a_seat_is_kept_for_an_absent_driver(table: SeatTable) -> None:
 
 def test_two_cockpits_agree(table: SeatTable) -> None:
     """A driver at the other cockpit has the seat here too, until that driver falls silent."""
-    seats, tenants = _driven()
-    table.update(seats, (), tenants)
+    seats = _driven()
+    table.update(seats)
     table.note_absent({'hv0': False}, 100.0)
     entry = table.document(NAMES, {})['seats']['hv0']
     assert (entry['holder'], entry['holder_name']) == ('p1', 'Ada')
@@ -114,22 +109,22 @@ def test_two_cockpits_agree(table: SeatTable) -> None:
     assert table.document(NAMES, {})['seats']['hv0']['holder'] is None
     assert table.claim('c2', 'hv0', NAMES, person='p2').holder == 'c2'
     # A quicker driver at the other cockpit gets the seat.
-    assert [item.id for item in table.update(seats, (), tenants)] == ['hv0']
+    assert [item.id for item in table.update(seats)] == ['hv0']
 
 
 def test_an_order_in_vain_is_not_repeated() -> None:
     """An order ends when the simulation has given the seat to a driver at another cockpit."""
     orders = SeatOrders()
     demand = SeatDemand('hv0', 'cockpit', SeatPerson('p2'))
-    orders.note(demand, _seats('game'), {}, 0.0)
-    seats, tenants = _driven()
-    orders.answered(seats, tenants)
+    orders.note(demand, _seats('game'), 0.0)
+    seats = _driven()
+    orders.answered(seats)
     assert 'hv0' not in orders
     displacing = SeatDemand('hv0', 'cockpit', SeatPerson('p2'), 'p1')
-    orders.note(displacing, seats, tenants, 0.0)
-    orders.answered(seats, tenants)
+    orders.note(displacing, seats, 0.0)
+    orders.answered(seats)
     assert 'hv0' in orders
-    orders.answered(*_driven('p2'))
+    orders.answered(_driven('p2'))
     assert 'hv0' not in orders
 
 
@@ -141,7 +136,7 @@ def test_release_gives_back(table: SeatTable) -> None:
     assert table.release('c1', 'hv0').id == 'hv0'  # type: ignore[union-attr]
     with pytest.raises(InputError, match='no person at this cockpit has the seat'):
         table.release('c1', 'hv0')
-    table.update({'hv0': {'source': 'cockpit', 'driver': 'idle'}})
+    table.update({'hv0': SeatEntry('cockpit', 'idle')})
     assert table.release('c2', 'hv0') is None
 
 
@@ -166,7 +161,7 @@ def test_unknown_seat_lists_what_there_is(table: SeatTable) -> None:
 def test_vehicles_of_another_game_lose_their_holders(table: SeatTable) -> None:
     """A seat that no longer exists has no holder."""
     table.claim('c1', 'av0', NAMES)
-    assert [seat.id for seat in table.update({'hv0': {'source': 'game', 'driver': 'idle'}})] \
+    assert [seat.id for seat in table.update({'hv0': SeatEntry('game', 'idle')})] \
         == ['av0']
     assert table.held == {}
 
@@ -226,18 +221,18 @@ def test_a_new_run_begins_at_cycle_0() -> None:
     assert seat.command(0, DT).throttle == pytest.approx(1.8 * DT)
 
 
-def _seats(source: str, driver: str = 'idle') -> dict[str, dict[str, str]]:
-    return {'hv0': {'source': source, 'driver': driver}}
+def _seats(source: str, driver: str = 'idle') -> dict[str, SeatEntry]:
+    return {'hv0': SeatEntry(source, driver)}
 
 
 def test_what_was_said_before_an_order_arrived_takes_nothing_away(table: SeatTable) -> None:
     """The seat stays held until the answer arrives; from then on /seats decides."""
     orders = SeatOrders()
     table.claim('c1', 'hv0', NAMES)
-    orders.note(SeatDemand('hv0', 'cockpit'), table.seats, {}, 0.0)
+    orders.note(SeatDemand('hv0', 'cockpit'), table.seats, 0.0)
     for source, awaited, held in (('game', True, True), ('cockpit', False, True),
                                   ('game', False, False)):
-        orders.answered(_seats(source), {})
+        orders.answered(_seats(source))
         table.update(_seats(source), orders)
         assert ('hv0' in orders, 'hv0' in table.held) == (awaited, held)
 
@@ -246,12 +241,12 @@ def test_orders_are_repeated_and_given_up(table: SeatTable) -> None:
     """Orders repeat every 0.5 s for 10 s, as a reset with a big map can block for seconds."""
     orders = SeatOrders()
     taken, given = SeatDemand('hv0', 'cockpit'), SeatDemand('hv0', 'game')
-    orders.note(taken, table.seats, {}, 100.0)
+    orders.note(taken, table.seats, 100.0)
     assert orders.due(100.0 + 0.9 * AGAIN_S) == []
     assert orders.due(100.0 + AGAIN_S) == [taken]
     assert orders.due(100.0 + 1.9 * AGAIN_S) == []
     # The later order counts.
-    orders.note(given, table.seats, {}, 101.0)
+    orders.note(given, table.seats, 101.0)
     assert orders.due(101.0 + AGAIN_S) == [given]
     assert orders.due(101.0 + GIVE_UP_S) == [] and 'hv0' not in orders
 
@@ -263,11 +258,11 @@ def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: s
     """The simulation sends no answer if the seat does not change."""
     orders = SeatOrders()
     demand = SeatDemand('hv0', ordered)
-    orders.note(demand, _seats(source, driver), {}, 0.0)
+    orders.note(demand, _seats(source, driver), 0.0)
     assert 'hv0' not in orders
-    orders.note(demand, {}, {}, 0.0)
+    orders.note(demand, {}, 0.0)
     assert 'hv0' in orders
-    orders.answered(_seats(source, driver), {})
+    orders.answered(_seats(source, driver))
     assert 'hv0' not in orders
 
 
@@ -279,4 +274,4 @@ def test_what_is_so_already_needs_no_answer(ordered: str, source: str, driver: s
 def test_seats_that_are_none_are_refused(text: str) -> None:
     """A bad name would become a topic, and a missing source an error during the drive."""
     with pytest.raises(InputError, match='/seats: is no list of seats'):
-        parse_seats(text)
+        SEATS.read(text)

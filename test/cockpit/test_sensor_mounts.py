@@ -33,8 +33,8 @@ def vehicle() -> VehicleParameters:
 def mounts(vehicle: VehicleParameters) -> SensorMounts:
     """Mount two sensors on av0, the second of two vehicles."""
     state = VehicleState(0.0, 0.0, 0.0, 0.0)
-    avs = (DrivenAv('av0', vehicle, state, perception=PerceptionSpec(sensors=SENSORS)),
-           DrivenAv('av1', vehicle, state))
+    avs = (DrivenAv('av0', vehicle, state, 'idm', perception=PerceptionSpec(sensors=SENSORS)),
+           DrivenAv('av1', vehicle, state, 'idm'))
     return SensorMounts(avs, {'hv0': 0, 'av0': 1}, DT_S)
 
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import document_entry, parse_document_entries
+from crgame_ros.game.documents import document_entry, EventEntries
 from crgame_ros.game.events import (
     ACTIONS,
     AtStep,
@@ -111,7 +111,7 @@ def test_document_has_the_same_events(tmp_path: Path) -> None:
     assert entries[9] == {'name': 'crawl', 'label': 'crawl', 'kind': 'traffic', 'when': None,
                           'agent': 'all', 'desired_speed': 3.0, 'options': {}}
     assert {entry['kind'] for entry in entries} == ACTIONS.keys()
-    assert parse_document_entries(entries, '/scenario/game') == events
+    assert EventEntries(EventList).read(entries, '/scenario/game') == events
 
 
 @pytest.mark.parametrize(('text', 'message'), [
@@ -187,4 +187,4 @@ def test_names_are_unique_and_lists_short() -> None:
 def test_spoilt_document_is_refused(entries: object) -> None:
     """Malformed content of `/scenario/game` from another process is refused."""
     with pytest.raises(InputError, match='/scenario/game'):
-        parse_document_entries(entries, '/scenario/game')
+        EventEntries(EventList).read(entries, '/scenario/game')

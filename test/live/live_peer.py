@@ -9,7 +9,7 @@ import time
 from types import TracebackType
 from typing import Any, Self
 
-from crgame_ros.game.documents import GameDocument, parse_game_document
+from crgame_ros.game.documents import GAME, GameDocument
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time
 from crgame_ros.timing.cycle_rows import CycleTable
@@ -29,7 +29,7 @@ from std_srvs.srv import Trigger
 
 QUEUE_DEPTH = 5000
 # A test that waits asks for the games a hundred times a second.
-_parsed = lru_cache(parse_game_document)
+_parsed = lru_cache(GAME.read)
 
 
 class Peer:

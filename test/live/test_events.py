@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from crgame_ros.game.documents import parse_events_document
+from crgame_ros.game.documents import EVENTS
 from crgame_ros.game.events import AtStep, FiredEvent
 from crgame_ros.game.file import load_game
 from crgame_ros.recording.recorded_events import read_run_events
@@ -40,9 +40,9 @@ class Stage(NamedTuple):
     @property
     def fired(self) -> tuple[FiredEvent, ...]:
         """Return what has taken effect in the present epoch, as published last."""
-        epoch, fired = parse_events_document(self.peer.messages['/scenario/events'][-1].data)
-        assert epoch == self.peer.games[-1].epoch
-        return fired
+        events = EVENTS.read(self.peer.messages['/scenario/events'][-1].data)
+        assert events.epoch == self.peer.games[-1].epoch
+        return events.fired
 
     def press(self, *names: str) -> None:
         """Trigger events and wait until they have taken effect."""
@@ -69,7 +69,7 @@ def graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launcher, 
 
 def _epoch_of_events(peer: Peer) -> int:
     """Return the epoch of the newest list of fired events."""
-    return parse_events_document(peer.messages['/scenario/events'][-1].data)[0]
+    return EVENTS.read(peer.messages['/scenario/events'][-1].data).epoch
 
 
 @pytest.fixture

@@ -11,13 +11,13 @@ from typing import Any
 
 from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
-from crgame_ros.game.documents import events_document, objects_document
+from crgame_ros.game.documents import EVENTS, FiredEvents, GAME, OBJECTS
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names, vehicle_to_joints
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.metadata import TopicQos
 from crgame_ros.recording.writer import BagWriter
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleRows
@@ -145,11 +145,12 @@ class RunRecorder:
         setup = result.setup
         scheduler = replace(setup.scheduler, clock_offset_ns=offset_ns)
         texts = {'/scenario/xml': setup.loaded.xml_text,
-                 '/scenario/objects': objects_document(setup.descriptions),
-                 '/scenario/game': game_document(
-                     setup, epoch=epoch, clock_offset_ns=offset_ns, real_time_factor=1.0)}
+                 '/scenario/objects': OBJECTS.write(setup.descriptions),
+                 '/scenario/game': GAME.write(describe_game(
+                     setup, epoch=epoch, clock_offset_ns=offset_ns))}
         if setup.game.events:
-            texts['/scenario/events'] = events_document(epoch, result.fired)
+            texts['/scenario/events'] = EVENTS.write(
+                FiredEvents(epoch, tuple(result.fired)))
         found = [(topic, 'std_msgs/msg/String', log_ns, self._samples.string(text))
                  for topic, text in texts.items()]
         names = [name for item in setup.vehicle_ids for name in vehicle_joint_names(item)]

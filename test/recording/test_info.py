@@ -117,7 +117,7 @@ def test_empty_recording(tmp_path: Path, samples: Any) -> None:
 def test_game_of_another_make_is_refused(tmp_path: Path, samples: Any, text: str) -> None:
     """The message names the topic instead of a traceback."""
     folder = record(tmp_path / 'run', samples, [('/scenario/game', STRING, samples.string(text))])
-    with pytest.raises(InputError, match='/scenario/game is no game of this program'):
+    with pytest.raises(InputError, match='/scenario/game: is no game of this program'):
         describe(folder)
 
 

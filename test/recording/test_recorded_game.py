@@ -11,7 +11,7 @@ from typing import Any
 from crgame_ros.cli import main
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import GAME_TOPIC
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, ModelSpec, PoseSpawn
 from crgame_ros.launcher.arguments import RunRequest
@@ -168,7 +168,7 @@ def test_recording_without_its_game_file_is_refused(tmp_path: Path, recorder: An
     """For a recording of an earlier version or another program a game must be named."""
     messages = []
     for topic, kind, log_ns, data in recorder.messages(drive('ZAM_CutIn-1_1_T-1.xml')):
-        if topic == GAME_TOPIC:
+        if topic == GAME.topic:
             text = samples.store.deserialize_cdr(data, kind).data
             data = samples.string(json.dumps(
                 {key: value for key, value in json.loads(text).items() if key != 'file'}))

@@ -10,12 +10,12 @@ from typing import Any
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.hub import Hub
 from crgame_ros.cockpit.page_messages import parse_message
-from crgame_ros.game.documents import objects_document
-from crgame_ros.game.seat_documents import seat_entry, SeatOccupant, SeatPerson
+from crgame_ros.game.documents import GAME, OBJECTS
+from crgame_ros.game.seat_documents import SeatEntry, SeatPerson, SEATS
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes.cockpit.backend import LiveBackend
 from crgame_ros.ros.messages import StateMessage
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import Setup
 from live_peer import Peer
 import numpy as np
@@ -69,9 +69,8 @@ class Graph:
 
     async def begin(self, setup: Setup, epoch: int = 0) -> None:
         """Publish the documents of a game, and wait for its scene."""
-        texts = {'xml': setup.loaded.xml_text, 'objects': objects_document(setup.descriptions),
-                 'game': game_document(setup, epoch=epoch, clock_offset_ns=OFFSET_NS,
-                                       real_time_factor=1.0)}
+        texts = {'xml': setup.loaded.xml_text, 'objects': OBJECTS.write(setup.descriptions),
+                 'game': GAME.write(describe_game(setup, epoch=epoch, clock_offset_ns=OFFSET_NS))}
         await self.meet(*((f'/scenario/{name}', '') for name in texts), ('/seats', ''))
         for name, text in texts.items():
             await self.say(f'/scenario/{name}', String(data=text))
@@ -79,10 +78,10 @@ class Graph:
 
     async def seats(self, source: str, driver: str = SCRIPT, page: Client | None = None) -> None:
         """Publish the driver of hv0, with the person at a page if there is one."""
-        tenant = None if page is None else SeatOccupant(SeatPerson(page.person))
-        await self.say('/seats', String(data=json.dumps({
-            'hv0': seat_entry(source, driver, tenant),
-            'av0': {'source': 'planner', 'driver': 'idm'}})))
+        person = None if page is None else SeatPerson(page.person)
+        await self.say('/seats', String(data=SEATS.write({
+            'hv0': SeatEntry(source, driver, person, here=page is not None),
+            'av0': SeatEntry('planner', 'idm')})))
         await self.until(lambda: self.seat().get('source') == source, f'/seats: {source}')
 
     async def state(self, setup: Setup, n: int) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from cockpit_graph import Graph, lived, OFFSET_NS
 from crgame_ros.cockpit.page_messages import SeenView, Sound
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import events_document
+from crgame_ros.game.documents import EVENTS, FiredEvents
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.status_values import read_status
@@ -242,11 +242,11 @@ def test_events_and_signals_are_passed_on(setup: Setup) -> None:
         await graph.begin(setup)
         before = graph.scene
         fired = FiredEvent('box', 30, 3, 'trigger')
-        await graph.say('/scenario/events', String(data=events_document(7, [fired])))
+        await graph.say('/scenario/events', String(data=EVENTS.write(FiredEvents(7, (fired,)))))
         await graph.pause(0.3)
         assert graph.document('events')['fired'] == []
-        await graph.say('/scenario/events', String(data=events_document(
-            0, [replace(fired, name='rain')])))
+        await graph.say('/scenario/events', String(data=EVENTS.write(
+            FiredEvents(0, (replace(fired, name='rain'),)))))
         await graph.until(lambda: graph.document('events')['fired'], 'the event')
         assert graph.document('events')['fired'] == [
             {'name': 'rain', 'n': 30, 'k': 3, 'by': 'trigger'}]

@@ -8,6 +8,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names
 from crgame_ros.occupancy.command import write_map
@@ -15,7 +16,7 @@ from crgame_ros.occupancy.map_file import RasterSpec
 from crgame_ros.occupancy.rasterize import Raster
 from crgame_ros.occupancy.tiles import TiledOccupancy
 from crgame_ros.scenario.loading import load_scenario
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup
 from live_peer import Peer
 from live_support import CUT_IN, PATIENCE_S
@@ -31,8 +32,7 @@ REACH_M = 60.0
 
 def _game(epoch: int, occupancy: Path | None) -> String:
     """Write a game that has this map."""
-    content = json.loads(game_document(build_setup(load_game(CUT_IN)), epoch=epoch,
-                                       clock_offset_ns=0, real_time_factor=1.0))
+    content = json.loads(GAME.write(describe_game(build_setup(load_game(CUT_IN)), epoch=epoch)))
     return String(data=json.dumps(content | {
         'occupancy': None if occupancy is None else str(occupancy)}))
 

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 import threading
 
-from crgame_ros.game.documents import objects_document
+from crgame_ros.game.documents import GAME, OBJECTS
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
 from crgame_ros.nodes import marker_node
@@ -16,7 +16,7 @@ from crgame_ros.nodes.markers.roads import NAMESPACES
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import from_time, StateMessage
 from crgame_ros.ros.node_main import StopFlag
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from live_peer import Peer
 from live_support import Launcher
@@ -232,9 +232,8 @@ class Stage:
         """Publish the documents of an epoch."""
         for name, text in (
                 ('xml', self.setup.loaded.xml_text),
-                ('objects', objects_document(self.setup.descriptions)),
-                ('game', game_document(self.setup, epoch=epoch, clock_offset_ns=0,
-                                       real_time_factor=1.0))):
+                ('objects', OBJECTS.write(self.setup.descriptions)),
+                ('game', GAME.write(describe_game(self.setup, epoch=epoch)))):
             self.texts[name].publish(String(data=text))
 
     def step(self) -> None:

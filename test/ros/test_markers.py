@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import math
 from pathlib import Path
 
-from crgame_ros.game.documents import objects_document, Signals
+from crgame_ros.game.documents import GAME, OBJECTS, Signals
 from crgame_ros.game.file import load_game
 from crgame_ros.game.objects import ObjectDescription, ObjectStates, Role
 from crgame_ros.geometry.outline import outline
@@ -19,7 +19,7 @@ from crgame_ros.nodes.markers.markers import AvPaths, SceneMarkers
 from crgame_ros.nodes.markers.roads import line_segments, map_markers, NAMESPACES
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.scenario.loading import load_scenario, parse_scenario
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from live_support import SCENARIOS
 import numpy as np
@@ -47,9 +47,8 @@ LIGHT = """
 def _documents(setup: Setup) -> ScenarioSet:
     collector = DocumentCollector()
     collector.add('xml', setup.loaded.xml_text)
-    collector.add('objects', objects_document(setup.descriptions))
-    collector.add('game', game_document(setup, epoch=0, clock_offset_ns=OFFSET_NS,
-                                        real_time_factor=1.0))
+    collector.add('objects', OBJECTS.write(setup.descriptions))
+    collector.add('game', GAME.write(describe_game(setup, clock_offset_ns=OFFSET_NS)))
     documents = collector.complete()
     assert documents is not None
     return documents

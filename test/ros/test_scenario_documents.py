@@ -6,10 +6,10 @@ from dataclasses import replace
 from itertools import permutations
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import objects_document
+from crgame_ros.game.documents import GAME, OBJECTS
 from crgame_ros.game.file import load_game
 from crgame_ros.ros.scenario_documents import DocumentCollector, KINDS
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup
 from live_support import SCENARIOS
 import pytest
@@ -17,9 +17,8 @@ import pytest
 
 def _texts(game: str, epoch: int = 0) -> dict[str, str]:
     setup = build_setup(load_game(SCENARIOS / f'{game}.yaml'))
-    return {'xml': setup.loaded.xml_text, 'objects': objects_document(setup.descriptions),
-            'game': game_document(setup, epoch=epoch, clock_offset_ns=epoch * 10 ** 9,
-                                  real_time_factor=1.0)}
+    return {'xml': setup.loaded.xml_text, 'objects': OBJECTS.write(setup.descriptions),
+            'game': GAME.write(describe_game(setup, epoch=epoch, clock_offset_ns=epoch * 10 ** 9))}
 
 
 @pytest.fixture(scope='module')

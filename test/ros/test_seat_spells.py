@@ -3,7 +3,7 @@
 """The drivers of a seat, with first and last step."""
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.seat_documents import DrivingSpell, parse_spells, SeatPerson
+from crgame_ros.game.seat_documents import DRIVERS, DrivingSpell, SeatPerson
 from crgame_ros.ros.seats import MAX_SPELLS, SeatSpells
 import pytest
 
@@ -24,8 +24,8 @@ def test_each_stretch_has_its_steps() -> None:
     spells.note(40, [driven(ADA), ('av0', 'cockpit', 'idm', BOB)])
     spells.note(70, [driven(ADA)])
     spells.note(90, [driven(BOB)])
-    epoch, told = parse_spells(spells.document())
-    assert epoch == 3 and told == (
+    told = DRIVERS.read(spells.document())
+    assert told.epoch == 3 and told.drivers == (
         DrivingSpell('hv0', 'cockpit', 'cockpit', ADA, 0, 90),
         DrivingSpell('av0', 'cockpit', 'idm', BOB, 40, 70),
         DrivingSpell('hv0', 'cockpit', 'cockpit', BOB, 90))
@@ -36,7 +36,7 @@ def test_a_flood_of_changes_is_bounded() -> None:
     spells = SeatSpells(0)
     for n in range(2 * MAX_SPELLS):
         spells.note(n, [driven(ADA if n % 2 else BOB)])
-    assert len(parse_spells(spells.document())[1]) == MAX_SPELLS
+    assert len(DRIVERS.read(spells.document()).drivers) == MAX_SPELLS
 
 
 @pytest.mark.parametrize('text', [
@@ -46,4 +46,4 @@ def test_a_flood_of_changes_is_bounded() -> None:
 def test_what_is_no_such_document_is_refused(text: str) -> None:
     """Recordings hold what any peer has published."""
     with pytest.raises(InputError, match='/seats/drivers: is no list of drivers'):
-        parse_spells(text)
+        DRIVERS.read(text)

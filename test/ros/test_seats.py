@@ -11,7 +11,7 @@ from crgame_ros.game.file import load_game
 from crgame_ros.recording.recorded_inputs import RecordedInputs
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import to_joy
-from crgame_ros.ros.seat import COMMAND_DEPTH, GAME, Seat
+from crgame_ros.ros.seat import COMMAND_DEPTH, GAME_DRIVER, Seat
 from crgame_ros.ros.seats import MAX_ORDERS, Seats
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.driver_command import DriverCommand, RELEASED
@@ -46,7 +46,7 @@ class Table(NamedTuple):
         """Return the seat of hv0."""
         return self.seats.humans[0]
 
-    def say(self, command: DriverCommand, source: str = GAME) -> None:
+    def say(self, command: DriverCommand, source: str = GAME_DRIVER) -> None:
         """Command hv0, and wait until it has come."""
         self.commands.publish(to_joy(command, OFFSET_NS, source))
         self.commands.wait_for_all_acked()
@@ -79,7 +79,7 @@ def table() -> Iterator[Table]:
     rclpy.try_shutdown(context=context)
 
 
-def _heard(table: Table, command: DriverCommand, source: str = GAME) -> None:
+def _heard(table: Table, command: DriverCommand, source: str = GAME_DRIVER) -> None:
     """Send the seat a command at 0 ms of the steady clock."""
     def obeyed() -> bool:
         table.say(command, source)
@@ -149,7 +149,7 @@ def test_released_in_a_cockpit_game_it_is_the_next_games_drivers(table: Table) -
     table.orders.publish(String(data='{"seat": "hv0", "source": "game"}'))
     wait_until(lambda: table.seats.apply_orders(0) is not None and not table.sources, 'the order')
     seats = Seats(Endpoints(table.node), build_setup(load_game(CUT_IN)), OFFSET_NS, table.sources)
-    assert seats.humans[0].source == GAME
+    assert seats.humans[0].source == GAME_DRIVER
 
 
 def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
@@ -170,7 +170,7 @@ def test_a_flood_does_not_hold_up_a_cycle(table: Table) -> None:
             """Return another command."""
             nonlocal asked
             asked += 1
-            return to_joy(FULL, OFFSET_NS, GAME)
+            return to_joy(FULL, OFFSET_NS, GAME_DRIVER)
     table.human.commands = Flood()  # type: ignore[assignment]
     assert table.human.listen(0)
     assert asked == COMMAND_DEPTH
@@ -180,11 +180,11 @@ def test_what_makes_no_command_is_counted(table: Table) -> None:
     """A command of an earlier run or another source, without axes or not finite does not drive."""
     _heard(table, RELEASED)
     old, empty, stranger = (to_joy(FULL, stamp_ns, source) for stamp_ns, source in (
-        (OFFSET_NS - 1, GAME), (OFFSET_NS, GAME), (OFFSET_NS, 'stranger')))
+        (OFFSET_NS - 1, GAME_DRIVER), (OFFSET_NS, GAME_DRIVER), (OFFSET_NS, 'stranger')))
     empty.axes = []
     for message in (old, empty, stranger, to_joy(
-            DriverCommand(float('nan'), float('inf'), float('-inf')), OFFSET_NS, GAME),
-            to_joy(DriverCommand(7.0, 1.0, -3.0), OFFSET_NS, GAME)):
+            DriverCommand(float('nan'), float('inf'), float('-inf')), OFFSET_NS, GAME_DRIVER),
+            to_joy(DriverCommand(7.0, 1.0, -3.0), OFFSET_NS, GAME_DRIVER)):
         table.commands.publish(message)
     found = []
     wait_until(lambda: found.append(table.human.command(0, 0.01, 20.0))
@@ -196,7 +196,7 @@ def test_what_makes_no_command_is_counted(table: Table) -> None:
 def test_a_command_without_a_stamp_is_meant_for_now(table: Table) -> None:
     """As `ros2 topic pub` sends it."""
     _heard(table, RELEASED)
-    table.commands.publish(to_joy(FULL, 0, GAME))
+    table.commands.publish(to_joy(FULL, 0, GAME_DRIVER))
     wait_until(lambda: table.human.command(0, 0.01, 20.0) == FULL, 'the command')
     assert table.human.outdated == 0
 
@@ -273,7 +273,7 @@ def test_of_two_cockpits_the_first_gets_the_seat(table: Table) -> None:
     # A message about another person changes nothing, whatever its sender.
     table.orders.publish(String(data=json.dumps({'seat': 'hv0', 'left': 'p1'})))
     assert _demand(table, source='game') == (True, [])
-    assert 'person' not in json.loads(table.seats.document())['hv0']
+    assert json.loads(table.seats.document())['hv0']['person'] is None
 
 
 @pytest.mark.parametrize('person', [
@@ -283,4 +283,4 @@ def test_people_that_cannot_be_shown_are_refused(table: Table, person: object) -
     """Any peer may order, and the text of its order goes into pages and recordings."""
     changed, refusals = _demand(table, source='cockpit', person=person)
     assert not changed and len(refusals) == 1 and refusals[0].startswith('/seats/order: ')
-    assert table.human.source == GAME
+    assert table.human.source == GAME_DRIVER

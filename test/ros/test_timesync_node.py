@@ -6,8 +6,9 @@ import os
 import subprocess
 import sys
 
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.time_controller import Cycle
@@ -34,8 +35,7 @@ def _late_cycle() -> Float64MultiArray:
 def test_an_order_ends_with_the_run_that_was_late() -> None:
     """A reset while frames are skipped brings them back, for the new run is not late."""
     setup = build_setup(load_game(CUT_IN))
-    documents = [String(data=game_document(setup, epoch=epoch, clock_offset_ns=0,
-                                           real_time_factor=1.0)) for epoch in range(2)]
+    documents = [String(data=GAME.write(describe_game(setup, epoch=epoch))) for epoch in range(2)]
     domain = own_domain_id()
     process = subprocess.Popen([sys.executable, '-m', 'crgame_ros.nodes.timesync_node'],
                                env=os.environ | {'ROS_DOMAIN_ID': str(domain)})

@@ -5,14 +5,14 @@
 from collections.abc import Callable, Iterator
 import time
 
-from crgame_ros.game.documents import objects_document
+from crgame_ros.game.documents import GAME, OBJECTS
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import object_joint_names, vehicle_joint_names
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import StateMessage
 from crgame_ros.ros.scenario_documents import DocumentCollector, ScenarioSet
 from crgame_ros.ros.world_follower import WorldFollower, WorldStep
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup
 from live_support import PATIENCE_S, SCENARIOS
 import numpy as np
@@ -30,8 +30,8 @@ def scenario() -> ScenarioSet:
     setup = build_setup(load_game(SCENARIOS / 'traffic.yaml'))
     collector = DocumentCollector()
     collector.add('xml', setup.loaded.xml_text)
-    collector.add('objects', objects_document(setup.descriptions))
-    collector.add('game', game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    collector.add('objects', OBJECTS.write(setup.descriptions))
+    collector.add('game', GAME.write(describe_game(setup)))
     documents = collector.complete()
     assert documents is not None and documents.others
     return documents

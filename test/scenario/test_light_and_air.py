@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.file import load_game, parse_game
 from crgame_ros.game.game import EnvironmentSpec
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.light_and_air import environment_of
 from crgame_ros.scenario.loading import parse_scenario
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup
 import pytest
 import yaml
@@ -52,12 +52,12 @@ def test_what_cannot_be_shown_is_refused(wrong: dict[str, object], told: str) ->
 
 def test_a_run_records_what_was_resolved() -> None:
     game = load_game(scenarios_directory() / 'fog.yaml')
-    text = game_document(build_setup(game), epoch=0, clock_offset_ns=0, real_time_factor=1.0)
-    assert parse_game_document(text).environment == EnvironmentSpec('day', 80.0)
+    text = GAME.write(describe_game(build_setup(game)))
+    assert GAME.read(text).environment == EnvironmentSpec('day', 80.0)
     # The file itself omits the values that the game omits.
     assert yaml.safe_load(game.dump())['environment'] == {'visibility': 80.0}
     old = json.loads(text)
     del old['environment']
-    assert parse_game_document(json.dumps(old)).environment is None
+    assert GAME.read(json.dumps(old)).environment is None
     with pytest.raises(InputError, match='environment'):
-        parse_game_document(json.dumps(old | {'environment': {'visibility': -1}}))
+        GAME.read(json.dumps(old | {'environment': {'visibility': -1}}))

@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import objects_document, parse_game_document, parse_objects_document
+from crgame_ros.game.documents import GAME, OBJECTS
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import DrivabilitySpec
 from crgame_ros.game.objects import ObjectDescription, Role
 from crgame_ros.geometry.shape import Shape
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import LoadedScenario
-from crgame_ros.simulation.document_writer import game_document
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.parameters import VehicleParameters
 from crgame_ros.vehicle.steering import load_steering_ratio, table_text
@@ -34,12 +34,13 @@ def game() -> Setup:
 @pytest.fixture(scope='module')
 def text(game: Setup) -> str:
     """Write the game after two resets."""
-    return game_document(game, epoch=2, clock_offset_ns=5_000_000_000, real_time_factor=0.5)
+    return GAME.write(describe_game(
+        game, epoch=2, clock_offset_ns=5_000_000_000, real_time_factor=0.5))
 
 
 def test_game_round_trip(game: Setup, text: str) -> None:
     """Other processes read the game that the engine runs."""
-    document = parse_game_document(text)
+    document = GAME.read(text)
     assert document.epoch == 2
     assert document.scenario_sha256 == game.loaded.sha256
     assert document.scheduler == replace(game.scheduler, clock_offset_ns=5_000_000_000)
@@ -58,14 +59,23 @@ def test_game_round_trip(game: Setup, text: str) -> None:
         assert item.planning_problem == av.planning_problem.planning_problem_id
     assert document.real_time_factor == 0.5
     assert document.benchmark_id == 'C-ZAM_TwoAvs-1_1_T-1'
-    assert document.duration_s == 20.0
+    assert document.duration == 20.0
     assert document.timing == game.game.timing
     assert json.loads(text)['dt_ns'] == 10_000_000
 
 
+@pytest.mark.parametrize('path', sorted(
+    path for path in scenarios_directory().glob('*.yaml') if path.name.count('.') == 1),
+    ids=lambda path: path.stem)
+def test_every_game_is_read_as_it_is_written(path: Path) -> None:
+    """Traffic, perception, events, objects, tasks and all else."""
+    document = describe_game(build_setup(load_game(path)), epoch=1, simulation='a')
+    assert GAME.read(GAME.write(document)) == document
+
+
 def test_scripted_driver_travels_as_text(game: Setup, text: str) -> None:
     """No shared file system is needed to drive the human."""
-    human = parse_game_document(text).humans[0]
+    human = GAME.read(text).humans[0]
     assert human.driver == game.game.humans[0].driver
     assert human.timeline == game.humans[0].timeline
     assert len(human.timeline) > 100
@@ -73,7 +83,7 @@ def test_scripted_driver_travels_as_text(game: Setup, text: str) -> None:
 
 def test_vehicle_by_id(text: str) -> None:
     """Humans and AVs; None for all others."""
-    document = parse_game_document(text)
+    document = GAME.read(text)
     assert document.av('av1') == document.avs[1]
     assert document.human('hv0') == document.humans[0]
     assert document.human('hv1') is None and document.av('hv0') is None
@@ -83,7 +93,7 @@ def test_transform_is_written(two_avs: LoadedScenario) -> None:
     """Delta psi and d of CRG 6-8, in this order."""
     moved = support.moved(two_avs, 10.0, (0.0, 0.4), 0.1)
     setup = build_setup(support.game_of(moved, avs=support.av_of('idm', spawn='lanelet')), moved)
-    content = json.loads(game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    content = json.loads(GAME.write(describe_game(setup)))
     transform = setup.avs[0].transform
     assert not transform.is_identity
     assert content['avs'][0]['transform'] == [
@@ -96,12 +106,11 @@ def test_endless_game_and_unlimited_steering_are_valid_json(
     setup = support.setup_of(cut_in)
     free = replace(setup.avs[0], vehicle=replace(setup.avs[0].vehicle,
                                                  max_steering_rate=math.inf))
-    text = game_document(replace(setup, avs=(free,)), epoch=0, clock_offset_ns=0,
-                         real_time_factor=1.0)
+    text = GAME.write(describe_game(replace(setup, avs=(free,))))
     assert 'Infinity' not in text
     assert json.loads(text)['duration'] is None
     assert json.loads(text)['avs'][0]['vehicle']['max_steering_rate'] is None
-    assert parse_game_document(text).avs[0].vehicle.max_steering_rate == math.inf
+    assert GAME.read(text).avs[0].vehicle.max_steering_rate == math.inf
 
 
 def without(key: str) -> Callable[[dict[str, Any]], None]:
@@ -126,7 +135,7 @@ def test_spoilt_game_is_refused(text: str, spoil: Callable[[dict[str, Any]], Non
     content = json.loads(text)
     spoil(content)
     with pytest.raises(InputError, match='/scenario/game: (is no game document|drivability: )'):
-        parse_game_document(json.dumps(content))
+        GAME.read(json.dumps(content))
 
 
 GARBAGE = ['', 'no json', '[]', '7', 'null', '{}', '"text"', '[' * 100_000, '\x00', '[[[]]]',
@@ -137,10 +146,10 @@ GARBAGE = ['', 'no json', '[]', '7', 'null', '{}', '"text"', '[' * 100_000, '\x0
 def test_garbage_is_refused(garbage: str) -> None:
     """For any text on either topic."""
     with pytest.raises(InputError, match='/scenario/game'):
-        parse_game_document(garbage)
+        GAME.read(garbage)
     if garbage not in ('[]', '{}', '"text"'):
         with pytest.raises(InputError, match='/scenario/objects'):
-            parse_objects_document(garbage)
+            OBJECTS.read(garbage)
 
 
 def test_objects_round_trip(traffic: LoadedScenario) -> None:
@@ -150,11 +159,11 @@ def test_objects_round_trip(traffic: LoadedScenario) -> None:
         ObjectDescription('o7', 'building', Role.STATIC,
                           Shape.polygon(((0.0, 0.0), (2.0, 0.1), (1.0, 3.3)))),
         ObjectDescription('o8', 'pedestrian', Role.RECORDED, Shape.circle(0.3)))
-    assert parse_objects_document(objects_document(described)) == described
-    entry = json.loads(objects_document(described))[0]
+    assert OBJECTS.read(OBJECTS.write(described)) == described
+    entry = json.loads(OBJECTS.write(described))[0]
     assert (entry['id'], entry['role'], entry['reference_point']) == ('hv0', 'human', 'rear_axle')
     assert entry['rear_to_center'] == pytest.approx(1.4227, abs=1e-4)
-    assert json.loads(objects_document(described))[-1]['reference_point'] == 'center'
+    assert json.loads(OBJECTS.write(described))[-1]['reference_point'] == 'center'
 
 
 @pytest.mark.parametrize(('key', 'value'), [
@@ -164,10 +173,10 @@ def test_objects_round_trip(traffic: LoadedScenario) -> None:
 def test_spoilt_objects_are_refused(key: str, value: Any) -> None:
     """For an object that could not be drawn or avoided."""
     item = ObjectDescription('o1', 'car', Role.RECORDED, Shape.rectangle(4.0, 2.0))
-    entries = json.loads(objects_document([item]))
+    entries = json.loads(OBJECTS.write((item,)))
     entries[0][key] = value
     with pytest.raises(InputError):
-        parse_objects_document(json.dumps(entries))
+        OBJECTS.read(json.dumps(entries))
 
 
 def test_vehicle_entry_has_every_parameter(text: str) -> None:

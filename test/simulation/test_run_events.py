@@ -7,15 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import events_document, parse_events_document, parse_game_document
+from crgame_ros.game.documents import EVENTS, FiredEvents, GAME
 from crgame_ros.game.events import EventList, EventSpec, FiredEvent
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, HumanSpec, PoseSpawn
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.engine import Simulation
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 import pytest
@@ -252,11 +252,13 @@ def test_external_planner_stays(street: LoadedScenario) -> None:
 def test_documents_round_trip(street: LoadedScenario) -> None:
     """`/scenario/game` carries the events, `/scenario/events` those that have fired."""
     setup = setup_of(street, RELEASE, CONE | {'when': {'time': 1.0}})
-    text = game_document(setup, epoch=3, clock_offset_ns=5, real_time_factor=1.0)
-    assert parse_game_document(text).events == setup.game.events
+    text = GAME.write(describe_game(setup, epoch=3, clock_offset_ns=5))
+    assert GAME.read(text).events == setup.game.events
     fired = (FiredEvent('walk', 20, 2, 'trigger'), FiredEvent('cone', 100, 10, 'condition'))
-    assert parse_events_document(events_document(3, fired)) == (3, fired)
-    assert parse_events_document(events_document(3, ())) == (3, ())
+    for events in (FiredEvents(3, fired), FiredEvents(3, ())):
+        assert EVENTS.read(EVENTS.write(events)) == events
+    newer = EVENTS.write(FiredEvents(3, fired)).replace('trigger', 'telepathy')
+    assert EVENTS.read(newer).fired[0].by == 'condition'
 
 
 @pytest.mark.parametrize('text', ['', '7', '{}', '{"epoch": 1}', '{"epoch": 1, "fired": [7]}',
@@ -264,4 +266,4 @@ def test_documents_round_trip(street: LoadedScenario) -> None:
 def test_spoilt_list_of_events_is_refused(text: str) -> None:
     """It raises one error that names the topic."""
     with pytest.raises(InputError, match='/scenario/events: is no list of events'):
-        parse_events_document(text)
+        EVENTS.read(text)

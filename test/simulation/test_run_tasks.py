@@ -8,19 +8,17 @@ import json
 from typing import Any
 
 from crgame_ros.errors import InputError
-from crgame_ros.game.documents import parse_game_document
+from crgame_ros.game.documents import GAME
 from crgame_ros.game.events import EventList
 from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import HumanSpec, PoseSpawn
 from crgame_ros.game.task_documents import (
-    log_document,
     PageTimes,
-    parse_log,
-    parse_report,
-    parse_state,
-    report_text,
-    state_document,
+    TASK_LOG,
+    TASK_REPORT,
+    TASK_STATE,
     TaskEntry,
+    TaskLog,
     TaskReport,
     TaskState,
 )
@@ -28,8 +26,8 @@ from crgame_ros.game.task_spec import DetectionResponse, TaskList
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
-from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.engine import Simulation
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.run_tasks import StimulusSchedule
 from crgame_ros.simulation.setup import Setup
@@ -270,14 +268,13 @@ def test_the_documents_say_the_tasks(street: LoadedScenario) -> None:
                      events=(SLOW,), language='de')
     again = parse_game(yaml.safe_load(setup.game.dump()), 'game', setup.game.base)
     assert again.tasks == setup.game.tasks and again.language == 'de'
-    document = parse_game_document(game_document(
-        setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    document = describe_game(setup)
     assert [task.seat for task in document.tasks] == ['hv0', 'av0']
     assert document.tasks[1] == setup.game.tasks[1] and document.language == 'de'
-    old = json.loads(game_document(setup, epoch=0, clock_offset_ns=0, real_time_factor=1.0))
+    old = json.loads(GAME.write(describe_game(setup)))
     del old['tasks'], old['language']
     # Older recordings have no tasks.
-    assert parse_game_document(json.dumps(old)).tasks == ()
+    assert GAME.read(json.dumps(old)).tasks == ()
 
 
 def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenario) -> None:
@@ -285,16 +282,17 @@ def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenar
     course = Course(setup_of(street, LIGHT))
     course.to_stimulus(1)
     course.answer(1, 250.5)
-    assert parse_log(log_document(3, course.entries)) == (3, tuple(course.entries))
+    log = TaskLog(3, tuple(course.entries))
+    assert TASK_LOG.read(TASK_LOG.write(log)) == log
     course.to_stimulus(2)
     written = TaskState(2, tuple(course.simulation.tasks_running),
                         tuple(course.simulation.prompts))
-    state = parse_state(state_document(written))
+    state = TASK_STATE.read(TASK_STATE.write(written))
     assert state == written
     assert (state.epoch, state.running, state.open[0].number) == (2, ('light',), 2)
     report = TaskReport('hv0', 'light', 4, 'answer', PageTimes(250.5, 30.0, 16.7, 0.0))
-    assert parse_report(report_text(report)) == report
-    content = json.loads(report_text(report))
+    assert TASK_REPORT.read(TASK_REPORT.write(report)) == report
+    content = json.loads(TASK_REPORT.write(report))
     for wrong in ({'seat': '../x'}, {'seat': 'hv\u0661'}, {'number': -1}, {'number': 1e9},
                   {'number': True}, {'number': '4'},
                   {'times': {**content['times'], 'response_ms': True}},
@@ -302,9 +300,9 @@ def test_the_messages_of_tasks_are_read_as_they_are_written(street: LoadedScenar
                   {'times': {**content['times'], 'response_ms': 1e12}},
                   {'times': {**content['times'], 'response_ms': 'x'}}, {'times': None}):
         with pytest.raises(InputError):
-            parse_report(json.dumps(content | wrong))
+            TASK_REPORT.read(json.dumps(content | wrong))
     for text in ('', '[]', '{"epoch": 1}', 'null'):
-        for parse in (parse_log, parse_state, parse_report):
+        for parse in (TASK_LOG.read, TASK_STATE.read, TASK_REPORT.read):
             with pytest.raises(InputError):
                 parse(text)
 

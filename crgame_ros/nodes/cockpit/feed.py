@@ -17,13 +17,8 @@ from crgame_ros.cockpit.run_files import files_document
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.scene import scene_document
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import (
-    GameDocument,
-    MALFORMED,
-    parse_events_document,
-    parse_signals_document,
-)
-from crgame_ros.game.task_documents import parse_state, STATE_TOPIC
+from crgame_ros.game.documents import EVENTS, GameDocument, SIGNALS
+from crgame_ros.game.task_documents import TASK_STATE
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
 from crgame_ros.ros.messages import from_time
@@ -91,7 +86,7 @@ class AvFeed:
         """
         Pass on plans, and those requests that a page shows.
 
-        :raises CrgameError: or one of MALFORMED, if a message cannot be read.
+        :raises CrgameError: or another of `UNREADABLE`, if a message cannot be read.
         """
         frames, clients = self._frames, self._hub.clients.values()
         if frames is None or frames_skipped:
@@ -111,7 +106,7 @@ class AvFeed:
         """
         Pass on the map, and those estimates and scans that a page shows.
 
-        :raises CrgameError: or one of MALFORMED, if a message cannot be read.
+        :raises CrgameError: or another of `UNREADABLE`, if a message cannot be read.
         """
         message = self._map.latest()
         if message is not None:
@@ -181,7 +176,9 @@ SILENCE_S = 3.0
 QUEUE = 100
 # Topics whose delay people do not notice are polled at this longer period [s].
 SLOW_PERIOD_S = 0.02
-UNREADABLE = (CrgameError, IndexError, *MALFORMED)
+# The errors of a message from anyone, including those of huge numbers.
+UNREADABLE = (AttributeError, CrgameError, IndexError, KeyError, OverflowError, TypeError,
+              ValueError)
 
 
 class CockpitFeed:
@@ -207,7 +204,7 @@ class CockpitFeed:
         self._criticality = endpoints.polled(CRITICALITY_TOPIC, depth=QUEUE)
         self._signals = endpoints.polled('/scenario/signals')
         self._fired = endpoints.polled('/scenario/events')
-        self._tasks = endpoints.polled(STATE_TOPIC)
+        self._tasks = endpoints.polled(TASK_STATE.topic)
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._diagnostics = endpoints.polled('/diagnostics', depth=QUEUE)
         self._verdicts: dict[str, PolledSubscription] = {}
@@ -340,7 +337,7 @@ class CockpitFeed:
         message = None if self.scenario is None else self._tasks.latest()
         if message is None or self.scenario is None:
             return
-        state = parse_state(message.data)
+        state = TASK_STATE.read(message.data)
         if state.epoch == self.scenario.game.epoch:
             self._hub.set_document('tasks', {
                 'running': state.running, 'open': [asdict(prompt) for prompt in state.open]})
@@ -359,12 +356,13 @@ class CockpitFeed:
             return
         signals, fired = self._signals.latest(), self._fired.latest()
         if fired is not None:
-            epoch, events = parse_events_document(fired.data)
-            if epoch == self.scenario.game.epoch:
-                self._hub.set_document('events', {'fired': [asdict(event) for event in events]})
-                self.status.add_events(events, self.scenario.game.scheduler.dt_s)
+            events = EVENTS.read(fired.data)
+            if events.epoch == self.scenario.game.epoch:
+                self._hub.set_document(
+                    'events', {'fired': [asdict(event) for event in events.fired]})
+                self.status.add_events(events.fired, self.scenario.game.scheduler.dt_s)
         if signals is not None:
-            self._hub.set_document('signals', asdict(parse_signals_document(signals.data)))
+            self._hub.set_document('signals', asdict(SIGNALS.read(signals.data)))
 
     def _poll_diagnostics(self) -> None:
         for slot in (self._diagnostics, *self._verdicts.values()):

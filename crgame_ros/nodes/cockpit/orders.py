@@ -6,8 +6,8 @@ import asyncio
 from typing import Any
 
 from crgame_ros.errors import CrgameError
-from crgame_ros.game.seat_documents import demand_text, SeatDemand
-from crgame_ros.game.task_documents import report_text, REPORT_TOPIC, TaskReport
+from crgame_ros.game.seat_documents import ORDER, SeatDemand
+from crgame_ros.game.task_documents import TASK_REPORT, TaskReport
 from crgame_ros.ros.endpoints import Endpoints
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -40,7 +40,7 @@ class CockpitOrders:
         self._parameters = node.create_client(SetParameters, 'sim_node/set_parameters')
         self._triggers = endpoints.publisher('/trigger')
         self._seat_orders = endpoints.publisher('/seats/order')
-        self._task_reports = endpoints.publisher(REPORT_TOPIC)
+        self._task_reports = endpoints.publisher(TASK_REPORT.topic)
 
     def close(self) -> None:
         """Release the executor."""
@@ -57,11 +57,11 @@ class CockpitOrders:
 
     def report_task(self, report: TaskReport) -> None:
         """Report what a page has shown of a task, or its driver's answer."""
-        self._task_reports.publish(String(data=report_text(report)))
+        self._task_reports.publish(String(data=TASK_REPORT.write(report)))
 
     def order_seat(self, demand: SeatDemand) -> None:
         """Publish a demand about the driver of a seat."""
-        self._seat_orders.publish(String(data=demand_text(demand)))
+        self._seat_orders.publish(String(data=ORDER.write(demand)))
 
     async def control(self, action: str) -> str:
         """

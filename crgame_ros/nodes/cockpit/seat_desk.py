@@ -23,12 +23,12 @@ from crgame_ros.cockpit.seat_orders import SeatOrders
 from crgame_ros.cockpit.seat_table import SeatTable
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.seat_documents import parse_seats, SeatDemand, SeatPerson
+from crgame_ros.game.seat_documents import SeatDemand, SeatPerson, SEATS
 from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import to_joy
-from crgame_ros.ros.seat import GAME
+from crgame_ros.ros.seat import GAME_DRIVER
 from crgame_ros.vehicle.driver_command import DriverCommand
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
@@ -69,8 +69,9 @@ class PeopleFeed:
         self._shown = present
         self._hub.set_document('people', {
             'people': [self._entry(client) for client in self._hub.clients.values()],
-            'devices': [device for seat, device in self._status.devices.items()
-                        if self._table.seats.get(seat, {}).get('source') == GAME]})
+            'devices': [
+                device for seat, device in self._status.devices.items()
+                if seat in self._table.seats and self._table.seats[seat].source == GAME_DRIVER]})
         if due:
             self._told_s = now_s
             self._record()
@@ -140,9 +141,9 @@ class SeatDesk:
 
         :raises InputError: if it does not follow the contract.
         """
-        seats, tenants = parse_seats(text)
-        self._awaited.answered(seats, tenants)
-        self.table.update(seats, self._awaited, tenants)
+        seats = SEATS.read(text)
+        self._awaited.answered(seats)
+        self.table.update(seats, self._awaited)
         # Made before the first claim, because discovery of a new publisher takes a while.
         for name in seats.keys() - self._commands.keys():
             self._commands[name] = self._endpoints.publisher('/<v>/driver_command', name)
@@ -250,7 +251,7 @@ class SeatDesk:
         if self.table.seat_of(client.id) is not None or not client.rights.drives:
             return
         for name, entry in self.table.seats.items():
-            if entry['driver'] == COCKPIT and name not in self.table.held:
+            if entry.driver == COCKPIT and name not in self.table.held:
                 self._claim(client, name)
                 self.show()
                 return
@@ -265,7 +266,7 @@ class SeatDesk:
     def cockpit_seats(self) -> list[str]:
         """Return the seats that the game leaves to people at pages."""
         return [name for name, entry in self.table.seats.items()
-                if entry['driver'] == entry['source'] == COCKPIT]
+                if entry.driver == entry.source == COCKPIT]
 
     def _drivers(self) -> dict[str, str]:
         return {item.id: item.name for item in self._hub.clients.values() if item.rights.drives}
@@ -308,7 +309,7 @@ class SeatDesk:
         if held is not None:
             self._publish_hands_off(held)
         self._told.pop(seat, None)
-        self._order(SeatDemand(seat, GAME))
+        self._order(SeatDemand(seat, GAME_DRIVER))
 
     def _offer(self, client: Client, seat: str, to: str) -> str:
         names = self._drivers()
@@ -328,7 +329,7 @@ class SeatDesk:
         if taken is not None:
             self._publish_hands_off(taken)
             self.table.held.pop(taken.id, None)
-            self._order(SeatDemand(taken.id, GAME))
+            self._order(SeatDemand(taken.id, GAME_DRIVER))
         self._sit(client, self.table.held[seat])
         self._send(before.holder, f'{client.name} drives {seat} now')
         return f'you drive {seat}'
@@ -348,7 +349,7 @@ class SeatDesk:
 
     def _order(self, demand: SeatDemand) -> None:
         self._orders.order_seat(demand)
-        self._awaited.note(demand, self.table.seats, self.table.tenants, time.monotonic())
+        self._awaited.note(demand, self.table.seats, time.monotonic())
 
     def _publish_hands_off(self, seat: HeldSeat) -> None:
         """Publish once that the hands are off; in the silence after, the watchdog brakes."""
@@ -357,7 +358,8 @@ class SeatDesk:
 
     def _publish(self, seat: HeldSeat) -> None:
         scenario = self._feed.scenario
-        if scenario is None or self.table.seats.get(seat.id, {}).get('source') != COCKPIT:
+        entry = self.table.seats.get(seat.id)
+        if scenario is None or entry is None or entry.source != COCKPIT:
             return
         scheduler = scenario.game.scheduler
         command: DriverCommand = seat.command(self._feed.n, scheduler.dt_s)

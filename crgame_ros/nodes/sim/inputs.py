@@ -9,7 +9,7 @@ from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatOccupant
-from crgame_ros.game.task_documents import parse_report, REPORT_TOPIC, TaskReport
+from crgame_ros.game.task_documents import TASK_REPORT, TaskReport
 from crgame_ros.messages.joint_messages import from_joint_trajectory
 from crgame_ros.messages.joints import JointSeries
 from crgame_ros.messages.request_layout import request_head
@@ -74,7 +74,7 @@ class SimInputs:
             '/traffic/agents', depth=SHARED_DEPTH)
         self._frame_skip = endpoints.polled('/timing/frame_skip')
         self._triggers = endpoints.polled('/trigger')
-        self._task_reports = endpoints.polled(REPORT_TOPIC) if setup.game.tasks else None
+        self._task_reports = endpoints.polled(TASK_REPORT.topic) if setup.game.tasks else None
         self._drivability = {}
         if setup.game.drivability.stop:
             self._drivability = {human.id: endpoints.polled('/<v>/drivability', human.id)
@@ -164,7 +164,7 @@ class SimInputs:
             if message is None:
                 return
             try:
-                reason = take(parse_report(message.data))
+                reason = take(TASK_REPORT.read(message.data))
             except InputError as error:
                 reason = str(error)
             if reason is not None:

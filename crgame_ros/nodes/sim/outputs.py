@@ -7,16 +7,10 @@ import json
 import math
 import time
 
-from crgame_ros.game.documents import events_document, objects_document, RUN_STATE_TOPIC
+from crgame_ros.game.documents import EVENTS, FiredEvents, GAME, OBJECTS, RUN_STATE
 from crgame_ros.game.events import FiredEvent
 from crgame_ros.game.objects import ObjectStates
-from crgame_ros.game.task_documents import (
-    log_document,
-    LOG_TOPIC,
-    state_document,
-    STATE_TOPIC,
-    TaskState,
-)
+from crgame_ros.game.task_documents import TASK_LOG, TASK_STATE, TaskLog, TaskState
 from crgame_ros.messages.contract import load_contract
 from crgame_ros.messages.joint_messages import MAP
 from crgame_ros.messages.joints import (
@@ -28,8 +22,8 @@ from crgame_ros.messages.joints import (
 from crgame_ros.roads.signals import TrafficLights
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import EXACT_VARIANCE, SeriesMessage, set_time, StateMessage
-from crgame_ros.simulation.document_writer import game_document
 from crgame_ros.simulation.engine import Simulation, StepResult
+from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import Setup
 from crgame_ros.timing.cycle_rows import CycleRows
 from crgame_ros.timing.publishing import steps_between_messages
@@ -114,9 +108,9 @@ class SimOutputs:
         self._cycle = endpoints.publisher('/timing/cycle')
         self._latched = {name: endpoints.publisher(name) for name in (
             '/scenario/xml', '/scenario/game', '/scenario/objects', '/scenario/events',
-            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', STATE_TOPIC,
-            RUN_STATE_TOPIC)}
-        self._task_log = endpoints.publisher(LOG_TOPIC)
+            '/scenario/signals', '/vehicles/signals', '/seats', '/seats/drivers', TASK_STATE.topic,
+            RUN_STATE.topic)}
+        self._task_log = endpoints.publisher(TASK_LOG.topic)
         self._diagnostics = endpoints.diagnostics
         # With perception, its node builds the plan request from the true one.
         self._request_topics = {
@@ -161,18 +155,18 @@ class SimOutputs:
         self._simulation, self._epoch = simulation, epoch
         self._vehicle_lights = None
         texts = {'/scenario/xml': setup.loaded.xml_text,
-                 '/scenario/objects': objects_document(setup.descriptions),
-                 '/scenario/events': events_document(epoch, ()),
-                 STATE_TOPIC: state_document(TaskState(epoch, (), ())),
-                 '/scenario/game': game_document(
+                 OBJECTS.topic: OBJECTS.write(setup.descriptions),
+                 EVENTS.topic: EVENTS.write(FiredEvents(epoch, ())),
+                 TASK_STATE.topic: TASK_STATE.write(TaskState(epoch, (), ())),
+                 GAME.topic: GAME.write(describe_game(
                      setup, epoch=epoch, clock_offset_ns=clock_offset_ns,
-                     real_time_factor=factor, simulation=simulation)}
+                     real_time_factor=factor, simulation=simulation))}
         for name, text in texts.items():
             self._latched[name].publish(String(data=text))
 
     def publish_state(self, values: Mapping[str, object]) -> None:
         """Publish whether the run waits, goes on, stands still or is over."""
-        self._latched[RUN_STATE_TOPIC].publish(String(data=json.dumps(
+        self._latched[RUN_STATE.topic].publish(String(data=json.dumps(
             {'simulation': self._simulation, 'epoch': self._epoch, **values})))
 
     def publish_seats(self, seats: str, drivers: str) -> None:
@@ -182,14 +176,15 @@ class SimOutputs:
 
     def publish_events(self, fired: Sequence[FiredEvent]) -> None:
         """Publish the events that have taken effect so far."""
-        self._latched['/scenario/events'].publish(
-            String(data=events_document(self._epoch, fired)))
+        self._latched[EVENTS.topic].publish(
+            String(data=EVENTS.write(FiredEvents(self._epoch, tuple(fired)))))
 
     def publish_tasks(self, simulation: Simulation, result: StepResult) -> None:
         """Publish the new events of the game's tasks, and their state."""
-        self._latched[STATE_TOPIC].publish(String(data=state_document(TaskState(
+        self._latched[TASK_STATE.topic].publish(String(data=TASK_STATE.write(TaskState(
             self._epoch, simulation.tasks_running, simulation.prompts))))
-        self._task_log.publish(String(data=log_document(self._epoch, result.tasks)))
+        self._task_log.publish(String(
+            data=TASK_LOG.write(TaskLog(self._epoch, tuple(result.tasks)))))
 
     def shows_vehicles(self, simulation: Simulation) -> bool:
         """Return whether the vehicles' own topics are to be published at this step."""

@@ -9,7 +9,7 @@ from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.inputs import SimInputs
 from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.ros.heard_topics import HeardTopics
-from crgame_ros.ros.seat import GAME
+from crgame_ros.ros.seat import GAME_DRIVER
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.engine import Simulation, StepResult
 
@@ -108,9 +108,9 @@ class StartGate:
     def _listen(self, now_ns: int) -> None:
         self._planners -= {av_id for av_id in self._planners if self._take_plan(av_id)}
         for seat in list(self._seats.values()):
-            if seat.source != GAME:
+            if seat.source != GAME_DRIVER:
                 self._forget([seat.id])
-            if seat.source != GAME or seat.listen(now_ns):
+            if seat.source != GAME_DRIVER or seat.listen(now_ns):
                 del self._seats[seat.id]
         if self._traffic_answers is not None and self._traffic_answers():
             self._traffic_answers = None

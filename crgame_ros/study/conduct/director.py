@@ -6,13 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from crgame_ros.cockpit.run_status import RunStatus
-from crgame_ros.errors import CrgameError, InputError
-from crgame_ros.game.documents import (
-    GameDocument,
-    MALFORMED,
-    parse_events_document,
-    parse_game_document,
-)
+from crgame_ros.errors import InputError
+from crgame_ros.game.documents import EVENTS, GAME, GameDocument
 from crgame_ros.messages.status_values import read_status
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription
@@ -116,8 +111,8 @@ class Director:
     def _read_game(self) -> None:
         try:
             message = self._games.latest()
-            game = None if message is None else parse_game_document(message.data)
-        except (CrgameError, *MALFORMED):
+            game = None if message is None else GAME.read(message.data)
+        except InputError:
             # It comes from another program: those of sim_node are readable.
             return
         if game is not None and (self.game is None or game.epoch != self.game.epoch):
@@ -131,9 +126,9 @@ class Director:
             return
         # Another program may publish a malformed document there.
         with suppress(InputError):
-            epoch, fired = parse_events_document(message.data)
-            if epoch == self.game.epoch:
-                self.status.add_events(fired, self.game.scheduler.dt_s)
+            events = EVENTS.read(message.data)
+            if events.epoch == self.game.epoch:
+                self.status.add_events(events.fired, self.game.scheduler.dt_s)
 
     def _read_clock(self) -> None:
         message = self._clock.latest()

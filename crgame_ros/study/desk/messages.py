@@ -4,7 +4,7 @@
 
 from typing import Annotated, Any, Literal
 
-from crgame_ros.schema.bounded import Bounded
+from crgame_ros.schema.document_marks import Bounded
 from crgame_ros.schema.messages import HexKey, Message, MessageId, MessageReader, Words
 from pydantic import AfterValidator, Field, StringConstraints
 

@@ -7,8 +7,8 @@ import json
 from typing import Annotated, Literal
 
 from crgame_ros.errors import InputError
-from crgame_ros.schema.bounded import Bounded
-from crgame_ros.schema.json_documents import DocumentReader
+from crgame_ros.schema.document_marks import Bounded
+from crgame_ros.schema.json_documents import JsonDocument
 from crgame_ros.schema.messages import Message, MessageReader
 from pydantic import TypeAdapter, ValidationError
 import pytest
@@ -38,7 +38,7 @@ def test_a_list_has_one_faulty_entry(kind: type) -> None:
     ({'a': [{'n': 1, 'names': ['x'] * 4}]}, 'a.0.names: should have 3 entries at most'),
     (7, 'all of it: Input should be a valid dictionary')])
 def test_what_is_longer_is_refused_before_it_is_read(given: object, said: str) -> None:
-    reader: DocumentReader[dict[str, tuple[Entry, ...]]] = DocumentReader(
+    reader: JsonDocument[dict[str, tuple[Entry, ...]]] = JsonDocument(
         Annotated[dict[str, Annotated[tuple[Entry, ...], Bounded(5)]], Bounded(2)], '/topic',
         'list')
     if not said:
