@@ -18,11 +18,10 @@ import tempfile
 import time
 
 from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import write_tables
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_game
-from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.simulation.offline import observed_run, run_offline
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.vehicle.driver_command import DriverCommand
@@ -58,8 +57,7 @@ def run_cell() -> None:
     """Run a cell of 10 s with criticality, measures of driving, and its rows of all tables."""
     result = run_offline(build_setup(effective_game(RunRequest())), duration_s=10.0)
     with tempfile.TemporaryDirectory() as folder:
-        write_tables([TableRun('cell', run_record_of(result))], Path(folder) / 'tables',
-                     'parquet')
+        write_tables([Run('cell', result=result)], Path(folder) / 'tables', 'parquet')
 
 
 def cold_start() -> float:

@@ -44,7 +44,7 @@ TOOLS = (
     _Tool('export', 'runs as tables, Parquet or CSV, with a data dictionary',
           'crgame_ros.analysis.export_command'),
     _Tool('figures', "a paper's figures of recorded runs, and videos",
-          'crgame_ros.analysis.pictures.figures_command'),
+          'crgame_ros.analysis.figures_command'),
     _Tool('report', 'a recorded run, or several side by side, as one HTML file',
           'crgame_ros.analysis.report.command'),
     _Tool('replay', 'the recorded human against other planners', 'crgame_ros.replay_command'),

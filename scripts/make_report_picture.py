@@ -11,11 +11,10 @@ import tempfile
 
 from cockpit_person import Browser, open_browser
 from crgame_ros.analysis.report.file import report_html
-from crgame_ros.analysis.report.run import measured_run
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory, share_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
-from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.simulation.offline import run_offline
 from crgame_ros.simulation.setup import build_setup
 from PIL import Image
@@ -32,7 +31,7 @@ def main() -> None:
     """Drive, write and photograph."""
     setup = build_setup(load_game(scenarios_directory() / 'cut_in.yaml'))
     drivers, _ = recorded_inputs(setup)
-    run = measured_run('cut_in', None, run_record_of(run_offline(setup, drivers=drivers)), None)
+    run = Run('cut_in', result=run_offline(setup, drivers=drivers))
     with tempfile.TemporaryDirectory() as folder:
         page, profile = Path(folder) / 'report.html', Path(folder) / 'profile'
         page.write_text(report_html([run]), encoding='utf-8')

@@ -39,8 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def export(values: argparse.Namespace) -> int:
     """Write the tables of some runs, and print how many rows each has."""
-    from crgame_ros.analysis.tables.run_tables import write_tables
-    from crgame_ros.analysis.tables.table_run import tabulated_runs
+    from crgame_ros.analysis.tables.run_tables import runs_in, write_tables
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
     out = values.out
@@ -50,14 +49,10 @@ def export(values: argparse.Namespace) -> int:
         if not run.exists():
             raise InputError('no such file or folder', str(run), 'give a run or its recording')
     out = out or recording_in(values.runs[0]).parent / 'tables'
-    progress = Progress(partial(print, file=sys.stderr, flush=True), '')
-
-    def show_progress(what: str, share: float) -> None:
-        progress.what = what
-        progress(share)
-
-    runs = tabulated_runs(values.runs, values.epoch, show_progress, not values.no_scores)
-    rows = write_tables(runs, out, values.to, show_progress)
+    progress = Progress(partial(print, file=sys.stderr, flush=True))
+    runs = runs_in(values.runs, values.epoch, progress.tell,
+                   'none' if values.no_scores else 'all')
+    rows = write_tables(runs, out, values.to)
     width = max(map(len, rows))
     for name, count in rows.items():
         print(f'{name:<{width}} {count:>9} rows')

@@ -9,9 +9,7 @@ import resource
 import time
 from typing import Any
 
-from crgame_ros.analysis.criticality.recorded import measure_log
-from crgame_ros.analysis.tables.score_columns import score_vehicles
-from crgame_ros.analysis.tables.table_run import TableRun
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.driver.replay_driver import ReplayDriver
 from crgame_ros.each_minute import kind_of
 from crgame_ros.evaluation.cell import Cell
@@ -22,9 +20,7 @@ from crgame_ros.game.file import parse_game
 from crgame_ros.game.game import Game
 from crgame_ros.game.perception_spec import PerceptionSpec
 from crgame_ros.game.traffic_spec import TrafficSpec
-from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.recorded_inputs import RecordedInputs
-from crgame_ros.recording.run_record import run_record_of
 from crgame_ros.scenario.loading import load_scenario, LoadedScenario
 from crgame_ros.schema.reading import read
 from crgame_ros.simulation.av_assignment import adapt_game, OWN
@@ -93,13 +89,11 @@ def _inputs(cell: Cell, contents: Path) -> RecordedInputs:
              if name.startswith('command_')}, file['intervals_s'])
 
 
-def measured(cell: Cell, result: OfflineResult) -> TableRun:
-    """Return a measured run to tabulate."""
-    record = run_record_of(result)
-    run = TableRun(cell.key, record, offline=offline_outcome(result))
-    found = measure_log(record.log)
-    run.criticality.update({item.vehicle_id: item for item in found.report()})
-    score_vehicles(run, drives_only=not cell.condition.commonroad_scores)
+def measured(cell: Cell, result: OfflineResult) -> Run:
+    """Return a run to tabulate."""
+    run = Run(cell.key, result=result,
+              scoring='all' if cell.condition.commonroad_scores else 'drives')
+    run.id = cell.key
     return run
 
 

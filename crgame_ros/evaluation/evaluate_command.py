@@ -33,23 +33,20 @@ def report_cell(folder: Path, key: str, say: Callable[[str], object]) -> Path:
     :raises InputError: if there is no such cell, or it cannot be run.
     """
     from crgame_ros.analysis.report.file import write_report
-    from crgame_ros.analysis.report.run import measured_run
+    from crgame_ros.analysis.runs.run import Run
     from crgame_ros.evaluation.cell_run import run_cell
     from crgame_ros.recording.export import prepare_folder, write_scenario
-    from crgame_ros.recording.offline_outcome import offline_outcome
-    from crgame_ros.recording.run_record import run_record_of
     place = EvaluationFolder(folder)
     cell = place.find(key)
     if cell.condition.code[0] != engine_digest():
         say('note: another version of crgame_ros planned this cell; its run may differ')
     say(f'running {cell.label}')
     result = run_cell(cell, place.store.folder)
-    record = run_record_of(result)
+    run = Run(cell.label, result=result)
     path = folder / REPORTS / f'{cell.key}.html'
     prepare_folder(path.parent)
-    write_report([measured_run(cell.label, None, record, None,
-                               offline=offline_outcome(result))], path)
-    write_scenario(record.log, path.with_suffix('.xml'))
+    write_report([run], path)
+    write_scenario(run.log, path.with_suffix('.xml'))
     return path
 
 

@@ -16,7 +16,7 @@ from crgame_ros.recording.metadata import METADATA_FILE
 from crgame_ros.recording.run_folder import bags_of, FINISHED_MARK, run_folders
 
 if TYPE_CHECKING:  # It takes a second to import.
-    from crgame_ros.analysis.report.run import ReportRun
+    from crgame_ros.analysis.runs.run import Run
     from crgame_ros.recording.finish import FinishedRecording
 
 LOOK_S = 0.5
@@ -38,7 +38,7 @@ class Finisher:
         self._say = say
         self._reports = reports
         self._finished: list[FinishedRecording] = []
-        self._measured: dict[Path, ReportRun | None] = {}
+        self._measured: dict[Path, Run | None] = {}
         self._process: subprocess.Popen[str] | None = None
         self._codes: dict[Path, int] = {}
         self._folder = session
@@ -109,9 +109,9 @@ class Finisher:
                 # What kept it from being written has been told.
                 continue
             run = self._measured.get(folder)
-            code = tell_outcome(self._say, timing, None if run is None else run.criticality,
-                                f'{folder.name}: ', () if run is None else run.scores.vehicles
-                                ) or code
+            code = tell_outcome(
+                self._say, timing, None if run is None else run.usual_criticality,
+                f'{folder.name}: ', () if run is None else run.usual_scores.vehicles) or code
         return code
 
     def _start(self, folder: Path) -> None:

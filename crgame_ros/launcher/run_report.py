@@ -10,12 +10,12 @@ from crgame_ros.errors import CrgameError
 from crgame_ros.recording.progress import Progress
 
 if TYPE_CHECKING:  # It takes a second to import.
-    from crgame_ros.analysis.report.run import ReportRun
+    from crgame_ros.analysis.runs.run import Run
     from crgame_ros.recording.finish import FinishedRecording
 
 
 def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object],
-                     progress: bool = True) -> 'ReportRun | None':
+                     progress: bool = True) -> 'Run | None':
     """
     Write the report of a run beside its recording, and return the run with its measures.
 
@@ -30,13 +30,11 @@ def write_run_report(finished: 'FinishedRecording', say: Callable[[str], object]
     began_s = time.monotonic()
     # They take some time to import.
     from crgame_ros.analysis.report.file import write_report
-    from crgame_ros.analysis.report.run import measured_run
-    from crgame_ros.recording.run_record import record_of_log
-    watch = Progress(say, f'measuring {finished.bag}') if progress else lambda _: None
+    from crgame_ros.analysis.runs.run import Run
+    watch = Progress(say).tell if progress else lambda _what, _share: None
     try:
-        run = measured_run(folder.resolve().name, finished.bag,
-                           record_of_log(finished.bag, finished.log), finished.timing, watch,
-                           drives_only=True)
+        run = Run(folder.resolve().name, bag=finished.bag, log=finished.log,
+                  timing=finished.timing, scoring='drives', progress=watch)
         write_report([run], path, driven_here=True)
     except (CrgameError, OSError) as error:
         say(f'error: no report: {error}')

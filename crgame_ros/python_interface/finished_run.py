@@ -2,74 +2,39 @@
 # SPDX-License-Identifier: Apache-2.0
 """The interface of a finished run, offline or recorded: its data and its measures."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import replace
+from abc import abstractmethod
+from collections.abc import Collection, Iterable, Mapping
+from copy import copy
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any, Self, TYPE_CHECKING
 import warnings
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
-from crgame_ros.game.documents import GameDocument
+from crgame_ros.analysis.runs.run import Run as MeasuredRun
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.python_interface.named import Named
 from crgame_ros.recording.recorded_inputs import RecordedInputs
-from crgame_ros.recording.run_record import RunRecord
-from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
-    from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
-    from crgame_ros.analysis.report.run import ReportRun
-    from crgame_ros.analysis.scores.plan_record import PlanRecord
+    from crgame_ros.analysis.criticality.criticality import VehicleCriticality
     from crgame_ros.analysis.scores.vehicle import VehicleScores
-    from crgame_ros.analysis.tables.table_run import TableRun
-    from crgame_ros.recording.recorded_plans import RecordedPlan
     import pyarrow as pa
 
 # In messages.
 VEHICLE = 'driven vehicle'
 
 
-class Run(ABC):
+class Run(MeasuredRun):
     """
     A run; measures are computed at their first use.
 
     :ivar name: displayed name.
     """
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    @property
-    @abstractmethod
-    def log(self) -> RunTrajectories:
-        """Return the motion of all vehicles and objects, at the scenario's time steps."""
-
-    @property
-    @abstractmethod
-    def record(self) -> RunRecord:
-        """Return the log, the drivers' commands and the events."""
-
-    @property
-    @abstractmethod
-    def outcome(self) -> Mapping[str, Any] | None:
-        """Return planners, violations and contacts as in `timing.json`; None if unknown."""
-
-    @property
-    def answers(self) -> 'dict[str, PlanRecord]':
-        """Return the known answers of planners, by AV."""
-        from crgame_ros.analysis.scores.plan_record import plans_of_report
-        return plans_of_report(self.outcome)
-
-    @property
-    def contacts(self) -> list[dict[str, Any]] | None:
-        """Return the first contacts as in `timing.json`; None if unknown."""
-        return None if self.outcome is None else self.outcome['contacts']
 
     @property
     def violations(self) -> list[dict[str, Any]] | None:
@@ -77,45 +42,9 @@ class Run(ABC):
         return None if self.outcome is None else self.outcome['drivability']['list']
 
     @property
-    @abstractmethod
-    def notices(self) -> tuple[str, ...]:
-        """Return notices about the run, one line each."""
-
-    @property
     def state_hash(self) -> str | None:
         """Return the SHA-256 over all states of an offline run; None for a recording."""
         return None
-
-    @property
-    def timing(self) -> Mapping[str, Any] | None:
-        """Return the content of `timing.json`; None if offline or without recorded cycles."""
-        return None
-
-    @property
-    def bag(self) -> Path | None:
-        """Return the path of its recording; None for an offline run."""
-        return None
-
-    @property
-    def game(self) -> GameDocument:
-        """Return the game as it was run."""
-        return self.log.game
-
-    @property
-    def vehicles(self) -> tuple[str, ...]:
-        """Return the ids of the driven vehicles: humans, then AVs."""
-        return tuple(item.id for item in self.log.vehicles)
-
-    @property
-    def duration_s(self) -> float:
-        """Return its duration on the scenario's time line [s]."""
-        return float((len(self.log.ks) - 1) * self.game.scheduler.time_step_s)
-
-    @property
-    def times_s(self) -> NDArray[np.float64]:
-        """Return the times of the scenario steps of the log since the run's start (K) [s]."""
-        scheduler = self.game.scheduler
-        return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
 
     def states_of(self, vehicle_id: str) -> NDArray[np.float64]:
         """
@@ -125,10 +54,6 @@ class Run(ABC):
         """
         columns = Named(VEHICLE, ((name, at) for at, name in enumerate(self.vehicles)))
         return self.log.vehicle_states[:, columns[vehicle_id]]
-
-    @property
-    def _offline(self) -> Mapping[str, Any] | None:
-        return self.outcome if self.timing is None else None
 
     @abstractmethod
     def setup_against(self, planner: str) -> Setup:
@@ -141,16 +66,6 @@ class Run(ABC):
     @abstractmethod
     def recorded_traces(self) -> Mapping[str, NDArray[np.float64]]:
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
-
-    def recorded_plans(self) -> 'Callable[[], Iterable[RecordedPlan]] | None':
-        """Return a function that reads the recorded plans one by one; None without plans."""
-        return None
-
-    @cached_property
-    def usual_criticality(self) -> 'Criticality':
-        """Measure its criticality by the usual thresholds."""
-        from crgame_ros.analysis.criticality.recorded import measure_log
-        return measure_log(self.log)
 
     @cached_property
     def drive_scores(self) -> 'tuple[VehicleScores, ...]':
@@ -203,23 +118,13 @@ class Run(ABC):
         :param scores: whether vehicles are scored, which takes most of the time.
         """
         from crgame_ros.analysis.tables.run_tables import tables_of
-        return Named('table', tables_of([self.tabulated(scores)]))
+        return Named('table', tables_of([self.scored(scores)]))
 
-    def tabulated(self, scores: bool = True) -> 'TableRun':
-        """Return the run in the form for tables."""
-        from crgame_ros.analysis.tables.table_run import TableRun
-        return TableRun(f'{self.name}:{self.game.epoch}', self.record, self.timing,
-                        self.recorded_plans(), self._offline, scores)
-
-    def reported(self, key: str = 'run1') -> 'ReportRun':
-        """
-        Return the run in the form for reports.
-
-        :param key: unique in the report.
-        """
-        from crgame_ros.analysis.report.run import measured_run
-        return replace(measured_run(self.name, self.bag, self.record, self.timing,
-                                    notices=self.notices, offline=self._offline), key=key)
+    def scored(self, scores: bool = True) -> Self:
+        """Return the same run, for tables with or without scores."""
+        run = copy(self)
+        run.scoring = 'all' if scores else 'none'
+        return run
 
     def report(self, path: FileName) -> Path:
         """
@@ -230,7 +135,7 @@ class Run(ABC):
         from crgame_ros.analysis.report.file import check_report_path, write_report
         file = as_path(path, 'path')
         check_report_path(file)
-        write_report([self.reported()], file)
+        write_report([self], file)
         return file
 
     def save_scenario(self, path: FileName) -> Path:
@@ -258,11 +163,10 @@ class Run(ABC):
         return f'<{type(self).__name__} {self.name}: {who or "nobody"}, {self.duration_s:.1f} s>'
 
     def _repr_html_(self) -> str:
-        from crgame_ros.python_interface.run_html import ShownRun
+        from crgame_ros.python_interface.run_html import run_html
         caption = f'{self.name}: {self.game.benchmark_id}, {self.duration_s:.1f} s' + (
             f', states {self.state_hash[:12]}…' if self.state_hash else '')
-        return ShownRun(caption, self.record, self.usual_criticality, self.contacts,
-                        self.answers).html()
+        return run_html(self, caption)
 
 
 def warn_of(notices: Iterable[str]) -> None:

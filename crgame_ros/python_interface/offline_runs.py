@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 import time
 from typing import Any
@@ -19,7 +18,6 @@ from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import argument_names, as_game, FileName
 from crgame_ros.python_interface.own_planners import name_planners, PlannerLike
 from crgame_ros.recording.export import scenario_path, write_scenario
-from crgame_ros.recording.offline_outcome import offline_outcome
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_inputs import (
     inputs_of,
@@ -27,8 +25,6 @@ from crgame_ros.recording.recorded_inputs import (
     RecordedInputs,
     with_recorded_events,
 )
-from crgame_ros.recording.run_record import run_record_of, RunRecord
-from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import Setup
@@ -79,29 +75,14 @@ class OfflineRun(Run):
     """
 
     def __init__(self, name: str, result: OfflineResult, wall_s: float) -> None:
-        super().__init__(name)
+        super().__init__(name, result=result)
         self.result = result
         self.wall_s = wall_s
-
-    @cached_property
-    def record(self) -> RunRecord:
-        """Return the log, the drivers' commands and the events."""
-        return run_record_of(self.result)
-
-    @property
-    def log(self) -> RunTrajectories:
-        """Return the motion of all vehicles and objects, at the scenario's time steps."""
-        return self.record.log
 
     @property
     def state_hash(self) -> str:
         """Return the SHA-256 over all states: equal for equal inputs."""
         return self.result.state_hash
-
-    @cached_property
-    def outcome(self) -> Mapping[str, Any]:
-        """Return planners, violations and contacts as in `timing.json`."""
-        return offline_outcome(self.result)
 
     @property
     def notices(self) -> tuple[str, ...]:

@@ -2,24 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded runs, with the same interface as offline runs."""
 
-from collections.abc import Callable, Iterable, Mapping
-from functools import cached_property, partial
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.analysis.runs.run import run_name
+from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
 from crgame_ros.python_interface.finished_run import Run
 from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.conversion import convert_log
 from crgame_ros.recording.recorded_game import read_game_document
-from crgame_ros.recording.recorded_plans import read_plans, RecordedPlan
 from crgame_ros.recording.recorded_states import recorded_states
 from crgame_ros.recording.run_folder import recording_in
-from crgame_ros.recording.run_record import record_of_log, RunRecord
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
-from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.simulation.setup import Setup
 import numpy as np
 from numpy.typing import NDArray
@@ -35,48 +31,8 @@ class RecordedRun(Run):
     """
 
     def __init__(self, name: str, bag: Path, log: RunTrajectories) -> None:
-        super().__init__(name)
-        self._bag, self._log = bag, log
-
-    @property
-    def bag(self) -> Path:
-        """Return the path of its recording."""
-        return self._bag
-
-    @property
-    def log(self) -> RunTrajectories:
-        """Return the motion of all vehicles and objects, at the scenario's time steps."""
-        return self._log
-
-    @cached_property
-    def record(self) -> RunRecord:
-        """Return the log, the drivers' commands and the events."""
-        return record_of_log(self._bag, self._log)
-
-    @cached_property
-    def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
-        """Return the content of `timing.json`, or why there is none."""
-        try:
-            return timing_report(self._bag, self.game.epoch, self._log), ()
-        except CrgameError as error:
-            return None, (str(error),)
-
-    @property
-    def timing(self) -> Mapping[str, Any] | None:
-        """Return the content of `timing.json`; None for a recording without cycles."""
-        return self._timed[0]
-
-    @property
-    def outcome(self) -> Mapping[str, Any] | None:
-        """Return planners, violations and contacts; None for a recording without cycles."""
-        return self.timing
-
-    @property
-    def notices(self) -> tuple[str, ...]:
-        """Return the parts of the run that the recording lacks, one line each."""
-        timing, refusal = self._timed
-        told = () if timing is None else timing['notices']
-        return tuple(dict.fromkeys((*told, *self._log.notices, *refusal)))
+        super().__init__(name, bag=bag, log=log)
+        self._bag = bag
 
     def setup_against(self, planner: str) -> Setup:
         """
@@ -96,13 +52,9 @@ class RecordedRun(Run):
         """Return the states (N, 8) of its vehicles at the simulation steps from 0 on."""
         return recorded_states(self._bag, self.game.epoch)
 
-    def recorded_plans(self) -> Callable[[], Iterable[RecordedPlan]]:
-        """Return a function that reads the recorded plans one by one."""
-        return partial(read_plans, self._bag, self.game.epoch)
-
     def exported(self, out: Path) -> tuple[Path, tuple[str, ...]]:
         """Write the scenario; return its file, and the parts that it does not express."""
-        found = convert_log(self._log, self._bag, out)
+        found = convert_log(self.log, self._bag, out)
         return found.path, found.notices
 
 
@@ -113,7 +65,6 @@ def read_run(path: FileName, epoch: int | None = None) -> RecordedRun:
     :param epoch: which run, where a recording holds several; None for the last.
     :raises InputError: if it cannot be read.
     """
-    from crgame_ros.analysis.tables.table_run import run_name
     place = as_path(path, 'run')
     bag = recording_in(place)
     return RecordedRun(run_name(place), bag, read_trajectories(bag, epoch))

@@ -3,7 +3,6 @@
 """Functions on one or several runs: measures, reports and tables."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -45,7 +44,7 @@ def report(runs: Run | FileName | Sequence[Run | FileName], path: FileName) -> P
     check_report_path(file)
     several = _several(runs)
     check_report_runs(len(several))
-    write_report([each.reported(f'run{number}') for number, each in enumerate(several, 1)], file)
+    write_report(several, file)
     return file
 
 
@@ -60,8 +59,7 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
     :return: the folder.
     :raises InputError: if a run cannot be read, or the folder is not writable.
     """
-    from crgame_ros.analysis.tables.run_tables import write_tables
-    from crgame_ros.analysis.tables.table_run import own_id
+    from crgame_ros.analysis.tables.run_tables import own_id, write_tables
     from crgame_ros.analysis.tables.writer import FORMATS
     out = as_path(folder, 'folder')
     file_format = next((name for name in FORMATS if name == to), None)
@@ -69,10 +67,10 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
         raise InputError(f'is "{to}"', 'to', f'give one of {", ".join(FORMATS)}')
     tabulated, ids = [], set[str]()
     for each in _several(runs):
-        found = each.tabulated(scores)
-        name = own_id(found.id, ids)
-        ids.add(name)
-        tabulated.append(replace(found, id=name))
+        found = each.scored(scores)
+        found.id = own_id(found.id, ids)
+        ids.add(found.id)
+        tabulated.append(found)
     write_tables(tabulated, out, file_format)
     return out
 

@@ -2,74 +2,53 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shows a run, or a comparison, as HTML in a notebook."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from html import escape
-from typing import Any
 
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.measure_command import HEAD, replay_rows
-from crgame_ros.analysis.pictures.critical_moments import critical_moments, Touch
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.report.story_section import moment_image
 from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
-from crgame_ros.analysis.scores.plan_record import PlanRecord
-from crgame_ros.recording.run_record import RunRecord
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.vehicle.state import StateColumn
 
 _HEAD = ('', 'driven by', 'greatest speed [m/s]', 'least TTC [s]', 'least distance [m]',
          'contacts', 'plans accepted')
 
 
-@dataclass(frozen=True)
-class ShownRun:
+def run_html(run: Run, caption: str) -> str:
     """
-    The parts of a run that a notebook shows.
+    Return the most critical moment from above, and a row for each driven vehicle.
 
     :param caption: one line.
-    :param record: the run.
-    :param criticality: of the run.
-    :param contacts: as in `timing.json`; None if unknown.
-    :param answers: known answers of planners, by AV.
     """
+    return f'<div>{_picture(run)}{table(free(caption), _HEAD, _rows(run))}</div>'
 
-    caption: str
-    record: RunRecord
-    criticality: Criticality
-    contacts: Sequence[Mapping[str, Any]] | None
-    answers: Mapping[str, PlanRecord]
 
-    def html(self) -> str:
-        """Return the most critical moment from above, and a row for each driven vehicle."""
-        return f'<div>{self._picture()}{table(free(self.caption), _HEAD, self._rows())}</div>'
+def _picture(run: Run) -> str:
+    if not run.vehicles or not run.moments:
+        return ''
+    moment = run.moments[0]
+    image = moment_image(FrameScene(run.log), moment, run.vehicles)
+    return (f'<figure>{image}<figcaption>{number(moment.time_s, 1)} s: '
+            f'{free(moment.why)}</figcaption></figure>')
 
-    def _picture(self) -> str:
-        vehicles = tuple(item.id for item in self.record.log.vehicles)
-        touches = [Touch.from_entry(item) for item in self.contacts or ()
-                   if item['n'] is not None]
-        moments = critical_moments(self.record, self.criticality, touches) if vehicles else ()
-        if not moments:
-            return ''
-        image = moment_image(FrameScene(self.record.log), moments[0], vehicles)
-        return (f'<figure>{image}<figcaption>{number(moments[0].time_s, 1)} s: '
-                f'{free(moments[0].why)}</figcaption></figure>')
 
-    def _rows(self) -> Iterator[Sequence[str]]:
-        log = self.record.log
-        drivers = {item.id: item.driver for item in log.game.humans}
-        drivers |= {item.id: item.planner for item in log.game.avs}
-        for place, found in enumerate(self.criticality.report()):
-            name = found.vehicle_id
-            worst = [found.worst.get(key) for key in ('ttc', 'min_distance')]
-            touched = None if self.contacts is None else sum(
-                name in (item['vehicle'], item['with']) for item in self.contacts)
-            answers = self.answers.get(name)
-            yield (free(name), free(drivers[name]),
-                   number(float(log.vehicle_states[:, place, StateColumn.SPEED].max()), 1),
-                   *(number(None if each is None else each.value) for each in worst),
-                   NOTHING if touched is None else str(touched),
-                   NOTHING if answers is None else share(answers.accepted_share, 1.0))
+def _rows(run: Run) -> Iterator[Sequence[str]]:
+    drivers = {item.id: item.driver for item in run.game.humans}
+    drivers |= {item.id: item.planner for item in run.game.avs}
+    for place, (name, found) in enumerate(run.vehicle_criticality.items()):
+        worst = [found.worst.get(key) for key in ('ttc', 'min_distance')]
+        touched = None if run.contacts is None else sum(
+            name in (item['vehicle'], item['with']) for item in run.contacts)
+        answers = run.answers.get(name)
+        yield (free(name), free(drivers[name]),
+               number(float(run.log.vehicle_states[:, place, StateColumn.SPEED].max()), 1),
+               *(number(None if each is None else each.value) for each in worst),
+               NOTHING if touched is None else str(touched),
+               NOTHING if answers is None else share(answers.accepted_share, 1.0))
 
 
 def replays_html(recorded: Criticality, alternatives: Sequence[Alternative]) -> str:

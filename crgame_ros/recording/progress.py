@@ -18,11 +18,11 @@ class Progress:
     :param clock: returns the time [s].
     """
 
-    def __init__(self, say: Callable[[str], object], what: str,
+    def __init__(self, say: Callable[[str], object], what: str = '',
                  clock: Callable[[], float] = time.monotonic) -> None:
         self._say = say
         self._clock = clock
-        self.what = what
+        self._what = what
         self._told_s = clock()
 
     def __call__(self, share: float) -> None:
@@ -30,4 +30,9 @@ class Progress:
         now_s = self._clock()
         if now_s - self._told_s >= PERIOD_S:
             self._told_s = now_s
-            self._say(f'{self.what}: {100.0 * share:.0f} %')
+            self._say(f'{self._what}: {100.0 * share:.0f} %')
+
+    def tell(self, what: str, share: float) -> None:
+        """Report the share that is done of another piece of work."""
+        self._what = what
+        self(share)

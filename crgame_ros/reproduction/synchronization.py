@@ -11,9 +11,9 @@ from pathlib import Path
 import time
 from typing import Any, TypeVar
 
-from crgame_ros.analysis.pictures.figure_run import FigureRun
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.game import TimingSpec
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
@@ -185,7 +185,7 @@ def measure_synchronization(game: Path, planner: str, duration_s: float,
     """
     _, beside_proposed = others_beside(
         lambda: run_live(game, planner, folder / 'proposed', duration_s))
-    proposed = FigureRun(folder / 'proposed', PROPOSED, None, print).timed
+    proposed = Run.of_recording(folder / 'proposed', name=PROPOSED).timed
     setup = effective_setup(RunRequest(game=game, planners=(planner,)))
     loop = NaiveLoop(setup, folder / 'naive')
     _, beside_naive = others_beside(lambda: loop.run(duration_s))

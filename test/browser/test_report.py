@@ -12,7 +12,7 @@ from typing import Any
 
 from browser_support import Browser
 from crgame_ros.analysis.report.file import report_html
-from crgame_ros.analysis.report.run import measured_run
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
@@ -33,7 +33,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     drivers, _ = recorded_inputs(setup)
     record = run_record_of(run_offline(setup, drivers=drivers, duration_s=13.0))
     path = tmp_path_factory.mktemp('report') / 'report.html'
-    path.write_text(report_html([measured_run('run', None, record, None)]), encoding='utf-8')
+    path.write_text(report_html([Run('run', record=record)]), encoding='utf-8')
     return path
 
 

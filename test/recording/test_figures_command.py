@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from crgame_ros.analysis.pictures.figure_run import FigureRun
 from crgame_ros.analysis.pictures.scene_frame import read_followed_plans
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.cli import main
 from crgame_ros.game.file import load_game
 from crgame_ros.messages.joints import vehicle_joint_names, vehicle_to_joints
@@ -120,7 +120,7 @@ def test_plans_are_drawn_as_recorded(run: Path, result: OfflineResult) -> None:
     assert [plan.start_s for plan in plans] == pytest.approx(
         [0.0, *(0.5 * np.arange(1, len(plans)) + 0.03)])
     # The AV followed its plans: its path lies on each of them.
-    scene = FigureRun(run, None, None, print).scene
+    scene = Run.of_recording(run).scene
     window = scene.windows([20])[0]
     (plan,) = scene.at(22, window).plans
     ticks = result.states_of('av0')[::result.setup.scheduler.steps_per_tick]

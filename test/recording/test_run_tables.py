@@ -10,13 +10,13 @@ import shutil
 import tracemalloc
 from typing import Any, NamedTuple
 
+from crgame_ros.analysis.runs.run import Run, run_name
 from crgame_ros.analysis.tables import pairs as pairs_table
 from crgame_ros.analysis.tables import run_tables
 from crgame_ros.analysis.tables import states as states_table
 from crgame_ros.analysis.tables import writer as table_writer
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.run_tables import TABLES, write_tables
-from crgame_ros.analysis.tables.table_run import run_name, TableRun
 from crgame_ros.analysis.tables.writer import FORMATS
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
@@ -27,7 +27,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.recorded_plans import RecordedPlan
-from crgame_ros.recording.run_record import run_record_of
+from crgame_ros.recording.run_record import run_record_of, RunRecord
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup
 from crgame_ros.vehicle.state import VehicleState
@@ -255,7 +255,7 @@ def test_the_same_recording_gives_the_same_bytes(recorded: Recorded, tmp_path: P
 def test_offline_run_and_recording_have_the_same_tables(
         recorded: Recorded, tmp_path: Path, tables: dict[str, polars.DataFrame]) -> None:
     """All numbers agree up to 1e-9, but for columns that only a recording has."""
-    write_tables([TableRun('pedestrian:0', run_record_of(recorded.result))], tmp_path,
+    write_tables([named_run('pedestrian:0', run_record_of(recorded.result))], tmp_path,
                  'parquet')
     for name in ('states', 'pairs', 'crossings', 'events', 'vehicles'):
         here, there = polars.read_parquet(tmp_path / f'{name}.parquet'), tables[name]
@@ -291,7 +291,12 @@ def test_plans_are_compared_with_what_was_driven(recorded: Recorded, tmp_path: P
     plans = [_plan(result, 5, 0.3, own[5]), _plan(result, 6, 0.0, own[6]),
              _plan(result, 7, 2.0, own[7]), _plan(result, last - 15, 0.0, None),
              RecordedPlan('av0', 900_000_000, 9, 0.2, None, 'has no points', None)]
-    run = TableRun('a', run_record_of(result), None, lambda: plans)
+    class Planned(Run):
+        """A run with these plans."""
+
+        plans = staticmethod(lambda: plans)
+
+    run = Planned('a', record=run_record_of(result))
     write_tables([run], tmp_path, 'parquet')
     table = polars.read_parquet(tmp_path / 'plans.parquet')
     assert table['number'].to_list() == [0, 1, 2, 3, 4]
@@ -365,7 +370,7 @@ def test_numbers_beyond_all_bounds_give_a_line(recorded: Recorded, tmp_path: Pat
     """JSON has no largest number, but a column has."""
     record = replace(run_record_of(recorded.result), fired=(FiredEvent('x', n, k, 'trigger'),))
     with pytest.raises(InputError, match='out of all bounds'):
-        write_tables([TableRun('a', record)], tmp_path, 'parquet')
+        write_tables([named_run('a', record)], tmp_path, 'parquet')
     assert list(tmp_path.iterdir()) == []
 
 
@@ -389,7 +394,14 @@ def test_runs_are_named_by_their_folders(tmp_path: Path) -> None:
     assert run_name(tmp_path / 'A' / 'trial.mcap') == 'trial'
 
 
-def _stretched(result: OfflineResult, times: int) -> TableRun:
+def named_run(name: str, record: RunRecord) -> Run:
+    """Return a run with this id in all rows."""
+    run = Run(name, record=record)
+    run.id = name
+    return run
+
+
+def _stretched(result: OfflineResult, times: int) -> Run:
     """Repeat the motion of a run so many times, one after the other."""
     record = run_record_of(result)
     log = record.log
@@ -397,7 +409,9 @@ def _stretched(result: OfflineResult, times: int) -> TableRun:
         log, ks=np.arange(len(log.ks) * times),
         **{name: np.tile(getattr(log, name), (times, 1, 1)) for name in (
             'vehicle_states', 'published_states', 'object_poses', 'object_velocities')})
-    return TableRun('a', replace(record, log=longer), scored=False)
+    run = named_run('a', replace(record, log=longer))
+    run.scoring = 'none'
+    return run
 
 
 @pytest.mark.exhaustive

@@ -3,7 +3,6 @@
 """`crgame report`: write one HTML file on a run, or on several side by side."""
 
 import argparse
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 import sys
@@ -40,15 +39,14 @@ def report(values: argparse.Namespace) -> int:
         check_report_runs,
         write_report,
     )
-    from crgame_ros.analysis.report.run import read_report_run
+    from crgame_ros.analysis.runs.run import Run
     from crgame_ros.recording.progress import Progress
     check_report_runs(len(values.runs))
     out = values.out or _place(values.runs[0])
     check_report_path(out)
     say = partial(print, file=sys.stderr, flush=True)
-    runs = [replace(read_report_run(path, values.epoch, Progress(say, f'measuring {path}')),
-                    key=f'run{number}') for number, path in enumerate(values.runs, 1)]
-    write_report(runs, out)
+    write_report([Run.of_recording(path, values.epoch, progress=Progress(say).tell)
+                  for path in values.runs], out)
     print(out)
     return 0
 

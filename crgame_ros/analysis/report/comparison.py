@@ -7,13 +7,12 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.report.criticality_section import marked
-from crgame_ros.analysis.report.outcome_section import contacts_of_report
 from crgame_ros.analysis.report.planners_section import planners_compared
-from crgame_ros.analysis.report.run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.run_section import title_of
-from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, Section
+from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, PLOTTED, Section
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.vehicle.state import StateColumn
 
 # Colours distinguish runs, dashes the vehicles of a run.
@@ -25,7 +24,7 @@ _COMPARED = {'ttc': 'least TTC [s]', 'thw': 'least THW [s]', 'gap': 'least gap [
              'drac': 'greatest DRAC [m/s²]', 'min_distance': 'least distance [m]'}
 
 
-def comparison_section(runs: Sequence[ReportRun]) -> Section:
+def comparison_section(runs: Sequence[Run]) -> Section:
     """Return the section that compares runs; letters identify them in plots."""
     head = ('', *(f'{letter(i)}: {free(run.name)}' for i, run in enumerate(runs)))
     rows = [(words, *(cell(run) for run in runs)) for words, cell in _rows()]
@@ -41,7 +40,7 @@ def letter(place: int) -> str:
     return (letter(first - 1) if first else '') + chr(ord('A') + last)
 
 
-def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
+def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
     yield 'game', lambda run: free(title_of(run))
     yield 'scenario', lambda run: free(run.log.game.benchmark_id)
     yield 'drivers', lambda run: ', '.join(
@@ -53,10 +52,10 @@ def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
     for name, words in _COMPARED.items():
         yield words, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
-        each.tet_s for each in run.criticality.report()))
+        each.tet_s for each in run.usual_criticality.report()))
     yield 'least PET [s]', _least_pet
-    yield 'contacts', lambda run: NOTHING if (found := contacts_of_report(run)) is None \
-        else str(len(found))
+    yield 'contacts', lambda run: NOTHING if run.contacts is None \
+        else str(len(run.contacts))
     yield 'violations', lambda run: NOTHING if run.outcome is None \
         else str(run.outcome['drivability']['violations'])
     yield 'events that took effect', lambda run: str(len(run.record.fired))
@@ -66,56 +65,55 @@ def _rows() -> Iterator[tuple[str, Callable[[ReportRun], str]]]:
         run, lambda timing: number(timing['max_cumulative_error_ms'], 1))
 
 
-def worst_of_all(run: ReportRun, name: str) -> str:
+def worst_of_all(run: Run, name: str) -> str:
     """Return the worst value of a measure over all vehicles of a run, linked to its moment."""
-    found = [each.worst[name] for each in run.criticality.report() if name in each.worst]
+    found = [each.worst[name] for each in run.usual_criticality.report() if name in each.worst]
     if not found:
         return NOTHING
     sign = MEASURES[name].worst
     worst = max(found, key=lambda each: sign * each.value)
-    critical = run.criticality.thresholds.exceeded(name, worst.value)
+    critical = run.usual_criticality.thresholds.exceeded(name, worst.value)
     return f'{marked(number(worst.value), critical)} <small>at {moment(run, worst.time_s)}</small>'
 
 
-def accepted(run: ReportRun) -> str:
+def accepted(run: Run) -> str:
     """Return the text on how many plans of all AVs were accepted."""
     entries = () if run.outcome is None else run.outcome['planners'].values()
     asked, taken = (sum(entry[key] or 0 for entry in entries) for key in ('requests', 'accepted'))
     return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING
 
 
-def _format_value(run: ReportRun, say: Callable[[Any], str]) -> str:
+def _format_value(run: Run, say: Callable[[Any], str]) -> str:
     return NOTHING if run.timing is None else say(run.timing)
 
 
-def _least_pet(run: ReportRun) -> str:
-    found = [each for vehicle in run.criticality.report() for each in vehicle.crossings]
+def _least_pet(run: Run) -> str:
+    found = [each for vehicle in run.usual_criticality.report() for each in vehicle.crossings]
     if not found:
         return NOTHING
     least = min(found, key=lambda each: each.pet_s)
-    text = marked(number(least.pet_s), least.pet_s < run.criticality.thresholds.pet_s)
+    text = marked(number(least.pet_s), least.pet_s < run.usual_criticality.thresholds.pet_s)
     return f'{text} <small>at {moment(run, least.entered_s)}</small>'
 
 
-def _latency(run: ReportRun) -> str:
+def _latency(run: Run) -> str:
     entries = () if run.outcome is None else run.outcome['planners'].values()
     known = [entry['latency_ms']['p99'] for entry in entries if entry['latency_ms']]
     return number(max(known), 1) if known else NOTHING
 
 
-def _plots(runs: Sequence[ReportRun]) -> Iterator[Plot]:
+def _plots(runs: Sequence[Run]) -> Iterator[Plot]:
     units = {name: MEASURES[name].symbol for name in PLOTTED}
     yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
         :, i, StateColumn.SPEED], None)
     for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),
                                 ('min_distance', 'Distance', None)):
-        place = PLOTTED.index(name)
         yield _plot(runs, name.replace('_', '-'), words, units[name],
-                    lambda run, i, place=place: run.course[i, place], bounds)  # type: ignore[misc]
+                    lambda run, i, name=name: run.course[name][i], bounds)  # type: ignore[misc]
 
 
-def _plot(runs: Sequence[ReportRun], key: str, words: str, unit: str,
-          values: Callable[[ReportRun, int], Any], bounds: tuple[float, float] | None) -> Plot:
+def _plot(runs: Sequence[Run], key: str, words: str, unit: str,
+          values: Callable[[Run, int], Any], bounds: tuple[float, float] | None) -> Plot:
     lines = [PlotLine(f'{letter(place)} {item.id}', run.times_s, values(run, i),
                       _COLOURS[place % len(_COLOURS)], _DASHES[i % len(_DASHES)])
              for place, run in enumerate(runs) for i, item in enumerate(run.log.vehicles)]

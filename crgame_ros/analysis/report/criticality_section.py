@@ -7,13 +7,20 @@ from collections.abc import Iterator, Sequence
 from crgame_ros.analysis.criticality.criticality import MEASURES, VehicleCriticality
 from crgame_ros.analysis.criticality.headways import SHORT_S
 from crgame_ros.analysis.criticality.thresholds import Thresholds
+from crgame_ros.analysis.pictures.story_moments import TWICE
 from crgame_ros.analysis.report.motion_section import dash_of
-from crgame_ros.analysis.report.run import PLOTTED, ReportRun
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
-from crgame_ros.analysis.report.story_moments import TWICE
+from crgame_ros.analysis.report.section import (
+    colours_of,
+    Plot,
+    PlotLimit,
+    PlotLine,
+    PLOTTED,
+    Section,
+)
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import note, number, plain, share, table
+from crgame_ros.analysis.runs.run import Run
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,10 +30,10 @@ _SHOWN_S = 10.0
 _SHOWN_DRAC = 12.0
 
 
-def criticality_section(run: ReportRun) -> Section:
+def criticality_section(run: Run) -> Section:
     """Return the section on criticality."""
-    limits = run.criticality.thresholds
-    measured = run.criticality.report()
+    limits = run.usual_criticality.thresholds
+    measured = run.usual_criticality.report()
     html = note('Each row is the most critical value of the whole run, with which other, when; '
                 'the time leads to the picture of that moment. Bold and ‼ mark what is beyond a '
                 f'threshold: TTC below {limits.ttc_s:g} s, DRAC above {limits.drac:g} m/s², '
@@ -59,7 +66,7 @@ def marked(text: str, critical: bool) -> str:
         if critical else text
 
 
-def _worst(run: ReportRun, vehicle: VehicleCriticality,
+def _worst(run: Run, vehicle: VehicleCriticality,
            limits: Thresholds) -> Iterator[Sequence[str]]:
     for name, measure in MEASURES.items():
         worst = vehicle.worst.get(name)
@@ -71,7 +78,7 @@ def _worst(run: ReportRun, vehicle: VehicleCriticality,
                moment(run, worst.time_s))
 
 
-def _headways(run: ReportRun, vehicle: VehicleCriticality) -> Iterator[Sequence[str]]:
+def _headways(run: Run, vehicle: VehicleCriticality) -> Iterator[Sequence[str]]:
     if not vehicle.headways.following:
         return
     for values, unit in ((vehicle.headways.distances(), 'm'), (vehicle.headways.times(), 's')):
@@ -81,9 +88,9 @@ def _headways(run: ReportRun, vehicle: VehicleCriticality) -> Iterator[Sequence[
                    number(each.median), unit, *shares)
 
 
-def _crossings(run: ReportRun, vehicle: VehicleCriticality,
+def _crossings(run: Run, vehicle: VehicleCriticality,
                limits: Thresholds) -> Iterator[Sequence[str]]:
-    ids = run.criticality.ids
+    ids = run.usual_criticality.ids
     for each in vehicle.crossings:
         yield (named(run, vehicle.vehicle_id), named(run, ids[each.first]),
                named(run, ids[each.second]), moment(run, each.entered_s),
@@ -91,17 +98,17 @@ def _crossings(run: ReportRun, vehicle: VehicleCriticality,
                       limits.exceeded('pet', each.pet_s)))
 
 
-def _plots(run: ReportRun, limits: Thresholds) -> Iterator[Plot]:
+def _plots(run: Run, limits: Thresholds) -> Iterator[Plot]:
     lines_at = {'ttc': (PlotLimit(limits.ttc_s, 'critical below'),),
                 'drac': (PlotLimit(limits.drac, 'critical above'),),
                 'min_distance': (PlotLimit(0.0, 'contact'),), 'gap': (PlotLimit(0.0, 'contact'),)}
-    for place, name in enumerate(PLOTTED):
-        values = run.course[:, place]
+    for name in PLOTTED:
+        values = run.course[name]
         if not np.isfinite(values).any():
             continue
         unit = MEASURES[name].symbol
         yield Plot(name.replace('_', '-'), MEASURES[name].label, unit, tuple(
-            PlotLine(item.id, run.times_s, values[i], run.colours[item.id], dash_of(item.role))
+            PlotLine(item.id, run.times_s, values[i], colours_of(run)[item.id], dash_of(item.role))
             for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),
             bounds=_bounds(name, unit, values, limits))
 

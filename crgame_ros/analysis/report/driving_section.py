@@ -9,11 +9,11 @@ from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
 from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
 from crgame_ros.analysis.report.motion_section import dash_of
-from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.report.section import Plot, PlotLine, Section
+from crgame_ros.analysis.report.section import colours_of, Plot, PlotLine, Section
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, note, number, plain, table
+from crgame_ros.analysis.runs.run import Run
 
 # Longer times to lane crossing are not meaningful [s].
 _SHOWN_S = 10.0
@@ -27,9 +27,9 @@ _WORDS = {
     'brake_applications': 'Applications of the brake'}
 
 
-def driving_section(run: ReportRun) -> Section | None:
+def driving_section(run: Run) -> Section | None:
     """Return the section on the vehicles that humans drove; None without any."""
-    found = [each for each in run.behaviour if each.human or each.take_overs]
+    found = [each for each in run.usual_behaviour if each.human or each.take_overs]
     if not found:
         return None
     html = note('Each measure names its variant where the pointer rests on it. Lane changes are '
@@ -51,9 +51,9 @@ def driving_section(run: ReportRun) -> Section | None:
         if told:
             html += table(caption, head, told, 'numbers')
     lines = tuple(PlotLine(
-        each.vehicle_id, each.times_s, each.tlc_s, run.colours[each.vehicle_id],
-        dash_of(item.role)) for each, item in zip(run.behaviour, run.log.vehicles, strict=True)
-        if each in found)
+        each.vehicle_id, each.times_s, each.tlc_s, colours_of(run)[each.vehicle_id],
+        dash_of(item.role)) for each, item in zip(
+            run.usual_behaviour, run.log.vehicles, strict=True) if each in found)
     return Section('driving', 'How people drove', html, (
         Plot('tlc', 'Time to lane crossing (TLC)', 's', lines, bounds=(0.0, _SHOWN_S)),))
 
@@ -68,14 +68,14 @@ def _measures(found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
                    *map(number, values))
 
 
-def _reactions(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+def _reactions(run: Run, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
     for driver in found:
         for each in driver.reactions:
             yield (named(run, driver.vehicle_id), free(each.event), moment(run, each.event_s),
                    *map(number, each.reaction))
 
 
-def _lane_changes(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+def _lane_changes(run: Run, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
     for driver in found:
         for each in driver.lane_changes:
             yield (named(run, driver.vehicle_id), each.side, number(each.time_s, 1),
@@ -85,7 +85,7 @@ def _lane_changes(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[
                                   number(None if gap is None else gap.time_gap_s))))
 
 
-def _take_over_rows(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
+def _take_over_rows(run: Run, found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
     for driver in found:
         for each in driver.take_overs:
             yield (named(run, driver.vehicle_id),
@@ -94,7 +94,7 @@ def _take_over_rows(run: ReportRun, found: Sequence[DriverBehaviour]) -> Iterato
                    number(each.to_stable_s))
 
 
-def task_section(run: ReportRun) -> Section | None:
+def task_section(run: Run) -> Section | None:
     """Return the section on answers, requests and other tasks; None without tasks."""
     events = task_events(run.record)
     if not events:
@@ -114,7 +114,7 @@ def task_section(run: ReportRun) -> Section | None:
     return Section('tasks', 'Tasks besides driving', html)
 
 
-def _scores(run: ReportRun, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
+def _scores(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
     for score in detection_scores(events):
         yield (free(score.task), named(run, score.seat), str(score.hits), str(score.misses),
                str(score.premature), str(score.unrequested), number(score.hit_rate),
@@ -122,14 +122,14 @@ def _scores(run: ReportRun, events: Sequence[TaskEvent]) -> Iterator[Sequence[st
                number(score.response_median_s))
 
 
-def _requests(run: ReportRun, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
+def _requests(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
     for event in events:
         if event.what == 'request':
             yield (free(event.name), named(run, event.seat), moment(run, event.onset_s),
                    number(event.times.delay_ms, 0), number(event.response_time_s))
 
 
-def _spans(run: ReportRun, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
+def _spans(run: Run, events: Sequence[TaskEvent]) -> Iterator[Sequence[str]]:
     for event in events:
         if event.what == 'span':
             yield (free(event.name), named(run, event.seat), moment(run, event.onset_s),

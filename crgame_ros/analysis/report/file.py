@@ -18,14 +18,14 @@ from crgame_ros.analysis.report.criticality_section import criticality_section
 from crgame_ros.analysis.report.document import plotted_document
 from crgame_ros.analysis.report.driving_section import driving_section, task_section
 from crgame_ros.analysis.report.motion_section import input_section, motion_section
-from crgame_ros.analysis.report.outcome_section import contacts_of_report, outcome_section
+from crgame_ros.analysis.report.outcome_section import outcome_section
 from crgame_ros.analysis.report.planners_section import planners_section
-from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import began, run_section, software_note, title_of
 from crgame_ros.analysis.report.section import Plot, PlotLine, Section
 from crgame_ros.analysis.report.story_section import story_section
 from crgame_ros.analysis.report.text import free, NOTHING, number
 from crgame_ros.analysis.report.timing_section import plan_section, timing_section
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.errors import InputError
 from crgame_ros.software import software
 from crgame_ros.whole_file import write_text
@@ -42,7 +42,7 @@ ALL_POINTS = 300_000
 # Points of a column: its smallest and greatest value, and one without a value.
 _A_COLUMN = 3
 # The sections of a run's report, in order; a new section is added here.
-SECTIONS: tuple[Callable[[ReportRun], Section | None], ...] = (
+SECTIONS: tuple[Callable[[Run], Section | None], ...] = (
     story_section, criticality_section, outcome_section, driving_section, task_section,
     planners_section, input_section, motion_section, plan_section, timing_section, run_section)
 
@@ -121,14 +121,19 @@ def script_json(content: object) -> str:
     return text.replace('<', '\\u003c').replace('>', '\\u003e').replace('&', '\\u0026')
 
 
-def report_html(runs: Sequence[ReportRun], software: str = '') -> str:
+def report_html(runs: Sequence[Run], software: str = '') -> str:
     """
     Return the page.
 
-    :param runs: one or more, each with a unique key.
+    :param runs: one or more.
     :param software: HTML on the software that wrote the report.
     :raises CrgameError: if Plotly is not installed.
     """
+    for run in runs:
+        # It measures them as well.
+        run.course  # noqa: B018
+    if len(runs) > 1:
+        runs = [run.as_part(f'run{number}') for number, run in enumerate(runs, 1)]
     parts = [(run, [section for make in SECTIONS if (section := make(run)) is not None])
              for run in runs]
     several = len(runs) > 1
@@ -151,14 +156,14 @@ def report_html(runs: Sequence[ReportRun], software: str = '') -> str:
     return plotted_document(title, '\n'.join(body), data)
 
 
-def _header(runs: Sequence[ReportRun], title: str) -> str:
+def _header(runs: Sequence[Run], title: str) -> str:
     if len(runs) > 1:
         return f'<header><h1>{free(title)}</h1><p class="lead">{len(runs)} runs</p></header>'
     return (f'<header><h1>{free(title)}</h1><p class="lead">{_lead(runs[0])}</p>'
             f'{_chips(runs[0])}</header>')
 
 
-def _lead(run: ReportRun) -> str:
+def _lead(run: Run) -> str:
     game = run.log.game
     who = [f'{item.id} driven by {free(item.driver)}' for item in game.humans]
     who += [f'{item.id} planned by {free(item.planner)}' for item in game.avs]
@@ -169,13 +174,13 @@ def _lead(run: ReportRun) -> str:
     return ' · '.join(filter(None, parts))
 
 
-def _chips(run: ReportRun) -> str:
+def _chips(run: Run) -> str:
     return '<dl class="chips">' + ''.join(
         f'<div><dt>{words}</dt><dd>{value}</dd></div>' for words, value in _facts(run)) + '</dl>'
 
 
-def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
-    contacts = contacts_of_report(run)
+def _facts(run: Run) -> Iterator[tuple[str, str]]:
+    contacts = run.contacts
     if contacts is not None:
         yield 'contacts', str(len(contacts))
     if run.outcome is not None:
@@ -189,7 +194,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
         yield 'real-time ratio', number(run.timing['real_time_ratio']['final'], 3)
 
 
-def _navigation(parts: Sequence[tuple[ReportRun, list[Section]]], several: bool) -> str:
+def _navigation(parts: Sequence[tuple[Run, list[Section]]], several: bool) -> str:
     links = [('all-comparison', 'Comparison')] if several else []
     if several:
         links += [(run.key, f'{letter(place)}: {free(run.name)}')
@@ -220,11 +225,10 @@ def _plot(address: str, plot: Plot) -> str:
 MOST_RUNS = 12
 
 
-def write_report(runs: Sequence[ReportRun], path: Path, driven_here: bool = False) -> None:
+def write_report(runs: Sequence[Run], path: Path, driven_here: bool = False) -> None:
     """
     Write the report of one or more runs.
 
-    :param runs: each with a unique key.
     :param path: path of the file.
     :param driven_here: whether this software, on this machine, has just driven the runs.
     :raises InputError: if the file cannot be written.

@@ -4,10 +4,10 @@
 
 from collections.abc import Iterator
 
-from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
-from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, PlotSpan, Section
+from crgame_ros.analysis.report.section import colours_of, Dash, Plot, PlotLine, PlotSpan, Section
 from crgame_ros.analysis.report.text import note, NOTHING, number, table
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.objects import Role
 from crgame_ros.timing.cycle_rows import COMMAND_COLUMNS
 from crgame_ros.vehicle.state import StateColumn
@@ -30,7 +30,7 @@ _INPUTS = (('throttle', 'Throttle', '0 to 1', (-0.05, 1.05)),
 _WAY_POINTS, _WAY_LEAST = 6000, 20
 
 
-def motion_section(run: ReportRun) -> Section:
+def motion_section(run: Run) -> Section:
     """Return the section on speeds, headings and positions of the driven vehicles."""
     rows = []
     states, distances = run.log.vehicle_states, run.record.ways()
@@ -44,7 +44,7 @@ def motion_section(run: ReportRun) -> Section:
     html = table('How the driven vehicles moved', (
         'vehicle', 'way [m]', 'mean speed [m/s]', 'least [m/s]', 'greatest [m/s]',
         'hardest braking [m/s²]', 'hardest acceleration [m/s²]'), rows, 'numbers')
-    colours = run.colours
+    colours = colours_of(run)
     profiles = [
         Plot(key, title, unit, tuple(
             PlotLine(item.id, run.times_s, _unwrapped(states[:, i, column], column),
@@ -68,7 +68,7 @@ def _unwrapped(values: FloatArray, column: StateColumn) -> FloatArray:
     return np.unwrap(values) if column is StateColumn.YAW else values
 
 
-def _others_ways(run: ReportRun) -> Iterator[PlotLine]:
+def _others_ways(run: Run) -> Iterator[PlotLine]:
     poses = run.log.object_poses
     if not poses.shape[1]:
         return
@@ -80,7 +80,7 @@ def _others_ways(run: ReportRun) -> Iterator[PlotLine]:
     yield PlotLine('others', broken[:, 0], broken[:, 1], 'others')
 
 
-def input_section(run: ReportRun) -> Section | None:
+def input_section(run: Run) -> Section | None:
     """Return the section on drivers' inputs; None where they were not recorded."""
     record = run.record
     if not len(record.ns):
@@ -100,18 +100,18 @@ def input_section(run: ReportRun) -> Section | None:
             'numbers')
     plots = tuple(Plot(key, title, unit, tuple(
         PlotLine(item.id, record.times_s, record.commands[:, i, COMMAND_COLUMNS.index(key)],
-                 run.colours[item.id], dash_of(item.role)) for i, item in vehicles), spans=spans,
-        bounds=bounds) for key, title, unit, bounds in _INPUTS) if rows else ()
+                 colours_of(run)[item.id], dash_of(item.role)) for i, item in vehicles),
+        spans=spans, bounds=bounds) for key, title, unit, bounds in _INPUTS) if rows else ()
     return Section('inputs', 'Driver inputs', html, plots)
 
 
-def _spans(run: ReportRun, i: int, vehicle: str, role: Role) -> Iterator[PlotSpan]:
+def _spans(run: Run, i: int, vehicle: str, role: Role) -> Iterator[PlotSpan]:
     commands, times_s = run.record.commands[:, i], run.record.times_s
     for start_s, end_s in stretches(commands[:, _REVERSE] > 0.5, times_s):
         yield PlotSpan(start_s, end_s, f'{vehicle} in reverse', 'warn')
     if role is Role.AUTONOMOUS:
         for start_s, end_s in stretches(np.isfinite(commands[:, 0]), times_s):
-            yield PlotSpan(start_s, end_s, f'{vehicle} taken over', run.colours[vehicle])
+            yield PlotSpan(start_s, end_s, f'{vehicle} taken over', colours_of(run)[vehicle])
 
 
 def stretches(holds: NDArray[np.bool_], times_s: FloatArray) -> list[tuple[float, float]]:

@@ -5,26 +5,21 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, table
+from crgame_ros.analysis.runs.run import Run
 
 
-def outcome_section(run: ReportRun) -> Section:
+def outcome_section(run: Run) -> Section:
     """Return the section on contacts, violations and events that took effect."""
     html = _contacts(run) + _violations(run) + _events(run)
     return Section('outcome', 'Contacts, violations, events', html)
 
 
-def contacts_of_report(run: ReportRun) -> Sequence[Mapping[str, Any]] | None:
-    """Return the contacts as in `timing.json`; None if unknown."""
-    return None if run.outcome is None else run.outcome['contacts']
-
-
-def _contacts(run: ReportRun) -> str:
-    contacts = contacts_of_report(run)
+def _contacts(run: Run) -> str:
+    contacts = run.contacts
     if contacts is None:
         return note('Contacts: the recording does not tell.')
     if not contacts:
@@ -38,12 +33,12 @@ def _contacts(run: ReportRun) -> str:
             for item in contacts], 'numbers')
 
 
-def _time_s(run: ReportRun, item: Mapping[str, Any]) -> float | None:
+def _time_s(run: Run, item: Mapping[str, Any]) -> float | None:
     n = item['n']
     return None if n is None else n * run.log.game.scheduler.dt_s
 
 
-def _violations(run: ReportRun) -> str:
+def _violations(run: Run) -> str:
     if run.outcome is None:
         return note('Violations: the recording does not tell.')
     found = run.outcome['drivability']['list']
@@ -55,7 +50,7 @@ def _violations(run: ReportRun) -> str:
         for item in found], 'numbers')
 
 
-def _events(run: ReportRun) -> str:
+def _events(run: Run) -> str:
     known = run.log.game.events
     if not known and not run.record.fired:
         return note('The game has no events.')
@@ -63,7 +58,7 @@ def _events(run: ReportRun) -> str:
                  _event_rows(run), 'numbers')
 
 
-def _event_rows(run: ReportRun) -> Iterator[Sequence[str]]:
+def _event_rows(run: Run) -> Iterator[Sequence[str]]:
     dt_s = run.log.game.scheduler.dt_s
     fired = run.record.fired
     for event in fired:

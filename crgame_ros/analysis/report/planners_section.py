@@ -5,10 +5,10 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Section
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 
@@ -37,14 +37,14 @@ class _Driver(NamedTuple):
     scores: VehicleScores
 
 
-def planners_section(run: ReportRun) -> Section | None:
+def planners_section(run: Run) -> Section | None:
     """Return the section on the scores of planners and humans; None without planners."""
     if not run.log.game.avs:
         return None
-    if not run.scores.vehicles:
+    if not run.usual_scores.vehicles:
         return Section('planners', 'How planners drove', note(
-            f'There are no scores: {free(run.scores.refusal)}'))
-    found = sorted(run.scores.vehicles, key=lambda each: each.role == 'human')
+            f'There are no scores: {free(run.usual_scores.refusal)}'))
+    found = sorted(run.usual_scores.vehicles, key=lambda each: each.role == 'human')
     drivers = [_Driver(_who(run, each), each) for each in found]
     html = note('Each score names its variant where the pointer rests on it. The nuPlan score is '
                 'the product of the lines with × times the weighted mean of those with +.'
@@ -54,19 +54,19 @@ def planners_section(run: ReportRun) -> Section | None:
     return Section('planners', 'How planners drove', html)
 
 
-def planners_compared(runs: Sequence[ReportRun], letters: Sequence[str]) -> str:
+def planners_compared(runs: Sequence[Run], letters: Sequence[str]) -> str:
     """
     Return HTML that compares the planners of several runs; empty without any.
 
     :param letters: letters that identify the runs.
     """
     drivers = [_Driver(f'{letter}: {_who(run, each)}', each)
-               for run, letter in zip(runs, letters, strict=True) for each in run.scores.vehicles
-               if each.role != 'human']
+               for run, letter in zip(runs, letters, strict=True)
+               for each in run.usual_scores.vehicles if each.role != 'human']
     return _table('How planners drove, the runs side by side', drivers) if drivers else ''
 
 
-def _who(run: ReportRun, scores: VehicleScores) -> str:
+def _who(run: Run, scores: VehicleScores) -> str:
     planner = f' {free(scores.planner)}' if scores.planner else ''
     return f'{named(run, scores.vehicle_id)}{planner}'
 
@@ -100,7 +100,7 @@ def _cell(name: str, value: float | None) -> str:
     return number(value, 3 if name in _NUPLAN or name == 'accepted_share' else 1)
 
 
-def _remarks(run: ReportRun, scores: VehicleScores) -> Iterator[str]:
+def _remarks(run: Run, scores: VehicleScores) -> Iterator[str]:
     """Yield remarks on a vehicle's scores, and its failures."""
     who = named(run, scores.vehicle_id)
     if scores.nuplan is not None:

@@ -5,9 +5,9 @@
 from collections.abc import Iterator
 from datetime import datetime, UTC
 
-from crgame_ros.analysis.report.run import ReportRun
-from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.section import colours_of, Section
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.objects import Role
 
@@ -15,7 +15,7 @@ from crgame_ros.game.objects import Role
 _LONGEST_FILE = 20_000
 
 
-def run_section(run: ReportRun) -> Section:
+def run_section(run: Run) -> Section:
     """Return the section on the run itself."""
     game = run.log.game
     html = table('The run', (), [(label, value) for label, value in _facts(run)], 'facts')
@@ -36,12 +36,12 @@ def run_section(run: ReportRun) -> Section:
     return Section('run', 'What was run', html)
 
 
-def title_of(run: ReportRun) -> str:
+def title_of(run: Run) -> str:
     """Return a run's title, unescaped."""
     return run.log.game.title or run.log.game.benchmark_id or run.name
 
 
-def began(run: ReportRun) -> str:
+def began(run: Run) -> str:
     """Return when a run was recorded."""
     if run.began_ns is None:
         return NOTHING
@@ -49,7 +49,7 @@ def began(run: ReportRun) -> str:
     return when.strftime('%Y-%m-%d %H:%M:%S UTC')
 
 
-def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
+def _facts(run: Run) -> Iterator[tuple[str, str]]:
     game = run.log.game
     scheduler = game.scheduler
     yield 'game', free(game.title or NOTHING)
@@ -73,7 +73,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
         yield 'view', view
 
 
-def _sound(run: ReportRun) -> Iterator[str]:
+def _sound(run: Run) -> Iterator[str]:
     """Yield the sound settings in the cockpit's seats; nothing if they were not recorded."""
     for seat, told in ((run.timing or {}).get('sound') or {}).items():
         words = 'off' if told['volume'] is None else \
@@ -81,7 +81,7 @@ def _sound(run: ReportRun) -> Iterator[str]:
         yield f'{free(seat)} {words}, rumble {_percent(told["rumble"])}'
 
 
-def _view(run: ReportRun) -> Iterator[str]:
+def _view(run: Run) -> Iterator[str]:
     """Yield the views in the cockpit's seats, with their intervals."""
     for seat, periods in ((run.timing or {}).get('view') or {}).items():
         for period in periods:
@@ -115,7 +115,7 @@ def _traffic(game: GameDocument) -> str:
             f'{plain(spec.recorded)}, car following {plain(spec.model)}, seed {seed}')
 
 
-def _others(run: ReportRun) -> str:
+def _others(run: Run) -> str:
     words = {Role.RECORDED: 'recorded', Role.STATIC: 'static', Role.TRAFFIC: 'of traffic',
              Role.SCRIPTED: 'scripted'}
     counts = {word: sum(item.role is role for item in run.log.objects)
@@ -123,7 +123,7 @@ def _others(run: ReportRun) -> str:
     return ', '.join(f'{count} {word}' for word, count in counts.items() if count) or 'nobody'
 
 
-def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
+def _vehicles(run: Run) -> Iterator[tuple[str, ...]]:
     game = run.log.game
     for item in run.log.vehicles:
         size = f'{item.shape.length:.2f} × {item.shape.width:.2f}'
@@ -138,7 +138,7 @@ def _vehicles(run: ReportRun) -> Iterator[tuple[str, ...]]:
                    'everything' if av.perception is None else 'what its sensors do')
 
 
-def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
+def _people(run: Run) -> Iterator[tuple[str, ...]]:
     """Yield the people in cockpit seats, and the local devices that drove."""
     last_n = int(run.log.ks[-1] - run.log.ks[0]) * run.log.game.scheduler.steps_per_tick
     for spell, delay_ms, _ in run.record.drivers:
@@ -154,9 +154,9 @@ def _people(run: ReportRun) -> Iterator[tuple[str, ...]]:
                    NOTHING if delay_ms is None else number(delay_ms, 0))
 
 
-def named(run: ReportRun, vehicle: str) -> str:
+def named(run: Run, vehicle: str) -> str:
     """Return an id as HTML, with the colour of its lines if it is driven."""
-    colour = run.colours.get(vehicle)
+    colour = colours_of(run).get(vehicle)
     mark = '' if colour is None else f'<span class="mark {colour}" aria-hidden="true"></span>'
     return mark + free(vehicle)
 

@@ -5,9 +5,16 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from crgame_ros.analysis.runs.run import Run
+from crgame_ros.game.objects import Role
 import numpy as np
 from numpy.typing import NDArray
 
+# Measures that are plotted over time.
+PLOTTED = ('gap', 'ttc', 'thw', 'drac', 'min_distance')
+# Colours of vehicles by role, in order; the page's style declares them.
+_COLOURS = {Role.HUMAN: ('human-0', 'human-1', 'human-2'),
+            Role.AUTONOMOUS: ('av-0', 'av-1', 'av-2')}
 Dash = Literal['solid', 'dash', 'dot']
 
 
@@ -92,3 +99,12 @@ class Section:
     title: str
     html: str
     plots: tuple[Plot, ...] = ()
+
+
+def colours_of(run: Run) -> dict[str, str]:
+    """Return the name of each driven vehicle's colour."""
+    found: dict[str, str] = {}
+    for role, names in _COLOURS.items():
+        of_role = [item.id for item in run.log.vehicles if item.role is role]
+        found |= {vehicle: names[i % len(names)] for i, vehicle in enumerate(of_role)}
+    return found

@@ -10,10 +10,10 @@ from crgame_ros.analysis.pictures.critical_moments import (
 )
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
-from crgame_ros.analysis.report.run import ReportRun
+from crgame_ros.analysis.pictures.story_moments import nearest_moment
 from crgame_ros.analysis.report.section import Section
-from crgame_ros.analysis.report.story_moments import nearest_moment
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain
+from crgame_ros.analysis.runs.run import Run
 
 # Width of a picture [px].
 _WIDTH = 560
@@ -36,14 +36,14 @@ def moment_image(scene: FrameScene, moment: Moment, driven: Sequence[str]) -> st
             f'src="data:image/svg+xml,{quote(svg, safe=_SAFE)}">')
 
 
-def story_section(run: ReportRun) -> Section | None:
+def story_section(run: Run) -> Section | None:
     """Return the section with the scene at each moment; None without a driven vehicle."""
     if not run.log.vehicles:
         return None
     scene = FrameScene(run.log)
     driven = [item.id for item in run.log.vehicles]
     figures = []
-    for place, moment in enumerate(run.moments):
+    for place, moment in enumerate(run.story):
         figures.append(
             f'<figure class="frame" id="{frame_address(run, place)}" tabindex="-1" '
             f'data-time="{moment.time_s:.6f}">{moment_image(scene, moment, driven)}'
@@ -56,16 +56,16 @@ def story_section(run: ReportRun) -> Section | None:
         + f'<div class="frames">{"".join(figures)}</div>')
 
 
-def frame_address(run: ReportRun, place: int) -> str:
+def frame_address(run: Run, place: int) -> str:
     """Return the address within the page of the frame of a moment."""
     return f'{run.key}-frame-{place + 1}'
 
 
-def moment(run: ReportRun, time_s: float | None) -> str:
+def moment(run: Run, time_s: float | None) -> str:
     """Return a time as HTML, linked to the frame that shows it."""
     if time_s is None:
         return NOTHING
-    place = nearest_moment(run.moments, time_s)
+    place = nearest_moment(run.story, time_s)
     text = number(time_s, 1)
     if place is None:
         return text

@@ -5,10 +5,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from crgame_ros.analysis.report.run import ReportRun
 from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, share, table
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.timing.late_step import CAUSE_WORDS
 
 # Rows of table I: key of `timing.json`, label, unit, factor, digits.
@@ -30,11 +30,11 @@ _TABLE_I = (
 _RATIO = ('final', 'mean', 'min')
 
 
-def timing_section(run: ReportRun) -> Section:
+def timing_section(run: Run) -> Section:
     """Return the section with table I, and the errors over time."""
     if run.timing is None:
         return Section('timing', 'Timing', note(
-            'An offline run keeps no clock.' if run.offline is not None else
+            'An offline run keeps no clock.' if run.bag is None else
             'The recording does not tell of its cycles.'))
     html = table('Timing (table I of the CommonRoad-Game paper)', ('', 'value', 'unit'),
                  _rows(run.timing), 'numbers')
@@ -65,7 +65,7 @@ def _late_steps(late: Mapping[str, Any] | None) -> str:
         (number(step['late_ms'], 1), free(step['text'])) for step in late['worst']], 'numbers')
 
 
-def _plots(run: ReportRun) -> Iterator[Plot]:
+def _plots(run: Run) -> Iterator[Plot]:
     cycles = run.log.cycles
     if cycles is None:
         return
@@ -79,7 +79,7 @@ def _plots(run: ReportRun) -> Iterator[Plot]:
         yield Plot(key, words, 'ms', (line,), limits)
 
 
-def plan_section(run: ReportRun) -> Section | None:
+def plan_section(run: Run) -> Section | None:
     """Return the section on the planners' answers; None without planners."""
     if not run.log.game.avs:
         return None

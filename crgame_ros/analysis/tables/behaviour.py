@@ -8,9 +8,9 @@ from typing import Any
 
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.part import TablePart
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import TableRows
 
 _PER_VEHICLE = tuple(name for name, measure in MEASURES.items() if measure.per == 'vehicle')
@@ -25,8 +25,8 @@ def _column(name: str, empty: str) -> Column:
                   measure.variant, empty)
 
 
-def _vehicles(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    found = run.behaviour
+def _vehicles(run: Run) -> Mapping[str, Sequence[Any]]:
+    found = run.usual_behaviour
     return {'driven_s': [each.driven_s for each in found],
             **{f'drive_{name}': [_known(each.values.get(name, math.nan)) for each in found]
                for name in _PER_VEHICLE}}
@@ -76,7 +76,7 @@ TAKE_OVERS = TableDeclaration(
 BEHAVIOUR_TABLES = REACTIONS, LANE_CHANGES, TAKE_OVERS
 
 
-def write_behaviour(run: TableRun, writers: Mapping[str, TableRows]) -> None:
+def write_behaviour(run: Run, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of reactions, lane changes and take-overs."""
     for table, rows in ((REACTIONS, _reactions(run)), (LANE_CHANGES, _lane_changes(run)),
                         (TAKE_OVERS, _take_over_rows(run))):
@@ -86,8 +86,8 @@ def write_behaviour(run: TableRun, writers: Mapping[str, TableRows]) -> None:
                                      for column in table.columns})
 
 
-def _reactions(run: TableRun) -> Iterable[Mapping[str, Any]]:
-    for driver in run.behaviour:
+def _reactions(run: Run) -> Iterable[Mapping[str, Any]]:
+    for driver in run.usual_behaviour:
         for each in driver.reactions:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'event': each.event,
                    'time_s': each.event_s,
@@ -96,8 +96,8 @@ def _reactions(run: TableRun) -> Iterable[Mapping[str, Any]]:
                    'reaction_steering': _known(each.reaction.steering_s)}
 
 
-def _lane_changes(run: TableRun) -> Iterable[Mapping[str, Any]]:
-    for driver in run.behaviour:
+def _lane_changes(run: Run) -> Iterable[Mapping[str, Any]]:
+    for driver in run.usual_behaviour:
         for number, change in enumerate(driver.lane_changes):
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'number': number,
                    'time_s': _known(change.time_s), 'side': change.side,
@@ -110,8 +110,8 @@ def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, A
             f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
 
 
-def _take_over_rows(run: TableRun) -> Iterable[Mapping[str, Any]]:
-    for driver in run.behaviour:
+def _take_over_rows(run: Run) -> Iterable[Mapping[str, Any]]:
+    for driver in run.usual_behaviour:
         for each in driver.take_overs:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'seat_s': each.seat_s,
                    'end_s': each.end_s,

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables of criticality: the measures of each pair at each step, and crossings."""
 
-from collections.abc import Callable
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import (
@@ -12,7 +11,7 @@ from crgame_ros.analysis.criticality.criticality import (
     WITHOUT_LEADER,
 )
 from crgame_ros.analysis.criticality.nearby_footprints import NEAR
-from crgame_ros.analysis.criticality.recorded import measure_log
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
@@ -22,7 +21,6 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import TableRows
 import numpy as np
 import pyarrow as pa
@@ -70,15 +68,14 @@ CROSSINGS = TableDeclaration(
                'the run: the rest of its path is taken as straight ahead')))
 
 
-def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
-                      progress: Callable[[float], object]) -> None:
+def write_criticality(run: Run, pairs: TableRows, crossings: TableRows) -> None:
     """
-    Measure a run, write both tables step by step, and store the worst values of each vehicle.
+    Measure a run, and write both tables step by step.
 
     :raises InputError: if its scenario cannot be used.
     """
     collected = _Collected(run, pairs)
-    criticality = measure_log(run.record.log, progress=progress, on_tick=collected.add)
+    criticality = run.measure(collected.add)
     collected.flush()
     found = criticality.crossings
     if found:
@@ -88,13 +85,12 @@ def write_criticality(run: TableRun, pairs: TableRows, crossings: TableRows,
             'entered_s': [each.entered_s for each in found],
             'pet_s': [each.pet_s for each in found],
             'is_estimate': [each.is_estimate for each in found]})
-    run.criticality = {found.vehicle_id: found for found in criticality.report()}
 
 
 class _Collected:
     """A buffer of rows of pairs, written in larger pieces."""
 
-    def __init__(self, run: TableRun, pairs: TableRows) -> None:
+    def __init__(self, run: Run, pairs: TableRows) -> None:
         self._run, self._pairs = run, pairs
         self._ids: pa.Array | None = None
         self._steps: list[tuple[int, int, int]] = []
@@ -106,7 +102,7 @@ class _Collected:
         """Add the measures of a step."""
         if self._ids is None:
             self._ids = pa.array(criticality.ids, TEXT)
-        k = self._run.record.log.game.scheduler.k(criticality.n)
+        k = self._run.game.scheduler.k(criticality.n)
         for subject, others, values, _ in criticality.latest:
             self._steps.append((k, subject, len(others)))
             self._others.append(others)
@@ -123,7 +119,7 @@ class _Collected:
         ks, subjects = np.repeat(ks, counts), np.repeat(subjects, counts)
         values = np.concatenate(self._values)
         self._pairs.add({
-            'run': self._run.id, 'k': ks, 'time_s': self._run.times_s(ks),
+            'run': self._run.id, 'k': ks, 'time_s': self._run.seconds_at(ks),
             'subject': self._ids.take(pa.array(subjects)),
             'other': self._ids.take(pa.array(np.concatenate(self._others))),
             **{name: values[:, column] for column, name in enumerate(MEASURES)}})

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import Column, TableDeclaration
-from crgame_ros.analysis.tables.table_run import TableRun
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class TablePart:
     """
 
     columns: tuple[Column, ...]
-    values: Callable[[TableRun], Mapping[str, Sequence[Any]]]
+    values: Callable[[Run], Mapping[str, Sequence[Any]]]
 
 
 def declare(name: str, row: str, key: tuple[str, ...],
@@ -30,7 +30,7 @@ def declare(name: str, row: str, key: tuple[str, ...],
     return TableDeclaration(name, row, key, (column for part in parts for column in part.columns))
 
 
-def part_rows(parts: Sequence[TablePart], run: TableRun) -> dict[str, Any]:
+def part_rows(parts: Sequence[TablePart], run: Run) -> dict[str, Any]:
     """
     Return all columns of a run's rows.
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import math
 from typing import Any
 
+from crgame_ros.analysis.runs.run import PlanTally, Run
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
@@ -16,7 +17,6 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.table_run import PlanTally, TableRun
 from crgame_ros.game.driven_vehicle import DrivenAv
 from crgame_ros.planner.plan_check import check_plan
 from crgame_ros.recording.recorded_plans import RecordedPlan
@@ -66,16 +66,17 @@ PLANS = TableDeclaration(
           for name, when, _ in DEVIATIONS)))
 
 
-def plan_rows(run: TableRun) -> Iterator[dict[str, Any]]:
+def plan_rows(run: Run) -> Iterator[dict[str, Any]]:
     """
     Yield the rows of a run, in pieces, and count the plans of each AV.
 
     :raises InputError: if the recording is damaged.
     """
-    avs = {av.id: av for av in run.record.log.game.avs}
-    run.tallies = {av: PlanTally() for av in avs} if run.plans is not None else {}
+    avs = {av.id: av for av in run.game.avs}
+    plans = run.plans
+    run.tallies = {av: PlanTally() for av in avs} if plans is not None else {}
     rows: list[dict[str, Any]] = []
-    for plan in run.plans() if run.plans is not None else ():
+    for plan in plans() if plans is not None else ():
         rows.append(_row(run, plan, avs[plan.av], run.tallies[plan.av]))
         if len(rows) == _ROWS:
             yield _columns(run, rows)
@@ -84,16 +85,16 @@ def plan_rows(run: TableRun) -> Iterator[dict[str, Any]]:
         yield _columns(run, rows)
 
 
-def _columns(run: TableRun, rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _columns(run: Run, rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {'run': run.id, **{name: [row.get(name) for row in rows]
                               for name in PLANS.schema.names if name != 'run'}}
 
 
-def _row(run: TableRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, Any]:
-    scheduler = run.record.log.game.scheduler
+def _row(run: Run, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, Any]:
+    scheduler = run.game.scheduler
     row: dict[str, Any] = {
         'av': found.av, 'number': tally.answers, 'k': found.k, 'latency_s': found.latency_s,
-        'time_s': None if found.k is None else float(run.times_s(np.array(found.k)))}
+        'time_s': None if found.k is None else float(run.seconds_at(np.array(found.k)))}
     refusal: str | None = found.fault
     if found.plan is not None:
         row |= _planned(run, found, av)
@@ -108,10 +109,10 @@ def _row(run: TableRun, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> 
     return row | {'passes_check': refusal is None if known else None, 'refusal': refusal}
 
 
-def _planned(run: TableRun, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
+def _planned(run: Run, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
     """Return the columns that concern a plan's states."""
     assert found.plan is not None
-    log, states = run.record.log, found.plan.states.copy()
+    log, states = run.log, found.plan.states.copy()
     states[:, :3] = av.transform.to_simulation(states[:, :3])
     step_s = log.game.scheduler.time_step_s
     row: dict[str, Any] = {'points': len(states), 'horizon_s': (len(states) - 1) * step_s}

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fills all tables of runs, and writes them into a folder."""
 
-from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 import json
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from crgame_ros.analysis.runs.run import Run, RunProgress, Scoring
 from crgame_ros.analysis.tables.behaviour import BEHAVIOUR_TABLES, write_behaviour
 from crgame_ros.analysis.tables.column import TableDeclaration
 from crgame_ros.analysis.tables.data_package import (
@@ -21,9 +21,7 @@ from crgame_ros.analysis.tables.pairs import CROSSINGS, PAIRS, write_criticality
 from crgame_ros.analysis.tables.part import part_rows
 from crgame_ros.analysis.tables.plans import plan_rows, PLANS
 from crgame_ros.analysis.tables.runs import RUN_PARTS, RUNS
-from crgame_ros.analysis.tables.score_columns import score_vehicles
 from crgame_ros.analysis.tables.states import state_rows, STATES
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.tasks import EVENT_PARTS, EVENTS, TASK_TABLES, write_tasks
 from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS, VEHICLES
 from crgame_ros.analysis.tables.writer import (
@@ -35,6 +33,7 @@ from crgame_ros.analysis.tables.writer import (
 )
 from crgame_ros.errors import InputError
 from crgame_ros.recording.export import prepare_folder
+from crgame_ros.recording.run_folder import recording_in
 from crgame_ros.whole_file import part_of, write_text
 import pyarrow as pa
 
@@ -146,9 +145,42 @@ TABLES: tuple[TableDeclaration, ...] = (
     RUNS, VEHICLES, STATES, PAIRS, CROSSINGS, EVENTS, PLANS, *BEHAVIOUR_TABLES, *TASK_TABLES)
 
 
-def write_tables(runs: Iterable[TableRun], out: Path, file_format: Format,
-                 progress: Callable[[str, float], object] = lambda _what, _share: None,
-                 ) -> dict[str, int]:
+def runs_in(paths: Sequence[Path], epoch: int | None, progress: RunProgress,
+            scoring: Scoring = 'all') -> Iterator[Run]:
+    """
+    Read runs one after the other, with different ids.
+
+    :param paths: folders of runs, or recordings.
+    :param epoch: number of the run where a recording holds several; None for the last.
+    :raises InputError: if one cannot be read, or is given twice.
+    """
+    ids: set[str] = set()
+    taken: set[tuple[Path, int]] = set()
+    for path in paths:
+        run = Run.of_recording(path, epoch, scoring=scoring, progress=progress)
+        place = recording_in(path).resolve(), run.game.epoch
+        if place in taken:
+            raise InputError('this run is given twice', str(path), 'give each run once')
+        taken.add(place)
+        run.id = own_id(run.id, ids)
+        ids.add(run.id)
+        yield run
+
+
+def own_id(name: str, taken: Collection[str]) -> str:
+    """
+    Return a unique id for a run: folders in different places may have the same name.
+
+    :param taken: ids of the others.
+    """
+    found, number = name, 1
+    while found in taken:
+        number += 1
+        found = f'{name}~{number}'
+    return found
+
+
+def write_tables(runs: Iterable[Run], out: Path, file_format: Format) -> dict[str, int]:
     """
     Write the tables of runs and their dictionary into a folder, all completely or none.
 
@@ -157,17 +189,16 @@ def write_tables(runs: Iterable[TableRun], out: Path, file_format: Format,
     :param runs: runs with different ids.
     :param out: the folder; an earlier export in it is replaced.
     :param file_format: Parquet or CSV.
-    :param progress: called with the current run and task, and the share done of it, 0 to 1.
     :return: number of rows by table.
     :raises InputError: if a scenario cannot be used, or the folder cannot be written.
     """
     with TableFolder(out, TABLES, file_format, 'tables') as folder:
         for run in runs:
-            _add_run(run, folder.writers, progress)
+            _add_run(run, folder.writers)
         return {name: writer.rows for name, writer in folder.writers.items()}
 
 
-def tables_of(runs: Iterable[TableRun]) -> dict[str, pa.Table]:
+def tables_of(runs: Iterable[Run]) -> dict[str, pa.Table]:
     """
     Return the tables of runs, by name; memory is that of all of them.
 
@@ -176,35 +207,30 @@ def tables_of(runs: Iterable[TableRun]) -> dict[str, pa.Table]:
     """
     kept = {table.name: KeptTable(table) for table in TABLES}
     for run in runs:
-        _add_run(run, kept, lambda _what, _share: None)
+        _add_run(run, kept)
     return {name: each.table for name, each in kept.items()}
 
 
-def _add_run(run: TableRun, writers: Mapping[str, TableRows],
-             progress: Callable[[str, float], object]) -> None:
+def _add_run(run: Run, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to all tables."""
     try:
-        _add_rows(run, writers, progress)
+        _add_rows(run, writers)
     except (OverflowError, pa.ArrowInvalid) as error:
         # Documents of a recording may contain any number.
         raise InputError(f'a number in it is out of all bounds ({error})', run.id,
                          'the recording is damaged; record again') from error
 
 
-def _add_rows(run: TableRun, writers: Mapping[str, TableRows],
-              progress: Callable[[str, float], object]) -> None:
+def _add_rows(run: Run, writers: Mapping[str, TableRows]) -> None:
     """Fill tables one after the other; vehicles and runs come last: they summarise the others."""
-    for rows in state_rows(run, partial(progress, f'writing the states of {run.id}')):
+    for rows in state_rows(run):
         writers[STATES.name].add(rows)
-    write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name],
-                      partial(progress, f'measuring {run.id}'))
+    write_criticality(run, writers[PAIRS.name], writers[CROSSINGS.name])
     for rows in plan_rows(run):
         writers[PLANS.name].add(rows)
-    progress(f'measuring how people drove in {run.id}', 0.0)
+    run.telling('measuring how people drove in')(0.0)
     write_behaviour(run, writers)
     write_tasks(run, writers)
-    if run.scored and run.record.log.vehicles:
-        score_vehicles(run, progress=partial(progress, f'scoring {run.id}'))
     for table, parts in ((EVENTS, EVENT_PARTS), (VEHICLES, VEHICLE_PARTS), (RUNS, RUN_PARTS)):
         if (values := part_rows(parts, run))['run']:
             writers[table.name].add(values)

@@ -7,9 +7,9 @@ import hashlib
 import json
 from typing import Any
 
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.part import declare, TablePart
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.game.objects import Role
 
 UNTIMED = 'its timing was not recorded, as that of an offline run'
@@ -36,10 +36,12 @@ COUNTS = {'cycles': 'cycles that were recorded', 'gaps': 'cycles that were lost'
           'resets': 'drift resets', 'catch_up_steps': 'cycles more than a step late'}
 
 
-def _identity(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    log = run.record.log
+def _identity(run: Run) -> Mapping[str, Sequence[Any]]:
+    log = run.log
     game, scheduler = log.game, log.game.scheduler
     planners = {av.id: av.planner for av in game.avs}
+    refusal = run.usual_scores.refusal
+    remarks = (f'no scores: {refusal}',) if refusal else ()
     file = hashlib.sha256(game.file.encode('utf-8', 'replace')).hexdigest() if game.file else None
     return {
         'run': [run.id], 'benchmark_id': [game.benchmark_id], 'title': [game.title],
@@ -52,20 +54,18 @@ def _identity(run: TableRun) -> Mapping[str, Sequence[Any]]:
         'avs': [len(game.avs)], 'objects': [len(log.objects)],
         'agents': [sum(item.role is Role.TRAFFIC for item in log.objects)],
         'planners': [json.dumps(planners)], 'events': [len(run.record.fired)],
-        'notices': ['\n'.join((*(run.timing or {}).get('notices', log.notices),
-                               *run.remarks))]}
+        'notices': ['\n'.join((*run.missing, *remarks))]}
 
 
-def _timing(run: TableRun) -> Mapping[str, Sequence[Any]]:
+def _timing(run: Run) -> Mapping[str, Sequence[Any]]:
     timing = run.timing
     found: dict[str, Sequence[Any]] = {} if timing is None else {
         **{name: [timing[key] * factor] for key, (name, _, factor, _) in TIMING.items()},
         **{f'real_time_ratio_{key}': [timing['real_time_ratio'][key]] for key in RATIOS},
         **{key: [timing[key]] for key in COUNTS}}
     if run.outcome is not None:
-        contacts = run.outcome['contacts']
         found['violations'] = [run.outcome['drivability']['violations']]
-        found['contacts'] = [None if contacts is None else len(contacts)]
+        found['contacts'] = [None if run.contacts is None else len(run.contacts)]
     return found
 
 

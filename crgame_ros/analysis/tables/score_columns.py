@@ -2,16 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Columns of the table of vehicles with the scores of `crgame score`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import MEASURES
-from crgame_ros.analysis.scores.plan_record import plans_of_report
-from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER, TEXT
 from crgame_ros.analysis.tables.part import TablePart
-from crgame_ros.analysis.tables.table_run import TableRun
 
 NOT_SCORED = 'the run was not scored'
 
@@ -50,23 +48,9 @@ def _declared(column: _ScoreColumn) -> Column:
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
 
-def score_vehicles(run: TableRun, *, drives_only: bool = False,
-                   progress: Callable[[float], object] = lambda _: None) -> None:
-    """
-    Score a run for the table of vehicles; a reason for no scores goes to the table of runs.
-
-    :param drives_only: whether to leave out CommonRoad's tools, which take most of the time.
-    :param progress: called with the share done so far, 0 to 1.
-    """
-    found = scores_of(run.record, plans_of_report(run.outcome), drives_only=drives_only,
-                      progress=progress)
-    run.scores = {each.vehicle_id: each for each in found.vehicles}
-    if found.refusal:
-        run.remarks.append(f'no scores: {found.refusal}')
-
-
-def _scores(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    found = [run.scores.get(item.id) for item in run.record.log.vehicles]
+def _scores(run: Run) -> Mapping[str, Sequence[Any]]:
+    scores = {each.vehicle_id: each for each in run.usual_scores.vehicles}
+    found = [scores.get(name) for name in run.vehicles]
     values = [{} if each is None else each.values() for each in found]
     return {
         **{column.name: [_value(row.get(column.measure), column) for row in values]

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of states: all vehicles and objects at each scenario step, and drivers' inputs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
@@ -15,7 +16,6 @@ from crgame_ros.analysis.tables.column import (
     TableDeclaration,
     TEXT,
 )
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import PIECE_ROWS
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.reference_point import shifted, shifted_velocities
@@ -82,18 +82,16 @@ STATES = TableDeclaration(
                CENTER, IN_LANE, OFF_ROAD)))
 
 
-def state_rows(run: TableRun, progress: Callable[[float], object] = lambda _: None,
-               ) -> Iterator[dict[str, Any]]:
+def state_rows(run: Run) -> Iterator[dict[str, Any]]:
     """
     Yield the rows of a run, in pieces: by time step, driven vehicles first.
 
-    :param progress: called with the share yielded so far, 0 to 1.
     :raises InputError: if its scenario cannot be used.
     """
-    log = run.record.log
+    log = run.log
     if not log.descriptions:
         return
-    maker = _StateRows(run)
+    maker, progress = _StateRows(run), run.telling('writing the states of')
     steps = max(1, PIECE_ROWS // len(log.descriptions))
     for start in range(0, len(log.ks), steps):
         end = min(start + steps, len(log.ks))
@@ -104,8 +102,8 @@ def state_rows(run: TableRun, progress: Callable[[float], object] = lambda _: No
 class _StateRows:
     """Builder of the rows of consecutive steps of a run."""
 
-    def __init__(self, run: TableRun) -> None:
-        self._run, log = run, run.record.log
+    def __init__(self, run: Run) -> None:
+        self._run, log = run, run.log
         self._vehicles = len(log.vehicles)
         self._rear_to_center = np.array([item.rear_to_center for item in log.vehicles])
         self._roads = RoadNetwork(parse_scenario(
@@ -118,7 +116,7 @@ class _StateRows:
 
     def rows(self, part: slice) -> dict[str, Any]:
         """Return the columns of the steps in a part of the log."""
-        log = self._run.record.log
+        log = self._run.log
         states = log.vehicle_states[part]
         count = len(states)
         centers = shifted(states[..., :3], self._rear_to_center)
@@ -137,7 +135,7 @@ class _StateRows:
         commands = self._commands(part, here.shape[1])
         found: dict[str, Any] = {
             'run': self._run.id, 'k': ks[here],
-            'time_s': self._run.times_s(ks[here]),
+            'time_s': self._run.seconds_at(ks[here]),
             **{name: pa.DictionaryArray.from_arrays(pa.array(who), texts).cast(pa.string())
                for name, texts in self._texts.items()},
             'length': self._sizes[who, 0], 'width': self._sizes[who, 1],
@@ -154,7 +152,7 @@ class _StateRows:
 
     def _commands(self, part: slice, everybody: int) -> FloatArray:
         """Return the commands that led to each state (steps, all, 5); NaN without a command."""
-        log, record = self._run.record.log, self._run.record
+        log, record = self._run.log, self._run.record
         found = np.full((part.stop - part.start, everybody, len(COMMAND_COLUMNS)), np.nan)
         wanted = self._run.steps_of(log.ks[part])
         places = np.minimum(np.searchsorted(record.ns, wanted), max(len(record.ns) - 1, 0))
@@ -165,10 +163,10 @@ class _StateRows:
 
     def _lanes(self, poses: FloatArray, here: NDArray[np.bool_]) -> dict[str, Any]:
         """Return lanelet, arc length and lateral offset of all that are present."""
-        avs = self._run.record.log.game.avs
+        avs = self._run.game.avs
         transforms = {item.id: item.transform for item in avs}
         on_road = poses.copy()
-        for column, item in enumerate(self._run.record.log.descriptions):
+        for column, item in enumerate(self._run.log.descriptions):
             # All but AVs are placed on the road by the first AV's transform, like humans (CRG 28).
             transform = transforms.get(item.id, avs[0].transform if avs else None)
             if transform is not None and not transform.is_identity:

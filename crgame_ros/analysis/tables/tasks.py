@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     INTEGER,
@@ -17,15 +18,14 @@ from crgame_ros.analysis.tables.column import (
     TEXT,
 )
 from crgame_ros.analysis.tables.part import declare, TablePart
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.writer import TableRows
 from crgame_ros.game.events import ACTIONS
 
 UNKNOWN = 'the game does not know the event: a vehicle touched another object, or was put back'
 
 
-def _fired(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    game = run.record.log.game
+def _fired(run: Run) -> Mapping[str, Sequence[Any]]:
+    game = run.game
     specs = {spec.name: spec for spec in game.events}
     fired = run.record.fired
     known = [specs.get(event.name) for event in fired]
@@ -109,7 +109,7 @@ TASK_SPANS = TableDeclaration(
 TASK_TABLES = DETECTION_RESPONSES, DETECTION_SCORES, TAKE_OVER_REQUESTS, TASK_SPANS
 
 
-def write_tasks(run: TableRun, writers: Mapping[str, TableRows]) -> None:
+def write_tasks(run: Run, writers: Mapping[str, TableRows]) -> None:
     """Add the rows of a run to the tables of tasks."""
     events = task_events(run.record)
     for table, rows in (

@@ -9,12 +9,12 @@ from typing import Any
 from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.behaviour import VEHICLE_BEHAVIOUR
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
 from crgame_ros.analysis.tables.pairs import FOOTPRINTS, measure_column
 from crgame_ros.analysis.tables.part import declare, TablePart
 from crgame_ros.analysis.tables.score_columns import VEHICLE_SCORES
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.game.driven_vehicle import DrivenAv, DrivenHuman
 from crgame_ros.vehicle.state import StateColumn
 import numpy as np
@@ -37,8 +37,8 @@ COUNTS = {
     'steps_without_plan': 'simulation steps without a plan to follow'}
 
 
-def _identity(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    vehicles, driven = run.record.log.vehicles, run.driven
+def _identity(run: Run) -> Mapping[str, Sequence[Any]]:
+    vehicles, driven = run.log.vehicles, run.driven
     return {
         'run': [run.id] * len(vehicles), 'id': [item.id for item in vehicles],
         'role': [item.role.value for item in vehicles],
@@ -53,8 +53,8 @@ def _identity(run: TableRun) -> Mapping[str, Sequence[Any]]:
                              for item in driven]}
 
 
-def _drive(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    states = run.record.log.vehicle_states
+def _drive(run: Run) -> Mapping[str, Sequence[Any]]:
+    states = run.log.vehicle_states
     speeds, accelerations = (states[..., column] for column in (
         StateColumn.SPEED, StateColumn.ACCELERATION))
     return {'distance': run.record.ways(), 'mean_speed': speeds.mean(axis=0),
@@ -63,8 +63,8 @@ def _drive(run: TableRun) -> Mapping[str, Sequence[Any]]:
             'min_acceleration': accelerations.min(axis=0)}
 
 
-def _criticality(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    found = [run.criticality.get(item.id) for item in run.record.log.vehicles]
+def _criticality(run: Run) -> Mapping[str, Sequence[Any]]:
+    found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
     columns: dict[str, list[Any]] = {}
     for name in MEASURES:
         worst = [None if each is None else each.worst.get(name) for each in found]
@@ -83,8 +83,8 @@ def _criticality(run: TableRun) -> Mapping[str, Sequence[Any]]:
     return columns
 
 
-def _following(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    found = [run.criticality.get(item.id) for item in run.record.log.vehicles]
+def _following(run: Run) -> Mapping[str, Sequence[Any]]:
+    found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
     columns: dict[str, list[Any]] = {column.name: [] for column in FOLLOWING_COLUMNS}
     for each in found:
         row: dict[str, Any] = dict.fromkeys(columns)
@@ -141,8 +141,8 @@ def _count_name(key: str) -> str:
     return f'plans_{key}' if key in ('accepted', 'refused', 'of_others', 'realigned') else key
 
 
-def _planning(run: TableRun) -> Mapping[str, Sequence[Any]]:
-    ids = [item.id for item in run.record.log.vehicles]
+def _planning(run: Run) -> Mapping[str, Sequence[Any]]:
+    ids = [item.id for item in run.log.vehicles]
     planners = {} if run.outcome is None else run.outcome['planners']
     tallies = [run.tallies.get(name) for name in ids]
     latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s

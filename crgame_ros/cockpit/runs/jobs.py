@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Jobs that read runs for the page, in a process of their own: scores, pictures, reports."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 import math
 from pathlib import Path
 from typing import Any
@@ -11,15 +10,13 @@ from typing import Any
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.report.file import write_report
-from crgame_ros.analysis.report.run import measured_run
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore, WEIGHTS
 from crgame_ros.analysis.scores.run_scores import scores_of
 from crgame_ros.cockpit.job_loop import serve_jobs
-from crgame_ros.errors import CrgameError
 from crgame_ros.recording.run_record import read_run_record
 from crgame_ros.recording.run_trajectories import RunTrajectories
-from crgame_ros.recording.timing_report import timing_report
 from crgame_ros.whole_file import write_text
 import numpy as np
 
@@ -80,18 +77,8 @@ def compare(path: Path, others: Sequence[str], names: Sequence[str], out: str) -
     :param out: the file to write, HTML.
     :raises InputError: if one of them cannot be read.
     """
-    runs = []
-    for number, (bag, name) in enumerate(zip((path, *map(Path, others)), names, strict=True), 1):
-        record = read_run_record(bag)
-        notices: tuple[str, ...] = ()
-        timing: Mapping[str, Any] | None = None
-        try:
-            timing = timing_report(bag, log=record.log)
-        except CrgameError as error:
-            notices = (str(error),)
-        runs.append(replace(measured_run(name, bag, record, timing, notices=notices,
-                                         drives_only=True), key=f'run{number}'))
-    write_report(runs, Path(out))
+    write_report([Run.of_recording(bag, name=name, scoring='drives') for bag, name in zip(
+        (path, *map(Path, others)), names, strict=True)], Path(out))
     return {}
 
 

@@ -5,6 +5,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import (
     Column,
     FLAG,
@@ -14,7 +15,6 @@ from crgame_ros.analysis.tables.column import (
     TEXT,
 )
 from crgame_ros.analysis.tables.part import part_rows
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.analysis.tables.vehicles import VEHICLE_PARTS
 from crgame_ros.simulation.contacts import contacts_of
 from crgame_ros.simulation.offline import OfflineResult
@@ -77,7 +77,7 @@ def outcome_of(result: OfflineResult) -> dict[str, Any]:
             'stopped': result.stop is not None}
 
 
-def vehicle_rows(run: TableRun, result: OfflineResult) -> list[dict[str, Any]]:
+def vehicle_rows(run: Run, result: OfflineResult) -> list[dict[str, Any]]:
     """Return the rows of a run's driven vehicles."""
     columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
     ids = columns.pop('id')

@@ -13,8 +13,8 @@ import shutil
 from typing import Any
 
 from crgame_ros.analysis.behaviour.task_events import task_events
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.analysis.tables.table_run import TableRun, tabulated_runs
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation.source_digest import engine_digest
 from crgame_ros.recording.run_folder import bags_of
@@ -82,7 +82,7 @@ class RunTablesCache:
 
     def _measure(self, run: Path, name: str, folder: Path,
                  progress: Callable[[str, float], object]) -> None:
-        tabulated = next(tabulated_runs([run], None, progress))
+        tabulated = Run.of_recording(run, progress=progress)
         tabulated.id = name
         tables = tables_of([tabulated])
         part = folder.with_name(f'.{folder.name}.{os.getpid()}.part')
@@ -116,8 +116,8 @@ def _is_whole(folder: Path) -> bool:
         return False
 
 
-def _summary(run: TableRun) -> dict[str, Any]:
-    game = run.record.log.game
+def _summary(run: Run) -> dict[str, Any]:
+    game = run.game
     return {
         'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,
         'humans': {item.id: item.driver for item in game.humans},

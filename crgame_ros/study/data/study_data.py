@@ -3,15 +3,14 @@
 """The data of a study so far, as tables that can be rewritten while it goes on."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import fcntl
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from crgame_ros.analysis.report.command import REPORT_FILE
 from crgame_ros.analysis.report.file import write_report
-from crgame_ros.analysis.report.run import read_report_run
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, TableDeclaration, TEXT
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.finish import finish_run
@@ -312,7 +311,6 @@ def _report(run: Path, name: str, say: Callable[[str], object],
     if (run / REPORT_FILE).exists():
         return
     try:
-        told = read_report_run(run, None, partial(progress, f'reporting {run}'))
-        write_report([replace(told, name=name)], run / REPORT_FILE)
+        write_report([Run.of_recording(run, name=name, progress=progress)], run / REPORT_FILE)
     except CrgameError as error:
         say(f'note: {run}: has no report: {error}')

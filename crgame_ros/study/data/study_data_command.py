@@ -103,13 +103,7 @@ def rerun_command(values: argparse.Namespace) -> int:
 def _read(folder: Any, reports: bool = False) -> 'StudyData':
     from crgame_ros.recording.progress import Progress
     from crgame_ros.study.data.study_data import read_study_data
-    progress = Progress(_print, '')
-
-    def show_progress(what: str, share: float) -> None:
-        progress.what = what
-        progress(share)
-
-    data = read_study_data(folder, _print, show_progress, reports)
+    data = read_study_data(folder, _print, Progress(_print).tell, reports)
     for problem in data.problems:
         _print(f'note: {problem}')
     return data

@@ -10,10 +10,9 @@ from crgame_ros.analysis.behaviour.driver import measure_behaviour
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
 from crgame_ros.analysis.behaviour.text import detection_lines
 from crgame_ros.analysis.report.driving_section import task_section
-from crgame_ros.analysis.report.run import measured_run
 from crgame_ros.analysis.run_measures import measure_run
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.run_tables import tables_of
-from crgame_ros.analysis.tables.table_run import TableRun
 from crgame_ros.driver.source import ScriptedDriver
 from crgame_ros.game.game import AvSpec, Game, HumanSpec, PoseSpawn
 from crgame_ros.game.task_documents import PageTimes, TaskEntry
@@ -169,11 +168,11 @@ def test_measures_report_and_tables_tell_of_tasks(record: RunRecord) -> None:
                                              if entry.task != 'light')))
     found = measure_run(told).as_dict()['detection_response']
     assert [(each['task'], each['hits']) for each in found] == [('light', 4)]
-    section = task_section(measured_run('run', None, told, None))
+    section = task_section(Run('run', record=told))
     assert section is not None
     for words in ('ISO 17488', 'Requests to take over', 'radio', '0.62'):
         assert words in section.html
-    tables = tables_of([TableRun('run', told, scored=False)])
+    tables = tables_of([Run('run', record=told, scoring='none')])
     responses = tables['detection_responses'].to_pylist()
     assert [row['outcome'] for row in responses] == [
         'hit', 'unrequested', 'hit', 'missed', 'premature', 'hit', 'unseen', 'missed', 'hit',

@@ -6,7 +6,7 @@ from dataclasses import replace
 import json
 from typing import Any
 
-from crgame_ros.analysis.report.run import measured_run, ReportRun
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import Game
 from crgame_ros.paths import scenarios_directory
@@ -50,9 +50,9 @@ def game() -> Game:
 
 
 @pytest.fixture(scope='session')
-def run(game: Game) -> ReportRun:
+def run(game: Game) -> Run:
     """Drive it for 10 s: the human cuts in after 5, and brakes."""
     setup = build_setup(replace(game, title=HOSTILE))
     drivers, _ = recorded_inputs(setup)
     record = run_record_of(run_offline(setup, drivers=drivers, duration_s=10.0))
-    return measured_run('a <b>run</b>', None, record, json.loads(json.dumps(TIMING)))
+    return Run('a <b>run</b>', record=record, timing=json.loads(json.dumps(TIMING)))

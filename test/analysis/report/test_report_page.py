@@ -3,16 +3,20 @@
 """The report's page: its content, and that foreign text in it cannot run."""
 
 import base64
+from copy import copy
 from dataclasses import replace
 import hashlib
 import json
+from pathlib import Path
 import re
+from typing import Any
 
 from crgame_ros.analysis.behaviour.measures import MEASURES
 from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.file import report_html
 from crgame_ros.analysis.report.planners_section import planners_section
-from crgame_ros.analysis.report.run import PLOTTED, ReportRun
+from crgame_ros.analysis.report.section import PLOTTED
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import MEASURES as MEASURES_OF_SCORES
 from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
 import numpy as np
@@ -21,7 +25,7 @@ import pytest
 
 
 @pytest.fixture(scope='module')
-def html(run: ReportRun) -> str:
+def html(run: Run) -> str:
     """Write the page of the run."""
     return report_html([run])
 
@@ -67,7 +71,14 @@ def _hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def test_every_time_leads_to_its_frame(page: Page, run: ReportRun) -> None:
+def changed(run: Run, **values: Any) -> Run:
+    """Return a copy of a run for which other values are known."""
+    other = copy(run)
+    other.__dict__.update(values)
+    return other
+
+
+def test_every_time_leads_to_its_frame(page: Page, run: Run) -> None:
     """Links of the page have targets; each worst value's frame is within a second."""
     ids = [found['id'] for _, found in page.elements if 'id' in found]
     assert len(ids) == len(set(ids))
@@ -79,17 +90,17 @@ def test_every_time_leads_to_its_frame(page: Page, run: ReportRun) -> None:
     for link in led:
         shown = times[(link['href'] or '')[1:]]
         assert abs(shown - float(link['data-time'] or '')) <= 1.0 + 1e-6
-    worst = [each for vehicle in run.criticality.report() for each in vehicle.worst.values()
+    worst = [each for vehicle in run.usual_criticality.report() for each in vehicle.worst.values()
              if each.value < 100.0]
     assert len(led) >= len(worst)
     for each in worst:
         assert any(abs(time - each.time_s) <= 1.0 + 1e-6 for time in times.values())
 
 
-def test_tables_say_what_was_measured(page: Page, run: ReportRun) -> None:
+def test_tables_say_what_was_measured(page: Page, run: Run) -> None:
     """Worst values to two digits, counts of plans, table I."""
     cells = [text.strip() for path, text in page.texts if 'td' in path]
-    for vehicle in run.criticality.report():
+    for vehicle in run.usual_criticality.report():
         for name in ('gap', 'thw', 'min_distance'):
             if name in vehicle.worst:
                 assert f'{vehicle.worst[name].value:.2f}' in cells
@@ -100,7 +111,7 @@ def test_tables_say_what_was_measured(page: Page, run: ReportRun) -> None:
     assert all(found['alt'] for found in page.attributes('img'))
 
 
-def test_plots_hold_the_series(page: Page, run: ReportRun) -> None:
+def test_plots_hold_the_series(page: Page, run: Run) -> None:
     """Each plot of the page has its data, which are those of the run, with thresholds."""
     data = json.loads(page.text_of('script')[0])
     places = [found['id'] for found in page.attributes('div') if found.get('class') == 'plot']
@@ -108,7 +119,7 @@ def test_plots_hold_the_series(page: Page, run: ReportRun) -> None:
     speed = data['run1-motion-speed']['lines'][0]
     np.testing.assert_array_equal(_numbers(speed['y']), run.log.vehicle_states[:, 0, 3])
     gap = data['run1-criticality-gap']['lines'][1]
-    worst = run.criticality.report()[1].worst['gap'].value
+    worst = run.usual_criticality.report()[1].worst['gap'].value
     assert np.nanmin(_numbers(gap['y'])) == worst
     assert [limit['value'] for limit in data['run1-criticality-drac']['limits']] == [3.0]
     throttle = data['run1-inputs-throttle']['lines'][0]
@@ -119,12 +130,12 @@ def _numbers(text: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text), '<f8')
 
 
-def test_the_course_agrees_with_the_worst(run: ReportRun) -> None:
+def test_the_course_agrees_with_the_worst(run: Run) -> None:
     """The plotted line of a measure has its worst value at its time."""
-    for i, vehicle in enumerate(run.criticality.report()):
-        for place, name in enumerate(PLOTTED):
+    for i, vehicle in enumerate(run.usual_criticality.report()):
+        for name in PLOTTED:
             known = vehicle.worst.get(name)
-            values = run.course[i, place]
+            values = run.course[name][i]
             assert np.isfinite(values).any() == (known is not None)
             if known is not None:
                 extreme = np.nanmax(values) if name == 'drac' else np.nanmin(values)
@@ -133,17 +144,17 @@ def test_the_course_agrees_with_the_worst(run: ReportRun) -> None:
                 assert run.times_s[row] == pytest.approx(known.time_s)
 
 
-def test_the_same_run_gives_the_same_bytes(run: ReportRun, html: str) -> None:
+def test_the_same_run_gives_the_same_bytes(run: Run, html: str) -> None:
     """The page has no time of writing."""
     assert report_html([run]) == html
 
 
-def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
+def test_reverse_and_take_overs_stand_out(run: Run) -> None:
     """Their times are known by hand: the human in reverse, a driver in the AV's seat."""
     commands = run.record.commands.copy()
     commands[100:200, 0, 3] = 1.0
     commands[300:450, 1] = 0.25
-    driven = replace(run, record=replace(run.record, commands=commands))
+    driven = changed(run, record=replace(run.record, commands=commands))
     page = Page(report_html([driven]))
     spans = json.loads(page.text_of('script')[0])['run1-inputs-brake']['spans']
     found = [(span['label'], span['from'], span['to']) for span in spans]
@@ -152,7 +163,7 @@ def test_reverse_and_take_overs_stand_out(run: ReportRun) -> None:
     assert 'av0 taken over' in [text for path, text in page.texts if 'th' in path]
 
 
-def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None:
+def test_late_steps_are_told_by_their_causes(page: Page, run: Run) -> None:
     """It has each cause with its time, the worst in words; or that there are none or unknown."""
     cells = [text for path, text in page.texts
              if path and path[-1] in ('td', 'th', 'bdi', 'caption')]
@@ -164,18 +175,18 @@ def test_late_steps_are_told_by_their_causes(page: Page, run: ReportRun) -> None
     assert run.timing is not None
     for late, words in ((None, 'an earlier version made it'),
                         ({'count': 0, 'threshold_ms': 0.5}, 'No step was late')):
-        other = replace(run, timing={**run.timing, 'late_steps': late})
+        other = changed(run, _timed=({**run.timing, 'late_steps': late}, ()))
         notes = Page(report_html([other])).text_of('p')
         assert any(words in text for text in notes)
 
 
-def test_what_people_in_the_seats_heard_is_told(run: ReportRun) -> None:
+def test_what_people_in_the_seats_heard_is_told(run: Run) -> None:
     assert run.timing is not None
     sound = {'hv0': {'on_share': 0.75, 'volume': 0.8, 'rumble': 0.5},
              'av0': {'on_share': 0.0, 'volume': None, 'rumble': 0.0}}
     for told, row in ((sound, ['hv0', ' on for 75 % of the time, volume 80 %, rumble 50 %; ',
                                'av0', ' off, rumble 0 %']), ({}, [])):
-        page = Page(report_html([replace(run, timing={**run.timing, 'sound': told})]))
+        page = Page(report_html([changed(run, _timed=({**run.timing, 'sound': told}, ()))]))
         texts = [text for _, text in page.texts]
         assert ('sound' in texts) == bool(told)
         if told:
@@ -183,7 +194,7 @@ def test_what_people_in_the_seats_heard_is_told(run: ReportRun) -> None:
             assert ''.join(texts[place + 1:place + 5]).split() == ''.join(row).split()
 
 
-def test_what_people_in_the_seats_saw_is_told(run: ReportRun) -> None:
+def test_what_people_in_the_seats_saw_is_told(run: Run) -> None:
     assert run.timing is not None
     period = {'from_s': 0.0, 'to_s': 4.0, 'shown': 'map', 'inset': False, 'plans': True,
               'across_deg': None, 'screen_width_m': None, 'eye_distance_m': None,
@@ -195,25 +206,26 @@ def test_what_people_in_the_seats_saw_is_told(run: ReportRun) -> None:
     words = ['hv0 map from 0.0 to 4.0 s, with the plans of AVs; hv0 driver from 4.0 to 9.5 s, '
              '75° across, true to scale on a screen of 0.60 m, 0.70 m from the eyes, with the '
              'small map, 30 pictures/s, drawn by the processor (<b>SwiftShader)']
-    page = Page(report_html([replace(run, timing={
-        **run.timing, 'view': {'hv0': [period, driver]}})]))
+    page = Page(report_html([changed(run, _timed=({
+        **run.timing, 'view': {'hv0': [period, driver]}}, ()))]))
     texts = [text for _, text in page.texts]
     place = texts.index('view')
     assert ''.join(texts[place + 1:place + 7]).split() == ''.join(words).split()
 
 
-def test_what_a_recording_does_not_tell_is_left_out(run: ReportRun) -> None:
+def test_what_a_recording_does_not_tell_is_left_out(run: Run) -> None:
     """Without cycles there are no inputs and no timing, and the page says so."""
-    bare = replace(run, timing=None, record=replace(
-        run.record, ns=run.record.ns[:0], commands=run.record.commands[:0]))
+    bare = changed(run, _timed=(None, ()), outcome=None, bag=Path('bag'), began_ns=None,
+                   record=replace(run.record, ns=run.record.ns[:0],
+                                  commands=run.record.commands[:0]))
     page = Page(report_html([bare]))
     assert 'The recording does not tell of its cycles.' in [text for _, text in page.texts]
     assert 'Driver inputs' not in page.text_of('h2')
 
 
-def test_several_runs_stand_side_by_side(run: ReportRun) -> None:
+def test_several_runs_stand_side_by_side(run: Run) -> None:
     """A column each, plots with a letter for each, and no address twice."""
-    other = replace(run, key='run2', name='another')
+    other = changed(run, name='another')
     page = Page(report_html([run, other]))
     ids = [found['id'] for _, found in page.elements if 'id' in found]
     assert len(ids) == len(set(ids))
@@ -227,9 +239,9 @@ def test_several_runs_stand_side_by_side(run: ReportRun) -> None:
     assert sum('plotly.js (basic' in text for text in page.text_of('script')) == 1
 
 
-def test_how_people_drove_is_told_with_its_variants(page: Page, run: ReportRun) -> None:
+def test_how_people_drove_is_told_with_its_variants(page: Page, run: Run) -> None:
     """It has the human's values and the measures' definitions; the undriven AV has none."""
-    human, av = run.behaviour
+    human, av = run.usual_behaviour
     texts = [text for _, text in page.texts]
     assert 'How people drove' in page.text_of('h2')
     place = texts.index('Deviation of lateral position (SDLP)')
@@ -256,9 +268,9 @@ def _rows(page: Page, caption: str) -> dict[str, list[str]]:
     return rows
 
 
-def test_how_planners_drove_is_told_in_numbers(page: Page, run: ReportRun) -> None:
+def test_how_planners_drove_is_told_in_numbers(page: Page, run: Run) -> None:
     """The AV first, the human beside it, as the scores have them; why it is not valid."""
-    human, av = run.scores.vehicles
+    human, av = run.usual_scores.vehicles
     assert (human.role, av.planner) == ('human', 'idm')
     assert 'How planners drove' in page.text_of('h2')
     rows = _rows(page, 'How planners drove')
@@ -281,30 +293,30 @@ def test_how_planners_drove_is_told_in_numbers(page: Page, run: ReportRun) -> No
     assert any(title.startswith(MEASURES_OF_SCORES['SM1'].definition) for title in titles)
 
 
-def test_at_the_end_of_a_run_what_takes_long_is_left_out(run: ReportRun) -> None:
+def test_at_the_end_of_a_run_what_takes_long_is_left_out(run: Run) -> None:
     """No cost, no check; the page names the command that adds them. Without scores it says why."""
-    quick = replace(run, scores=scores_of(run.record, {}, drives_only=True))
+    quick = changed(run, usual_scores=scores_of(run.record, {}, drives_only=True))
     section = planners_section(quick)
     assert section is not None and 'crgame report</code> adds them' in section.html
     rows = _rows(Page(section.html), 'How planners drove')
     assert 'nuPlan score, of 1' in rows and 'Feasible' not in rows
     assert not any(name.startswith('CommonRoad') for name in rows)
-    av = run.scores.vehicles[1]
+    av = run.usual_scores.vehicles[1]
     assert av.commonroad is not None
     costs = tuple(replace(cost, total=None, reason='no <i>lane</i>')
                   for cost in av.commonroad.costs)
     lost = replace(av, commonroad=replace(av.commonroad, costs=costs))
-    without = planners_section(replace(run, scores=RunScores((lost,))))
+    without = planners_section(changed(run, usual_scores=RunScores((lost,))))
     assert without is not None and 'TR1: <bdi>no &lt;i&gt;lane&lt;/i&gt;</bdi>' in without.html
-    refused = planners_section(replace(run, scores=RunScores((), 'the run: <b>no</b> step')))
+    refused = planners_section(changed(run, usual_scores=RunScores((), 'the run: <b>no</b> step')))
     assert refused is not None and '&lt;b&gt;no&lt;/b&gt; step' in refused.html
 
 
-def test_planners_of_several_runs_stand_side_by_side(run: ReportRun) -> None:
+def test_planners_of_several_runs_stand_side_by_side(run: Run) -> None:
     """A column for the AV of each run, with its letter."""
-    page = Page(report_html([run, replace(run, key='run2', name='another')]))
+    page = Page(report_html([run, changed(run, name='another')]))
     rows = _rows(page, 'How planners drove, the runs side by side')
-    score = run.scores.vehicles[1].nuplan
+    score = run.usual_scores.vehicles[1].nuplan
     assert score is not None and rows['nuPlan score, of 1'] == [f'{score.score:.3f}'] * 2
     heads = [text for path, text in page.texts if 'thead' in path]
     assert 'A: ' in heads and 'B: ' in heads

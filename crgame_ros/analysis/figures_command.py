@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 import math
 from pathlib import Path
+import re
 import sys
 from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 
 if TYPE_CHECKING:  # A command that draws nothing starts without matplotlib.
-    from crgame_ros.analysis.pictures.figure_run import FigureRun
+    from crgame_ros.analysis.runs.run import Run
     from matplotlib.figure import Figure
 
 DESCRIPTION = """\
@@ -68,17 +69,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def figures(values: argparse.Namespace) -> int:
     """Draw the requested figures, and print the files with their contents."""
-    from crgame_ros.analysis.pictures.figure_run import FigureRun
     from crgame_ros.analysis.pictures.figure_style import FORMATS
+    from crgame_ros.analysis.runs.run import Run
+    from crgame_ros.recording.progress import Progress
+    from crgame_ros.recording.run_folder import recording_in
     wanted = _listed('--figures', values.figures, FIGURES) if values.figures is not None \
         else (() if values.video else FIGURES)
     formats = _listed('--format', values.format, FORMATS)
     times_s = None if values.at is None else _times(values.at)
     _check(values)
     say = partial(print, file=sys.stderr, flush=True)
-    runs = [FigureRun(path, label, values.epoch, say) for path, label in zip(
-        values.runs, values.label or [None] * len(values.runs), strict=True)]
-    folder = values.out or runs[0].folder / FOLDER
+    runs = [Run.of_recording(path, values.epoch, name=label, progress=Progress(say).tell)
+            for path, label in zip(
+                values.runs, values.label or [''] * len(values.runs), strict=True)]
+    first = values.runs[0]
+    # A recording is in the folder of its run.
+    folder = values.out or (first if recording_in(first) != first else first.parent) / FOLDER
     for number, run in enumerate(runs):
         # With several runs, each run's own figures are in a separate folder.
         own = folder / _name(number, runs) if len(runs) > 1 else folder
@@ -87,7 +93,7 @@ def figures(values: argparse.Namespace) -> int:
                 _write(figure, own / name, formats, caption)
         if 'profiles' in wanted:
             _write(_profiles(run, values), own / 'profiles', formats, 'heading angle, position '
-                   f'and velocity{" and more" if values.more else ""} of {run.label}')
+                   f'and velocity{" and more" if values.more else ""} of {run.name}')
     if 'timing' in wanted or 'table' in wanted:
         _timing(runs, folder, wanted, formats, values.columns,
                 say if values.figures is None else None)
@@ -136,32 +142,32 @@ def _times(text: str) -> list[float]:
     return times
 
 
-def _frames(run: 'FigureRun', values: argparse.Namespace, times_s: list[float] | None
+def _frames(run: 'Run', values: argparse.Namespace, times_s: list[float] | None
             ) -> Iterator[tuple[str, 'Figure', str]]:
     """Yield the figures of frames with their names and captions."""
     from crgame_ros.analysis.pictures.frames_figure import frames_figure, panel_steps
-    scene, log = run.scene, run.record.log
+    scene, log = run.scene, run.log
     scheduler = log.game.scheduler
     if times_s is not None:
         ends = [(int(k) - scheduler.k0) * scheduler.time_step_s for k in log.ks[[0, -1]]]
         for time_s in times_s:
             if not ends[0] - 1e-6 <= time_s <= ends[1] + 1e-6:
-                raise InputError(f'{time_s:g} s is not in it', str(run.path),
+                raise InputError(f'{time_s:g} s is not in it', run.name,
                                  f'it lasts from {ends[0]:g} to {ends[1]:g} s')
         yield 'frames', frames_figure(scene, [scene.k_at(each) for each in times_s],
-                                      columns=values.columns), f'{run.label} at {values.at} s'
+                                      columns=values.columns), f'{run.name} at {values.at} s'
         return
     if not run.moments:
-        print(f'note: no driven vehicle came near another object in {run.path}: no frames; '
+        print(f'note: no driven vehicle came near another object in {run.name}: no frames; '
               '--at names times', file=sys.stderr)
     for number, moment in enumerate(run.moments[:values.moments], 1):
         ks = panel_steps(scene, moment.time_s, values.panels, values.spacing)
         yield (f'frames_{number}',
                frames_figure(scene, ks, moment.vehicles, values.columns),
-               f'{run.label} around {moment.time_s:.1f} s: {moment.why}')
+               f'{run.name} around {moment.time_s:.1f} s: {moment.why}')
 
 
-def _profiles(run: 'FigureRun', values: argparse.Namespace) -> 'Figure':
+def _profiles(run: 'Run', values: argparse.Namespace) -> 'Figure':
     from crgame_ros.analysis.pictures.profiles_figure import (
         ALL_PROFILES,
         profiles_figure,
@@ -171,7 +177,7 @@ def _profiles(run: 'FigureRun', values: argparse.Namespace) -> 'Figure':
                            ALL_PROFILES if values.more else USUAL_PROFILES, values.columns)
 
 
-def _timing(runs: Sequence['FigureRun'], folder: Path, wanted: Sequence[str],
+def _timing(runs: Sequence['Run'], folder: Path, wanted: Sequence[str],
             formats: Sequence[str], columns: int, say: Callable[[str], object] | None) -> None:
     """
     Draw the timing and write the table of all runs.
@@ -189,7 +195,7 @@ def _timing(runs: Sequence['FigureRun'], folder: Path, wanted: Sequence[str],
             raise
         say(f'note: no timing: {error}')
         return
-    names = ' and '.join(run.label for run in runs)
+    names = ' and '.join(run.name for run in runs)
     if 'timing' in wanted:
         _write(timing_figure(timed, columns), folder / 'timing', formats, f'timing of {names}')
     if 'table' in wanted:
@@ -213,19 +219,20 @@ def _write(figure: 'Figure', place: Path, formats: Sequence[str], caption: str) 
         print(f'{path}: {caption}', flush=True)
 
 
-def _video(run: 'FigureRun', path: Path, say: Callable[[str], object]) -> None:
+def _video(run: 'Run', path: Path, say: Callable[[str], object]) -> None:
     from crgame_ros.analysis.pictures.run_video import video_path, write_video
     from crgame_ros.recording.export import prepare_folder
     from crgame_ros.recording.progress import Progress
     prepare_folder(path.absolute().parent)
     if video_path(path) != path:
         say('note: ffmpeg is not installed: the video becomes a GIF')
-    written = write_video(run.scene, path, Progress(say, f'drawing {run.path}'))
-    print(f'{written}: {run.label} in real time')
+    written = write_video(run.scene, path, Progress(say, f'drawing {run.name}'))
+    print(f'{written}: {run.name} in real time')
 
 
-def _name(number: int, runs: Sequence['FigureRun']) -> str:
+def _name(number: int, runs: Sequence['Run']) -> str:
     """Return the name of a run's folder, unique among runs of the same name."""
-    name = runs[number].name
-    before = sum(run.name == name for run in runs[:number])
+    names = [re.sub(r'[^\w.-]+', '_', run.name).lstrip('.') or 'run' for run in runs]
+    name = names[number]
+    before = names[:number].count(name)
     return f'{name}_{before + 1}' if before else name

@@ -2,16 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Selects the moments of a run that its report shows, and finds them for links."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
-from crgame_ros.analysis.pictures.critical_moments import (
-    critical_moments,
-    Moment,
-    TOGETHER_S,
-    Touch,
-)
+from crgame_ros.analysis.pictures.critical_moments import Moment, TOGETHER_S
 from crgame_ros.recording.run_record import RunRecord
 
 # Greatest number of pictures of a run, start and end included.
@@ -21,21 +15,20 @@ TWICE = 'time_gap'
 
 
 def story_moments(record: RunRecord, criticality: Criticality,
-                  contacts: Sequence[Mapping[str, Any]]) -> tuple[Moment, ...]:
+                  critical: Sequence[Moment]) -> tuple[Moment, ...]:
     """
     Return the moments of a run to show, in order of time.
 
     These are start and end, the most critical ones, and those to which worst values are linked.
 
-    :param contacts: contacts as in `timing.json`.
+    :param critical: the critical ones, the most critical one first.
     """
     log = record.log
     scheduler = log.game.scheduler
     first_s, last_s = ((int(k) - scheduler.k0) * scheduler.time_step_s
                        for k in (log.ks[0], log.ks[-1]))
     ends = [Moment(first_s, 'start', ()), Moment(last_s, 'end', ())]
-    found = list(critical_moments(record, criticality,
-                                  [Touch.from_entry(item) for item in contacts]))
+    found = list(critical)
     found += [Moment(worst.time_s, f'{MEASURES[name].label} of {vehicle.vehicle_id} to '
                      f'{worst.other} is {worst.value:.2f} {MEASURES[name].symbol}',
                      (vehicle.vehicle_id, worst.other))

@@ -1,0 +1,361 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A finished run, for reports, tables and figures: all that is known and measured of it."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from pathlib import Path
+import re
+from typing import Any, Literal, TYPE_CHECKING
+
+from crgame_ros.errors import CrgameError
+from crgame_ros.game.documents import GameDocument
+from crgame_ros.game.driven_vehicle import DrivenVehicle
+from crgame_ros.recording.epochs import read_epoch
+from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.reader import BagReader
+from crgame_ros.recording.run_cycles import read_cycles
+from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_record import record_of_log, run_record_of, RunRecord
+from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
+from crgame_ros.recording.timing_report import timing_report
+from crgame_ros.simulation.offline import OfflineResult
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # They take a second to import, and only measures need them.
+    from crgame_ros.analysis.behaviour.vehicle import DriverBehaviour
+    from crgame_ros.analysis.criticality.criticality import Criticality, VehicleCriticality
+    from crgame_ros.analysis.pictures.critical_moments import Moment, Touch
+    from crgame_ros.analysis.pictures.scene_frame import FrameScene
+    from crgame_ros.analysis.pictures.timing_figure import TimedRun
+    from crgame_ros.analysis.scores.plan_record import PlanRecord
+    from crgame_ros.analysis.scores.run_scores import RunScores
+    from crgame_ros.recording.recorded_plans import RecordedPlan
+
+FloatArray = NDArray[np.float64]
+# Called with a piece of work, as in `reading runs/NAME`, and the share done of it, 0 to 1.
+RunProgress = Callable[[str, float], object]
+# Which scores a run has: those of CommonRoad's tools take most of the time.
+Scoring = Literal['all', 'drives', 'none']
+_PART_OF_SESSION = re.compile(r'run_[1-9][0-9]*')
+_BAG = re.compile(r'bag(_[0-9]+|_part[0-9]+)*')
+
+
+def _untold(_criticality: object) -> None:
+    """Tell nobody."""
+
+
+@dataclass
+class PlanTally:
+    """Counts of an AV's plans: answers, and those that pass the engine's check."""
+
+    answers: int = 0
+    passing: int = 0
+    checked: int = 0
+    latencies_s: list[float] = field(default_factory=list)
+
+
+def _silent(_what: str, _share: float) -> None:
+    """Tell nobody."""
+
+
+class Run:
+    """
+    A finished run; each part of it is read or measured at its first use, and kept.
+
+    :ivar name: for people.
+    :ivar key: part of addresses in a report.
+    :ivar bag: its recording; None for an offline run.
+    :ivar scoring: which scores it gets.
+    :ivar tallies: by AV, once its plans have been tabulated.
+    """
+
+    def __init__(self, name: str, *, bag: Path | None = None, epoch: int | None = None,
+                 log: RunTrajectories | None = None, record: RunRecord | None = None,
+                 timing: Mapping[str, Any] | None = None, result: OfflineResult | None = None,
+                 scoring: Scoring = 'all', progress: RunProgress = _silent) -> None:
+        """
+        Keep what is known; the rest follows from the recording, or from an offline run's result.
+
+        :param epoch: which run, where a recording holds several; None for the last.
+        :param timing: content of `timing.json`.
+        """
+        self.name, self.bag, self.key = name, bag, 'run1'
+        self._epoch, self.scoring, self._progress = epoch, scoring, progress
+        self._known_log, self._known_record = log, record
+        self._known_timing, self._result = timing, result
+        self.tallies: dict[str, PlanTally] = {}
+        self._id: str | None = None
+        self._criticality: Criticality | None = None
+
+    @classmethod
+    def of_recording(cls, path: Path, epoch: int | None = None, *, name: str = '',
+                     scoring: Scoring = 'all', progress: RunProgress = _silent) -> 'Run':
+        """
+        Return a recorded run.
+
+        :param path: folder of the run, or its recording.
+        :param epoch: which run, where a recording holds several; None for the last.
+        :param name: for people; by default that of its folder.
+        :raises InputError: at its first use, if it cannot be read.
+        """
+        return cls(name or run_name(path), bag=recording_in(path), epoch=epoch, scoring=scoring,
+                   progress=progress)
+
+    @cached_property
+    def log(self) -> RunTrajectories:
+        """
+        Return the motion of all vehicles and objects, at the scenario's steps.
+
+        :raises InputError: if the recording lacks it.
+        """
+        if self._known_record is not None or self._result is not None:
+            return self.record.log
+        if self._known_log is not None:
+            return self._known_log
+        assert self.bag is not None
+        return read_trajectories(self.bag, self._epoch, self.telling('reading'))
+
+    @cached_property
+    def record(self) -> RunRecord:
+        """Return the log, the drivers' commands and the events."""
+        if self._known_record is not None:
+            return self._known_record
+        if self._result is not None:
+            return run_record_of(self._result)
+        assert self.bag is not None
+        return record_of_log(self.bag, self.log)
+
+    @property
+    def game(self) -> GameDocument:
+        """Return the game as it was run."""
+        return self.log.game
+
+    @property
+    def id(self) -> str:  # noqa: A003
+        """Return its id in tables: by default its name and epoch."""
+        return self._id or f'{self.name}:{self.game.epoch}'
+
+    @id.setter
+    def id(self, text: str) -> None:  # noqa: A003
+        self._id = text
+
+    def as_part(self, key: str) -> 'Run':
+        """Return the same run with another key: one of several in a report."""
+        part = copy(self)
+        part.key = key
+        return part
+
+    @property
+    def vehicles(self) -> tuple[str, ...]:
+        """Return the ids of the driven vehicles: humans, then AVs."""
+        return tuple(item.id for item in self.log.vehicles)
+
+    @property
+    def driven(self) -> tuple[DrivenVehicle, ...]:
+        """Return the game's driven vehicles, in the log's order."""
+        game = {item.id: item for item in self.game.vehicles}
+        return tuple(game[name] for name in self.vehicles)
+
+    @property
+    def duration_s(self) -> float:
+        """Return its duration on the scenario's time line [s]."""
+        return float((len(self.log.ks) - 1) * self.game.scheduler.time_step_s)
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Return the times of the log's scenario steps since the run's start (K) [s]."""
+        scheduler = self.game.scheduler
+        return np.asarray((self.log.ks - scheduler.k0) * scheduler.time_step_s)
+
+    def steps_of(self, ks: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the simulation steps n of scenario steps k."""
+        scheduler = self.game.scheduler
+        return np.asarray((ks - scheduler.k0) * scheduler.steps_per_tick)
+
+    def seconds_at(self, ks: NDArray[np.int64]) -> FloatArray:
+        """Return the times of scenario steps k since the run's start, equal in all tables [s]."""
+        return np.asarray(self.steps_of(ks) * self.game.scheduler.dt_s)
+
+    @cached_property
+    def _timed(self) -> tuple[Mapping[str, Any] | None, tuple[str, ...]]:
+        """Return the content of `timing.json`, or why there is none."""
+        if self._known_timing is not None or self.bag is None:
+            return self._known_timing, ()
+        try:
+            return timing_report(self.bag, self.game.epoch, self.log,
+                                 self.telling('reading the timing of')), ()
+        except CrgameError as error:
+            return None, (str(error),)
+
+    @property
+    def timing(self) -> Mapping[str, Any] | None:
+        """Return the content of `timing.json`; None if offline or without recorded cycles."""
+        return self._timed[0]
+
+    @cached_property
+    def outcome(self) -> Mapping[str, Any] | None:
+        """Return planners, violations and contacts as in `timing.json`; None if unknown."""
+        return self.timing if self._result is None else offline_outcome(self._result)
+
+    @property
+    def contacts(self) -> Sequence[Mapping[str, Any]] | None:
+        """Return the first contacts as in `timing.json`; None if unknown."""
+        return None if self.outcome is None else self.outcome['contacts']
+
+    @property
+    def answers(self) -> 'dict[str, PlanRecord]':
+        """Return the known answers of planners, by AV."""
+        from crgame_ros.analysis.scores.plan_record import plans_of_report
+        return plans_of_report(self.outcome)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Return notices about it, one line each."""
+        return self.missing
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Return what its recording lacks, one line each."""
+        timing, refusal = self._timed
+        told = () if timing is None else timing['notices']
+        return tuple(dict.fromkeys((*told, *self.log.notices, *refusal)))
+
+    @cached_property
+    def began_ns(self) -> int | None:
+        """Return the log time of its first message since 1970 [ns]; None for an offline run."""
+        if self.bag is None:
+            return None
+        with BagReader(self.bag, parts=True) as reader:
+            return reader.start_ns or None
+
+    @cached_property
+    def timed(self) -> 'TimedRun':
+        """
+        Read the cycles; no other recorded data are needed.
+
+        :raises InputError: if there are none.
+        """
+        from crgame_ros.analysis.pictures.timing_figure import TimedRun
+        assert self.bag is not None
+        with BagReader(self.bag, parts=True) as reader:
+            game = read_epoch(reader, self._epoch).game
+            return TimedRun(self.name, read_cycles(reader, game.epoch), game.scheduler.dt_s)
+
+    @cached_property
+    def scene(self) -> 'FrameScene':
+        """Read what pictures show, with the plans that AVs followed."""
+        from crgame_ros.analysis.pictures.scene_frame import FrameScene, read_followed_plans
+        if self.bag is None:
+            return FrameScene(self.log)
+        return FrameScene(self.log, read_followed_plans(
+            self.bag, self.log, self.telling('reading the plans of')))
+
+    @property
+    def plans(self) -> 'Callable[[], Iterator[RecordedPlan]] | None':
+        """Return a function that reads the recorded plans one by one; None if offline."""
+        if self.bag is None:
+            return None
+        from crgame_ros.recording.recorded_plans import read_plans
+        return partial(read_plans, self.bag, self.game.epoch,
+                       self.telling('reading the plans of'))
+
+    def measure(self, on_tick: 'Callable[[Criticality], object] | None' = None) -> 'Criticality':
+        """
+        Measure how critical it was by the usual thresholds, and keep the result.
+
+        :param on_tick: called at each scenario step.
+        :raises InputError: if its scenario cannot be used.
+        """
+        from crgame_ros.analysis.criticality.recorded import measure_log
+        self._criticality = measure_log(
+            self.log, progress=self.telling('measuring'), on_tick=on_tick or _untold)
+        return self._criticality
+
+    @property
+    def usual_criticality(self) -> 'Criticality':
+        """Return how critical it was by the usual thresholds."""
+        return self._criticality or self.measure()
+
+    @cached_property
+    def vehicle_criticality(self) -> 'dict[str, VehicleCriticality]':
+        """Return how critical it was for each driven vehicle."""
+        return {each.vehicle_id: each for each in self.usual_criticality.report()}
+
+    @cached_property
+    def course(self) -> dict[str, FloatArray]:
+        """Return the most critical value of each measure (V, K); NaN where there was none."""
+        from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
+        log = self.log
+        shape = len(log.vehicles), len(log.ks)
+        course = {name: np.full(shape, np.nan) for name in MEASURES}
+        row = 0
+
+        def add_step(found: Criticality) -> None:
+            nonlocal row
+            for tick in found.latest:
+                for place, (name, measure) in enumerate(MEASURES.items()):
+                    values = tick.values[:, place]
+                    values = values[~np.isnan(values) & (values != measure.undefined)]
+                    if len(values):
+                        course[name][tick.subject, row] = \
+                            values.min() if measure.worst < 0 else values.max()
+            row += 1
+        self.measure(add_step)
+        return course
+
+    @cached_property
+    def usual_behaviour(self) -> 'tuple[DriverBehaviour, ...]':
+        """Measure how each vehicle was driven, in the log's order; no event is a request."""
+        from crgame_ros.analysis.behaviour.driver import measure_behaviour
+        return measure_behaviour(self.record)
+
+    @cached_property
+    def usual_scores(self) -> 'RunScores':
+        """Score its vehicles, with their own progress as the measure."""
+        from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
+        if self.scoring == 'none' or not self.vehicles:
+            return RunScores()
+        return scores_of(self.record, self.answers, drives_only=self.scoring == 'drives',
+                         progress=self.telling('scoring'))
+
+    @property
+    def touches(self) -> 'tuple[Touch, ...]':
+        """Return its contacts for pictures; without cycles, their steps are unknown."""
+        from crgame_ros.analysis.pictures.critical_moments import Touch
+        return tuple(Touch.from_entry(item) for item in self.contacts or ()
+                     if item['n'] is not None)
+
+    @cached_property
+    def story(self) -> 'tuple[Moment, ...]':
+        """Find the moments that a report shows, in order of time."""
+        from crgame_ros.analysis.pictures.story_moments import story_moments
+        return story_moments(self.record, self.usual_criticality, self.moments)
+
+    @cached_property
+    def moments(self) -> 'tuple[Moment, ...]':
+        """Find its moments, the most critical one first."""
+        from crgame_ros.analysis.pictures.critical_moments import critical_moments
+        return critical_moments(self.record, self.usual_criticality, self.touches)
+
+    def telling(self, what: str) -> Callable[[float], object]:
+        """Return the function to call with the share done of some work, as in `reading`."""
+        return partial(self._progress, f'{what} {self.name}')
+
+
+def run_name(path: Path) -> str:
+    """
+    Return a run's name: that of its folder, given either the folder or the recording in it.
+
+    A later run of a session, in its `run_2`, has the session's name and another epoch.
+    """
+    path = path.resolve()
+    if path.is_file():
+        # The name of a recording without a folder of its own.
+        path = path.with_suffix('') if not _BAG.fullmatch(path.stem) else path.parent
+    if _BAG.fullmatch(path.name) and path.parent.name:
+        path = path.parent
+    return path.parent.name if _PART_OF_SESSION.fullmatch(path.name) else path.name
