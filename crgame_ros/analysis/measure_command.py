@@ -10,7 +10,7 @@ from pathlib import Path
 import sys
 from typing import Any
 
-from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.analysis.criticality.thresholds import OPTIONS, Thresholds, USUAL
 
 # Printed after a value that is beyond its threshold.
 CRITICAL = '   <- critical'
@@ -34,11 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('run', type=Path, help='folder of a run, or its recording')
     parser.add_argument('--epoch', type=int, help='which run of a recording that holds several '
                         '(resets count them from 0; default: the last)')
-    for name, unit, value, which in (
-            ('ttc', 'S', USUAL.ttc_s, 'smaller'), ('drac', 'M/S2', USUAL.drac, 'greater'),
-            ('pet', 'S', USUAL.pet_s, 'smaller')):
-        parser.add_argument(f'--{name}', type=float, default=value, metavar=unit,
-                            help=f'{which} ones are critical (default: {value:g})')
+    for field, (name, sentence) in OPTIONS.items():
+        default = getattr(USUAL, field)
+        parser.add_argument(f'--{name.replace("_", "-")}', type=float, default=default,
+                            dest=field, metavar='N', help=f'{sentence} (default: {default:g})')
     parser.add_argument('--request', action='append', default=[], metavar='EVENT',
                         help='an event that asks to take over an AV, as orders of its seat do; '
                         'may be given several times')
@@ -53,7 +52,7 @@ def measure(values: argparse.Namespace) -> int:
     from crgame_ros.recording.progress import Progress
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_record import read_run_record
-    thresholds = Thresholds(values.ttc, values.drac, values.pet)
+    thresholds = Thresholds(*(getattr(values, field) for field in OPTIONS))
     thresholds.check('--')
     path = values.run
     say = partial(print, file=sys.stderr, flush=True)
@@ -73,7 +72,7 @@ def measure(values: argparse.Namespace) -> int:
 
 
 def _lines(found: dict[str, Any]) -> Iterator[str]:
-    from crgame_ros.analysis.criticality.criticality import MEASURES
+    from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
     limits = Thresholds(**found['thresholds'])
     for vehicle_id, vehicle in found['vehicles'].items():
         yield vehicle_id
@@ -85,9 +84,9 @@ def _lines(found: dict[str, Any]) -> Iterator[str]:
                    f'{worst["time_s"]:.1f} s{CRITICAL if critical else ""}')
         if not near:
             yield '  no other was near'
-        yield (f'  tet          {vehicle["tet_s"]:9.2f} s      with a ttc below '
-               f'{limits.ttc_s:g} s')
-        yield f'  tit          {vehicle["tit_s2"]:9.2f} s^2    what it was below that, over time'
+        for name, exposure in EXPOSURES.items():
+            yield (f'  {name.removesuffix("_s"):<15}{vehicle["exposures"][name]["value"]:7.2f} '
+                   f'{exposure.unit:<6} {exposure.told(limits).definition}')
         for each in vehicle['crossings']:
             yield (f'  pet          {each["pet_s"]:9.2f} s      {each["second"]} after '
                    f'{each["first"]} at {each["entered_s"]:.1f} s'
@@ -116,7 +115,7 @@ def replay_rows(found: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]
             yield (
                 each['planner'], vehicle_id,
                 *(worst.get(name, NEVER) for name in ('gap', 'ttc', 'a_req', 'min_distance')),
-                f'{vehicle["tet_s"]:.1f}',
+                f'{vehicle["exposures"]["tet_s"]["value"]:.1f}',
                 str(len(touched)) if each.get('contacts') is not None else NEVER,
                 *(NEVER if each.get(name) is None else f'from {each[name]:.1f} s'
                   for name in ('human_differs_s', 'others_differ_s')))

@@ -12,6 +12,7 @@ import secrets
 from types import MappingProxyType
 from typing import Any
 
+from crgame_ros.analysis.criticality.criticality import EXPOSURES
 from crgame_ros.analysis.criticality.rows import MEASURED
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.cockpit.client import Client
@@ -33,6 +34,10 @@ _MEASURES = [
     {'name': name, 'label': measure.label, 'unit': measure.symbol,
      'worst': measure.worst, 'limit': USUAL.of(name), 'definition': measure.definition}
     for name, measure in MEASURED.items()]
+_EXPOSURES = [
+    {'name': name, 'label': each.label, 'unit': each.unit.replace('^2', '²'),
+     'definition': each.definition}
+    for name, each in ((name, each.told(USUAL)) for name, each in EXPOSURES.items())]
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,8 @@ class Hub:
         client.put_event(_encode('hello', {
             'client': client.id, 'name': client.name, 'mode': self._mode,
             'version': __version__, 'program': self._program, 'rights': _rights(client),
-            'framed_by': self._framed_by, 'measures': _MEASURES}))
+            'framed_by': self._framed_by, 'measures': _MEASURES,
+            'exposures': _EXPOSURES}))
         for kind, text in self._documents.items():
             client.put_document(kind, text)
         for slot, frame in self._frames.items():

@@ -15,7 +15,7 @@ OK, ERROR = 0, 2
 LATE_TRAFFIC_S = 2.0
 # A stopped vehicle that touches the same object again within this time has one contact [s].
 SAME_CONTACT_S = 1.0
-_WORST, _OF, _THRESHOLD = 'worst_', '_of', 'threshold_'
+_WORST, _OF, _THRESHOLD, _EXPOSURE = 'worst_', '_of', 'threshold_', 'exposure_'
 TRACKING = tuple(f'{when}{name}_error' for when in ('', 'worst_')
                  for name in ('lane', 'lateral', 'along', 'heading', 'speed'))
 
@@ -281,8 +281,9 @@ def _criticality(level: int, values: Mapping[str, str]) -> dict[str, Any]:
     """Read a vehicle's criticality: the worst values so far and their limits."""
     worst = {name[len(_WORST):-len(_OF)]: other for name, other in values.items()
              if name.startswith(_WORST) and name.endswith(_OF)}
-    return {'critical': level != OK, 'tet_s': _number(values.get('tet_s')),
-            'tit_s2': _number(values.get('tit_s2')),
+    return {'critical': level != OK,
+            'exposures': {name.removeprefix(_EXPOSURE): _number(value)
+                          for name, value in values.items() if name.startswith(_EXPOSURE)},
             'worst': {name: {'value': _number(values.get(f'{_WORST}{name}')), 'of': other,
                              't': _number(values.get(f'{_WORST}{name}_at'))}
                       for name, other in worst.items()},

@@ -10,8 +10,9 @@ from crgame_ros.analysis.criticality.rows import (
     COLUMNS,
     criticality_rows,
     CRITICALITY_TOPIC,
+    MEASURED,
 )
-from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
+from crgame_ros.analysis.criticality.thresholds import OPTIONS, Thresholds, USUAL
 from crgame_ros.ros.node_main import run_node
 from crgame_ros.ros.number_parameters import declare_number
 from crgame_ros.ros.observer_node import ObserverNode
@@ -34,13 +35,9 @@ class CriticalityNode(ObserverNode[Criticality]):
     def __init__(self) -> None:
         super().__init__('criticality_node')
         bounds = 0.0, GREATEST
-        self._thresholds = Thresholds(
-            declare_number(self, 'ttc', USUAL.ttc_s,
-                           'smaller times to collision are critical [s]', bounds),
-            declare_number(self, 'drac', USUAL.drac,
-                           'greater decelerations to avoid a crash are critical [m/s^2]', bounds),
-            declare_number(self, 'pet', USUAL.pet_s,
-                           'smaller post-encroachment times are critical [s]', bounds))
+        self._thresholds = Thresholds(*(
+            declare_number(self, name, getattr(USUAL, field), sentence, bounds)
+            for field, (name, sentence) in OPTIONS.items()))
         self._rows = self.endpoints.publisher(CRITICALITY_TOPIC)
         self._message = Float64MultiArray()
         self._message.layout.dim = [
@@ -86,15 +83,16 @@ class CriticalityNode(ObserverNode[Criticality]):
             return
         self._told[tick.subject] = bool(critical)
         found = observer.report()[tick.subject]
-        told = {'n': observer.n, 'tet_s': f'{found.tet_s:.2f}', 'tit_s2': f'{found.tit:.2f}'}
+        told = {'n': observer.n} | {
+            f'exposure_{name}': f'{value:.2f}' for name, value in found.exposures.items()}
         for name, (value, other) in now.items():
             told[name], told[f'{name}_of'] = f'{value:.3f}', observer.ids[other]
         for name, worst in found.worst.items():
             told[f'worst_{name}'] = f'{worst.value:.3f}'
             told[f'worst_{name}_of'] = worst.other
             told[f'worst_{name}_at'] = f'{worst.time_s:.2f}'
-        told |= {f'threshold_{name.removesuffix("_s")}': f'{value:g}'
-                 for name, value in self._thresholds._asdict().items()}
+        told |= {f'threshold_{name}': f'{limit:g}' for name in MEASURED
+                 if (limit := self._thresholds.of(name))}
         self.endpoints.diagnostics.publish(
             f'criticality_node: {found.vehicle_id}',
             DiagnosticStatus.WARN if critical else DiagnosticStatus.OK,

@@ -63,16 +63,21 @@ async def test_a_new_client_gets_hello_then_documents_and_the_newest_frames() ->
     hub.send_frame('state', b'old')
     hub.send_frame('state', b'new')
     sink = await received(add(hub))
-    program, measures = (sink.texts[0][name] for name in ('program', 'measures'))
+    program, measures, exposures = (
+        sink.texts[0][name] for name in ('program', 'measures', 'exposures'))
     assert [measure['name'] for measure in measures] == [*MEASURES, 'pet']
     assert measures[3] == {
         'name': 'ttc', 'label': 'Time to collision (TTC)', 'unit': 's', 'worst': -1, 'limit': 3.0,
         'definition': MEASURES['ttc'].definition}
+    assert exposures[0] == {
+        'name': 'tet_s', 'label': 'Time with a TTC below 3 s (TET)', 'unit': 's',
+        'definition': 'time with a ttc below 3 s'}
     assert sink.texts == [
         {'type': 'hello', 'client': 'c1', 'name': 'Guest 1', 'mode': 'live',
          'version': __version__, 'program': program, 'rights': {
              'role': 'director and driver', 'directs': True, 'drives': True, 'seat': '',
-             'may_direct': True, 'may_drive': True}, 'framed_by': '', 'measures': measures},
+             'may_direct': True, 'may_drive': True}, 'framed_by': '', 'measures': measures,
+         'exposures': exposures},
         {'type': 'scene', 'id': 2}, {'type': 'seats', 'seats': {}}]
     assert sink.frames == [b'new']
     assert (await received(add(hub))).texts[0]['program'] == program

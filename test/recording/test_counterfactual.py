@@ -107,7 +107,8 @@ def test_the_same_human_against_the_same_planner_and_another(
     assert same['human_differs_s'] is same['others_differ_s'] is other['human_differs_s'] is None
     expected = recorded['criticality']['vehicles']
     for vehicle, found in same['criticality']['vehicles'].items():
-        assert found['tet_s'] == pytest.approx(expected[vehicle]['tet_s'])
+        assert found['exposures']['tet_s']['value'] == pytest.approx(
+            expected[vehicle]['exposures']['tet_s']['value'])
         assert found['worst']['min_distance']['value'] == pytest.approx(
             expected[vehicle]['worst']['min_distance']['value'], abs=1e-6)
     human = recorded['criticality']['vehicles']['hv0']

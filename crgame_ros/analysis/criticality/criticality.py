@@ -7,6 +7,7 @@ The same code observes offline runs and measures recordings. All definitions are
 `docs/criticality.md`. Distances are bumper to bumper, along the subject's own path.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import math
 from typing import Any, NamedTuple
@@ -94,6 +95,52 @@ _OF_LEADER = COLUMN['ttc_2d']
 _SENSES = np.array([float(measure.worst) for measure in MEASURES.values()])
 
 
+class Exposure(NamedTuple):
+    """
+    A measure of a vehicle over a whole run: the integral over time of a measure's excess.
+
+    :param unit: as tables write it.
+    :param label: for people, as is the definition; both may name thresholds: {ttc_s}.
+    :param definition: one sentence.
+    :param variant: how it is computed.
+    :param rate: of the most critical values of a tick, in the order of `MEASURES`, and the
+        thresholds: by how much it grows in a second.
+    """
+
+    unit: str
+    label: str
+    definition: str
+    variant: str
+    rate: Callable[[Sequence[float], Thresholds], float]
+
+    def told(self, limits: Thresholds) -> 'Exposure':
+        """Return it with the thresholds in its texts."""
+        numbers = {name: f'{value:g}' for name, value in limits._asdict().items()}
+        return self._replace(label=self.label.format(**numbers),
+                             definition=self.definition.format(**numbers))
+
+
+def _while(holds: bool) -> float:
+    return 1.0 if holds else 0.0
+
+
+_IN_FULL = 'each step that it is below counts in full'
+# By the name of their column.
+EXPOSURES = {
+    'tet_s': Exposure(
+        's', 'Time with a TTC below {ttc_s} s (TET)', 'time with a ttc below {ttc_s} s', _IN_FULL,
+        lambda values, limits: _while(values[COLUMN['ttc']] < limits.ttc_s)),
+    'tit': Exposure(
+        's^2', 'Integral of the TTC below {ttc_s} s (TIT)',
+        'integral of what the ttc is below {ttc_s} s', 'rectangles of a scenario step',
+        lambda values, limits: max(0.0, limits.ttc_s - values[COLUMN['ttc']])),
+    'short_time_gap_s': Exposure(
+        's', 'Time with a time gap below {time_gap_s} s',
+        'time with a time gap below {time_gap_s} s', _IN_FULL,
+        lambda values, limits: _while(values[COLUMN['time_gap']] < limits.time_gap_s)),
+}
+
+
 def most_critical(values: FloatArray, others: NDArray[np.int64]
                   ) -> tuple[FloatArray, NDArray[np.int64]]:
     """
@@ -151,16 +198,14 @@ class VehicleCriticality:
     The criticality of a run for one vehicle.
 
     :param worst: by measure; measures that were never defined are missing.
-    :param tet_s: time with a ttc below its threshold (TET) [s]; each tick counts as one step
-    :param tit: integral of the ttc's amount below its threshold (TIT) [s^2]
+    :param exposures: by the names of `EXPOSURES`.
     :param headways: gaps and headways to its leaders, at all ticks.
     :param crossings: crossings with other paths, with their PET.
     """
 
     vehicle_id: str
     worst: dict[str, Worst]
-    tet_s: float
-    tit: float
+    exposures: dict[str, float]
     headways: Headways
     crossings: list[WayCrossed]
 
@@ -193,7 +238,8 @@ class Criticality:
             for problem in run.problems or (None,) * self.vehicles])
         self._crossings = EncroachmentDetector(self.vehicles, self._footprints.radii)
         self._before: tuple[float, FloatArray] | None = None
-        self._found = [VehicleCriticality(item.id, {}, 0.0, 0.0, Headways(), [])
+        self._found = [VehicleCriticality(item.id, {}, dict.fromkeys(EXPOSURES, 0.0), Headways(),
+                                          [])
                        for item in run.vehicles]
         self.n = -1
         self.latest: tuple[TickMeasures, ...] = ()
@@ -241,7 +287,8 @@ class Criticality:
                                      'of': worst.other, 'time_s': worst.time_s}
                               for name, measure in MEASURES.items()
                               if (worst := vehicle.worst.get(name))},
-                    'tet_s': vehicle.tet_s, 'tit_s2': vehicle.tit,
+                    'exposures': {name: {'value': value, 'unit': EXPOSURES[name].unit}
+                                  for name, value in vehicle.exposures.items()},
                     'crossings': [{'first': self.ids[each.first],
                                    'second': self.ids[each.second],
                                    'entered_s': each.entered_s, 'pet_s': each.pet_s,
@@ -309,10 +356,8 @@ class Criticality:
                                    or MEASURES[name].worst * (value - known.value) > 0.0):
                     found.worst[name] = Worst(value, self.ids[other], time_s)
             found.headways.add(tick.following, values[COLUMN['ttc']])
-            short = self.thresholds.ttc_s - values[COLUMN['ttc']]
-            if short > 0.0:
-                found.tet_s += step_s
-                found.tit += step_s * short
+            for name, exposure in EXPOSURES.items():
+                found.exposures[name] += step_s * exposure.rate(values, self.thresholds)
 
 
 def _rates_along(path: Curve, corner: Corner, scene: Scene, number: int) -> list[float]:

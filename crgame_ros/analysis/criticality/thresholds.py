@@ -6,20 +6,23 @@ import math
 from typing import NamedTuple
 
 from crgame_ros.errors import InputError
+from crgame_ros.schema.declaration import sentences_of
 
 
 class Thresholds(NamedTuple):
     """
-    Thresholds of critical values, as in the SSM device of SUMO.
+    Thresholds of critical values, as in the SSM device of SUMO, and of short time gaps.
 
     :param ttc_s: smaller times to collision are critical [s]
-    :param drac: greater decelerations are critical [m/s^2]
+    :param drac: greater decelerations to avoid a crash are critical [m/s^2]
     :param pet_s: smaller post-encroachment times are critical [s]
+    :param time_gap_s: smaller time gaps are short, but not critical [s]
     """
 
     ttc_s: float = 3.0
     drac: float = 3.0
     pet_s: float = 2.0
+    time_gap_s: float = 1.0
 
     def exceeded(self, measure: str, value: float) -> bool:
         """Return whether a value is critical; False for measures without a threshold."""
@@ -52,8 +55,12 @@ class Thresholds(NamedTuple):
         """
         for name, value in self._asdict().items():
             if not 0.0 < value < math.inf:
-                raise InputError(f'is {value}', prefix + name.removesuffix('_s'),
+                option = OPTIONS[name][0].replace('_', '-') if prefix else OPTIONS[name][0]
+                raise InputError(f'is {value}', prefix + option,
                                  'give a positive number')
 
 
 USUAL = Thresholds()
+# By field: the name of an option or parameter, and what the threshold is.
+OPTIONS = {name: (name.removesuffix('_s'), sentence)
+           for name, sentence in sentences_of(Thresholds).items()}

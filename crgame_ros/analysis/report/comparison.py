@@ -52,7 +52,7 @@ def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
     for name, words in _COMPARED.items():
         yield words, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
-        each.tet_s for each in run.usual_criticality.report()))
+        each.exposures['tet_s'] for each in run.usual_criticality.report()))
     yield 'least PET [s]', _least_pet
     yield 'contacts', lambda run: NOTHING if run.contacts is None \
         else str(len(run.contacts))

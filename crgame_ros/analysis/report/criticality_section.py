@@ -4,7 +4,11 @@
 
 from collections.abc import Iterator, Sequence
 
-from crgame_ros.analysis.criticality.criticality import MEASURES, VehicleCriticality
+from crgame_ros.analysis.criticality.criticality import (
+    EXPOSURES,
+    MEASURES,
+    VehicleCriticality,
+)
 from crgame_ros.analysis.criticality.headways import SHORT_S
 from crgame_ros.analysis.criticality.thresholds import Thresholds
 from crgame_ros.analysis.pictures.story_moments import TWICE
@@ -43,9 +47,10 @@ def criticality_section(run: Run) -> Section:
         caption = f'Worst values of {named(run, vehicle.vehicle_id)}'
         html += table(caption, ('measure', 'worst', 'unit', 'against', 'at [s]'), rows,
                       'numbers worst') if rows else f'<p>{caption}: no other was near.</p>'
-    html += table('Time below the threshold of TTC', (
-        'vehicle', f'TTC below {limits.ttc_s:g} s [s]', 'integral below it [s²]'), [
-            (named(run, vehicle.vehicle_id), number(vehicle.tet_s), number(vehicle.tit))
+    told = [each.told(limits) for each in EXPOSURES.values()]
+    html += table('Over the whole run', ('vehicle', *(
+        f'{each.label} [{each.unit.replace("^2", "²")}]' for each in told)), [
+            (named(run, vehicle.vehicle_id), *map(number, vehicle.exposures.values()))
             for vehicle in measured], 'numbers')
     following = [row for vehicle in measured for row in _headways(run, vehicle)]
     if following:

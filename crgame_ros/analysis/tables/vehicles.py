@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import math
 from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import MEASURES
+from crgame_ros.analysis.criticality.criticality import EXPOSURES, MEASURES
 from crgame_ros.analysis.criticality.headways import LEAST_SPEED, SHORT_S
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.runs.run import Run
@@ -75,8 +75,8 @@ def _criticality(run: Run) -> Mapping[str, Sequence[Any]]:
     columns['max_inverse_ttc'] = [
         None if each is None else 0.0 if (least := each.worst.get('ttc')) is None
         else 1.0 / max(least.value, LEAST_TTC_S) for each in found]
-    columns['tet_s'] = [None if each is None else each.tet_s for each in found]
-    columns['tit'] = [None if each is None else each.tit for each in found]
+    for name in EXPOSURES:
+        columns[name] = [None if each is None else each.exposures[name] for each in found]
     columns['crossings'] = [None if each is None else len(each.crossings) for each in found]
     columns['worst_pet_s'] = [None if each is None else min(
         (crossing.pet_s for crossing in each.crossings), default=None) for each in found]
@@ -187,10 +187,8 @@ VEHICLE_PARTS = (
         Column('max_inverse_ttc', NUMBER, '1/s', 'greatest 1 / ttc; 0 if it never approached a '
                'leader, so that means over vehicles count it', FOOTPRINTS,
                f'a ttc below {LEAST_TTC_S:g} s, as in a contact, counts as {LEAST_TTC_S:g} s'),
-        Column('tet_s', NUMBER, 's', f'time with a ttc below {USUAL.ttc_s:g} s', FOOTPRINTS,
-               'each step that it is below counts in full'),
-        Column('tit', NUMBER, 's^2', f'integral of what the ttc is below {USUAL.ttc_s:g} s',
-               FOOTPRINTS, 'rectangles of a scenario step'),
+        *(Column(name, NUMBER, each.unit, each.told(USUAL).definition, FOOTPRINTS, each.variant)
+          for name, each in EXPOSURES.items()),
         Column('crossings', INTEGER, '1', 'rows of crossings with it'),
         Column('worst_pet_s', NUMBER, 's', 'least post-encroachment time', FOOTPRINTS,
                empty='it crossed no other path')), _criticality),

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 import math
 from typing import Literal, NamedTuple
 
+from crgame_ros.analysis.criticality.criticality import EXPOSURES
 from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
@@ -145,8 +146,8 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('worst_min_distance', 'least distance', 'worst_min_distance', 1),
     SummaryMeasure('worst_drac', 'greatest DRAC', 'worst_drac', -1, most=20.0),
     SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
-    SummaryMeasure('tet_s', 'time with a critical TTC', 'tet_s', -1),
-    SummaryMeasure('tit', 'TTC below its threshold, over time', 'tit', -1),
+    *(SummaryMeasure(name, each.told(USUAL).definition, name, -1)
+      for name, each in EXPOSURES.items()),
     SummaryMeasure('distance', 'way', 'distance', 0),
     SummaryMeasure('mean_speed', 'mean speed', 'mean_speed', 0),
     SummaryMeasure('min_acceleration', 'hardest braking', 'min_acceleration', 1),

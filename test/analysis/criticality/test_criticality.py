@@ -141,6 +141,21 @@ def test_two_cars_at_any_heading(cut_in: LoadedScenario) -> None:
         assert np.isinf(beside[[COLUMN[name] for name in ('ttc', 'ttc_a', 'ttc_2d')]]).all()
 
 
+def test_time_exposed_while_closing_in(cut_in: LoadedScenario) -> None:
+    """20 m/s behind 10 m/s, from 35.05 m to 10.05 m: below 30 m a ttc of 3 s, below 20 m 1 s."""
+    criticality = Criticality(_run(_lane(cut_in, Placement()), [_car('av0', Role.AUTONOMOUS)],
+                                   [_car('o1', Role.RECORDED)]))
+    gaps = 35.05 - np.arange(26)
+    for tick, gap in enumerate(gaps.tolist()):
+        place = 50.0 + 2.0 * tick
+        pose, moves = np.array([[place + gap + 4.5, 0.0, 0.0]]), np.array([[10.0, 0.0, 0.0]])
+        criticality.observe(10 * tick, 0.0, _state(np.array([place, 0.0, 0.0]), 20.0, 0.0)[None],
+                            ObjectStates(pose, moves))
+    assert criticality.report()[0].exposures == pytest.approx({
+        'tet_s': 0.1 * (gaps < 30.0).sum(), 'tit': 0.1 * np.clip(3.0 - gaps / 10.0, 0.0, 9).sum(),
+        'short_time_gap_s': 0.1 * (gaps < 20.0).sum()})
+
+
 @pytest.mark.parametrize('radius', [15.0, -15.0, 40.0])
 def test_two_cars_on_a_bend(cut_in: LoadedScenario, radius: float) -> None:
     """

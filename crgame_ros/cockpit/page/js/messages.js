@@ -241,12 +241,21 @@ export {};
  */
 
 /**
+ * A measure of a vehicle over a whole run.
+ *
+ * @typedef {object} Exposure
+ * @property {string} name
+ * @property {string} label
+ * @property {string} unit
+ * @property {string} definition
+ */
+
+/**
  * The worst values so far by measure, and the thresholds of criticality.
  *
  * @typedef {object} Criticality
  * @property {boolean} critical now
- * @property {number|null} tet_s
- * @property {number|null} tit_s2
+ * @property {Record<string, number|null>} exposures over the run so far, by name
  * @property {Record<string, {value: number|null, of: string, t: number|null}>} worst
  * @property {Record<string, number|null>} thresholds
  */
@@ -322,7 +331,7 @@ export {};
  *
  * @typedef {{type: 'hello', client: string, name: string, mode: 'live'|'replay',
  *   version: string, program?: string, rights: Rights, framed_by?: string,
- *   measures?: Measure[]}} HelloMessage
+ *   measures?: Measure[], exposures?: Exposure[]}} HelloMessage
  * @typedef {{type: 'scene'} & Scene} SceneMessage
  * @typedef {{type: 'seats', seats: Record<string, Seat>}} SeatsMessage
  * @typedef {{type: 'signals', k: number, states: Record<string, string>,

@@ -14,7 +14,7 @@ import { SampleRing } from './samples.js';
 /** @import { CriticalityFrame, StateFrame } from './frames.js' */
 /** @import { History } from './history.js' */
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
-/** @import { FiredEvent, HelloMessage, Measure, NoticeMessage, Scene } from './messages.js' */
+/** @import { Exposure, FiredEvent, HelloMessage, Measure, NoticeMessage, Scene } from './messages.js' */
 /** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
 /** @import { DeviceDelay, PeopleMessage, Present, Rights } from './people_messages.js' */
 /** @import { YouMessage } from './people_messages.js' */
@@ -106,6 +106,8 @@ export class Store {
   perceived = new Perceived();
   /** @type {Measure[]} of criticality, as the server has greeted with */
   measures = [];
+  /** @type {Exposure[]} likewise */
+  exposures = [];
   /** The criticality of the vehicles; of a replay, over the whole run. */
   criticality = new CriticalityLog(() => this.measures, HISTORY_S);
   // Received raw samples, a few seconds: states and scenario steps.
@@ -160,6 +162,7 @@ export class Store {
         this.version = message.version;
         this.framedBy = message.framed_by ?? '';
         this.measures = message.measures ?? [];
+        this.exposures = message.exposures ?? [];
         this.rights = message.rights ?? this.rights;
         this.#fresh = true;
         break;

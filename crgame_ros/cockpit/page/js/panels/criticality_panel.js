@@ -8,7 +8,7 @@ import { clockTime, fixed, NONE } from './format.js';
 import { HistoryPanel } from './history.js';
 
 /** @import { Worst } from '../criticality.js' */
-/** @import { Criticality, Measure } from '../messages.js' */
+/** @import { Criticality, Exposure, Measure } from '../messages.js' */
 /** @import { Store } from '../store.js' */
 /** @import { Quantity } from './quantities.js' */
 
@@ -36,6 +36,7 @@ const QUANTITIES = [
     key: 'min_distance', title: 'Distance to the nearest', unit: 'm', digits: 1,
     lines: [{ critical: 'min_distance' }],
   },
+  { key: 'exposure', title: 'Time exposed', unit: 's', digits: 1, lines: [{ exposures: 's' }] },
 ];
 
 // Its value is that of the time gap.
@@ -64,7 +65,7 @@ export function createCriticality(root, store) {
     const ids = panel.selected.map(({ id }) => id);
     if (ids.join() !== [...shown.keys()].join()) {
       shown.clear();
-      ids.forEach((id) => shown.set(id, new VehicleTable(id, store.measures)));
+      ids.forEach((id) => shown.set(id, new VehicleTable(id, store.measures, store.exposures)));
       tables.replaceChildren(...[...shown.values()].map((table) => table.root));
     }
     const t = store.displayed(performance.now())?.t ?? 0;
@@ -80,13 +81,15 @@ class VehicleTable {
   #id;
   /** @type {Map<Measure, HTMLElement[]>} */
   #cells = new Map();
-  #sum = element('p', { class: 'hint' });
+  /** @type {Map<string, HTMLElement>} */
+  #sums = new Map();
 
   /**
    * @param {string} id of the vehicle
    * @param {Measure[]} measures
+   * @param {Exposure[]} exposures
    */
-  constructor(id, measures) {
+  constructor(id, measures, exposures) {
     this.#id = id;
     const rows = measures.filter(({ name }) => name !== TWICE).map((measure) => {
       const cells = [element('td', {}), element('td', {}), element('td', {})];
@@ -94,12 +97,21 @@ class VehicleTable {
       return element('tr', { 'data-key': measure.name, title: measure.definition },
         element('th', { scope: 'row', text: `${measure.label} [${measure.unit}]` }), ...cells);
     });
+    const sums = exposures.map(({ name, label, unit, definition }) => {
+      const cell = element('td', {});
+      this.#sums.set(name, cell);
+      return element('tr', { 'data-key': name, title: definition },
+        element('th', { scope: 'row', text: `${label} [${unit}]` }), cell);
+    });
     this.root = element('section', { 'data-id': id }, element('h3', { text: id }),
       element('table', { class: 'figures criticality' },
         element('caption', { class: 'unseen', text: `Criticality of ${id}` }),
         element('thead', {}, element('tr', {}, element('th', {}),
           ...['now', 'to', 'worst'].map((text) => element('th', { scope: 'col', text })))),
-        element('tbody', {}, ...rows)), this.#sum);
+        element('tbody', {}, ...rows)),
+      element('table', { class: 'figures exposures' },
+        element('caption', { class: 'unseen', text: `${id} over the whole run` }),
+        element('tbody', {}, ...sums)));
   }
 
   /**
@@ -121,8 +133,9 @@ class VehicleTable {
         : `${fixed(past.value, 2)} (${past.of}, ${clockTime(past.t)})`);
       setAttribute(worst, 'data-late', isCritical(measure, limits, past?.value));
     }
-    setText(this.#sum, told && told.tet_s !== null
-      ? `Below a TTC of ${fixed(limits.ttc, 1)} s for ${fixed(told.tet_s, 1)} s (TET)` : '');
+    for (const [name, cell] of this.#sums) {
+      setText(cell, fixed(told?.exposures[name], 1));
+    }
   }
 }
 

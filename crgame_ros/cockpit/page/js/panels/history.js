@@ -321,6 +321,7 @@ export class HistoryPanel {
     chart.update(traces(chart.quantity, {
       vehicles, health: this.#health, runColor: this.#theme.accent,
       limitColor: this.#theme.alarm, limits: limitsOf(this.#store.measures, this.#store.status),
+      exposures: this.#store.exposures,
     }, view), view);
   }
 

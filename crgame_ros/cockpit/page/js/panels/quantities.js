@@ -7,16 +7,16 @@ import { thin, unwrap } from './series.js';
 /** @import { Limits } from '../criticality.js' */
 /** @import { VEHICLE } from '../frames.js' */
 /** @import { History } from '../history.js' */
-/** @import { SceneVehicle } from '../messages.js' */
+/** @import { Exposure, SceneVehicle } from '../messages.js' */
 /** @import { ChartView } from './chart.js' */
 /** @import { HealthLog } from './series.js' */
 
 const DEGREES = 180 / Math.PI;
-const DASHES = ['solid', 'dot'];
+const DASHES = ['solid', 'dot', 'dash'];
 
 /**
  * A line: a column of vehicles' states, a figure of the run's health, the latency of planners,
- * the criticality of vehicles, or a limit.
+ * the criticality of vehicles now or over the run so far, or a limit.
  *
  * @typedef {object} ColumnLine
  * @property {keyof typeof VEHICLE} column
@@ -26,8 +26,9 @@ const DASHES = ['solid', 'dot'];
  * @typedef {{name: string, health: 'lag'|'step_error'}} HealthLine
  * @typedef {{latency: true, name?: string}} LatencyLine
  * @typedef {{critical: string, name?: string}} CriticalLine
+ * @typedef {{exposures: string}} ExposureLines of this unit, one for each measure over a run
  * @typedef {{limit: string, name: string}} LimitLine
- * @typedef {ColumnLine|HealthLine|LatencyLine|CriticalLine|LimitLine} Line
+ * @typedef {ColumnLine|HealthLine|LatencyLine|CriticalLine|ExposureLines|LimitLine} Line
  */
 
 /**
@@ -44,7 +45,7 @@ const DASHES = ['solid', 'dot'];
  * @typedef {{id: string, role: SceneVehicle['role'], color: string, past: History,
  *   critical: (name: string) => {t: number[], values: number[]}}} PlottedVehicle
  * @typedef {{vehicles: PlottedVehicle[], health: HealthLog, runColor: string,
- *   limitColor: string, limits: Limits}} PlotData
+ *   limitColor: string, limits: Limits, exposures: Exposure[]}} PlotData
  * @typedef {Pick<ChartView, 'from'|'to'|'shown'>} PlotWindow
  */
 
@@ -104,6 +105,11 @@ export function traces(quantity, data, view) {
         name: line.name, color: data.limitColor, dash: 'dash', x: [view.from, view.to],
         y: [data.limits[line.limit], data.limits[line.limit]], now: data.limits[line.limit],
       }];
+    }
+    if ('exposures' in line) {
+      return data.exposures.filter(({ unit }) => unit === line.exposures).flatMap(
+        ({ name, label }, j) => data.vehicles.map(({ id, color }) => trace(`${id} ${label}`, color,
+          DASHES[j % DASHES.length], data.health.t, data.health.exposure(id, name), view)));
     }
     const vehicles = 'latency' in line
       ? data.vehicles.filter((vehicle) => vehicle.role === 'autonomous') : data.vehicles;

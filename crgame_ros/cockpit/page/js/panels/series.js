@@ -81,7 +81,8 @@ export function unwrap(angles) {
 }
 
 /**
- * @typedef {{t: number, latency: Record<string, number>, step_error: number, lag: number}} Row
+ * @typedef {{t: number, latency: Record<string, number>, step_error: number, lag: number,
+ *   exposures: Record<string, Record<string, number|null>>}} Row
  */
 
 /**
@@ -127,8 +128,13 @@ export class HealthLog {
     for (const [av, planner] of Object.entries(status.planners ?? {})) {
       latency[av] = planner.latency_ms ?? NaN;
     }
+    /** @type {Row['exposures']} */
+    const exposures = {};
+    for (const [vehicle, told] of Object.entries(status.criticality ?? {})) {
+      exposures[vehicle] = told.exposures;
+    }
     this.#rows.push({
-      t, latency, step_error: figure(status.timing, 'mean_step_error_ms'),
+      t, latency, exposures, step_error: figure(status.timing, 'mean_step_error_ms'),
       lag: figure(status.timing, 'final_error_ms'),
     });
   }
@@ -152,5 +158,14 @@ export class HealthLog {
    */
   latency(av) {
     return this.#rows.map((row) => row.latency[av] ?? NaN);
+  }
+
+  /**
+   * @param {string} vehicle
+   * @param {string} name
+   * @returns {number[]} what a measure over the run had grown to
+   */
+  exposure(vehicle, name) {
+    return this.#rows.map((row) => row.exposures[vehicle]?.[name] ?? NaN);
   }
 }
