@@ -424,16 +424,18 @@ def test_memory_does_not_grow_with_the_run(recorded: Recorded, tmp_path: Path,
     peaks = []
     for times in (1, 1, 8):
         run = _stretched(recorded.result, times)
+        # That is measured over a whole run at once, and kept.
+        assert len(run.usual_behaviour) == 2
         pool = pa.proxy_memory_pool(pa.system_memory_pool())
         usual = pa.default_memory_pool()
         pa.set_memory_pool(pool)
-        # That is measured over a whole run at once, and kept.
-        assert len(run.behaviour) == 2
         tracemalloc.start()
-        rows = write_tables([run], tmp_path / str(times), 'parquet')
-        peaks.append((tracemalloc.get_traced_memory()[1], pool.max_memory()))
-        tracemalloc.stop()
-        pa.set_memory_pool(usual)
+        try:
+            rows = write_tables([run], tmp_path / str(times), 'parquet')
+            peaks.append((tracemalloc.get_traced_memory()[1], pool.max_memory()))
+        finally:
+            tracemalloc.stop()
+            pa.set_memory_pool(usual)
         assert rows['states'] > 200 * times
     # The first warms up. Only a Parquet file's footer still grows: 10 kB a row group.
     assert peaks[2][0] < peaks[1][0] + 1_500_000
