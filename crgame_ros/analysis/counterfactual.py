@@ -11,10 +11,10 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.criticality.recorded import measure_log
-from crgame_ros.analysis.outcome_line import accepted_ratio
 from crgame_ros.driver.source import IdleDriver
 from crgame_ros.errors import InputError
 from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.plan_outcome import plans_of_report
 from crgame_ros.recording.progress import Progress
 from crgame_ros.recording.recorded_inputs import recorded_inputs, RecordedInputs
 from crgame_ros.recording.run_folder import recording_in
@@ -76,8 +76,8 @@ class Alternative:
         return {
             'planner': self.planner, 'state_hash': self.state_hash,
             'human_differs_s': self.human_differs_s, 'others_differ_s': self.others_differ_s,
-            'accepted_ratio': {av: accepted_ratio(entry)
-                               for av, entry in self.outcome['planners'].items()},
+            'accepted_ratio': {av: found.accepted_share
+                               for av, found in plans_of_report(self.outcome).items()},
             'contacts': self.contacts,
             'criticality': self.criticality.as_dict()}
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import Criticality
 from crgame_ros.analysis.scores.vehicle import VehicleScores
+from crgame_ros.recording.plan_outcome import plans_of_report
 from crgame_ros.timing.metrics import slowness
 
 # Exit code of a run in which no plan of some planner was driven.
@@ -43,10 +44,11 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
     if worst:
         parts.append(f'least TTC {min(worst):.2f} s')
     # The last request of a run has no answer yet.
-    due = sum(entry[key] or 0 for entry in outcome['planners'].values()
-              for key in ('accepted', 'refused', 'timed_out'))
+    plans = plans_of_report(outcome).values()
+    due = sum(count or 0 for found in plans
+              for count in (found.accepted, found.refused, found.timed_out))
     if due:
-        driven = sum(_driven(entry) for entry in outcome['planners'].values())
+        driven = sum(found.driven for found in plans)
         parts.append(f'{driven} of {_counted(due, "plan")} accepted')
     scored = [f'{each.vehicle_id} {each.nuplan.score:.2f}' for each in scores
               if each.nuplan is not None]
@@ -59,34 +61,9 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
 
 def undriven(outcome: Mapping[str, Any]) -> list[str]:
     """Return one line for each AV that drove none of its planner's plans, with the reason."""
-    return [f'{av}: no plan of its planner was driven: {_why(entry)}'
-            for av, entry in outcome['planners'].items()
-            if entry['requests'] and not _driven(entry)]
-
-
-def accepted_ratio(entry: Mapping[str, Any]) -> float | None:
-    """
-    Return the share of a planner's answers that were accepted and are no fallback.
-
-    :param entry: of an AV in `timing.json`.
-    :return: None where it is unknown.
-    """
-    known = entry['accepted'] is not None and entry['plans']
-    return _driven(entry) / entry['plans'] if known else None
-
-
-def _driven(entry: Mapping[str, Any]) -> int:
-    """Return how many plans were accepted, without the braking plans that stand for failures."""
-    return max(0, (entry['accepted'] or 0) - (entry['fallback'] or 0))
-
-
-def _why(entry: Mapping[str, Any]) -> str:
-    reasons: Mapping[str, int] = entry['fallback_reasons'] or {}
-    if reasons:
-        return max(reasons, key=lambda each: reasons[each])
-    if entry['refused']:
-        return f'answered, but refused {entry["refused"]} times: {entry["last_refusal"]}'
-    return 'it never answered'
+    return [f'{av}: no plan of its planner was driven: {found.trouble}'
+            for av, found in plans_of_report(outcome).items()
+            if found.requests and not found.driven]
 
 
 def _counted(count: int, what: str) -> str:

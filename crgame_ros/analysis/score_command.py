@@ -82,10 +82,10 @@ def _progress(what: str) -> Any:
 
 
 def _score_run(values: argparse.Namespace) -> 'list[PlannerScores]':
-    from crgame_ros.analysis.scores.plan_record import plans_of_report
     from crgame_ros.analysis.scores.scored_drives import expert_of_run
     from crgame_ros.analysis.scores.scored_run import score_run
     from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
+    from crgame_ros.recording.plan_outcome import plans_of_report
     from crgame_ros.recording.run_folder import recording_in
     from crgame_ros.recording.run_record import read_run_record
     from crgame_ros.recording.run_trajectories import read_trajectories
@@ -228,9 +228,9 @@ def _plans(found: dict[str, Any] | None) -> Iterator[tuple[str, str]]:
         return
     yield 'plans', (f'{100.0 * found["accepted_share"]:.1f} % accepted and no fallback, of '
                     f'{_number(found["plans"])}; '
-                    f'{_number(found["fallbacks"])} fallbacks, {_number(found["refused"])} '
+                    f'{_number(found["fallback"])} fallbacks, {_number(found["refused"])} '
                     f'refused, {_number(found["steps_without_plan"])} steps without a plan')
-    for reason, count in found['fallback_reasons'].items():
+    for reason, count in (found['fallback_reasons'] or {}).items():
         yield '', f'{count} x {reason}'
     for name in ('latency_ms', 'age_ms', 'plan_time_ms'):
         if found[name] is not None:

@@ -18,6 +18,7 @@ from crgame_ros.messages.status_values import BRAKING, read_status
 from crgame_ros.messages.world_messages import OBJECT_STATES_TOPIC, VEHICLES_TOPIC
 from crgame_ros.planner.adapter import first_of_kind
 from crgame_ros.recording.epochs import Epoch, read_epoch
+from crgame_ros.recording.plan_outcome import PLAN_COUNTS, PlanOutcome, spread_of
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.recorded_plans import OpenRequests
 from crgame_ros.recording.run_cycles import read_cycles
@@ -107,9 +108,6 @@ REPORT_KEYS = frozenset((
     'gaps', 'scenario_steps', 'planners', 'drivability', 'contacts', 'benchmark_id', 'epoch',
     'notices', 'final_error_ms', 'mean_step_error_ms', 'max_cumulative_error_ms', 'timeout_ratio',
     'real_time_ratio', 'time_efficiency', 'precision_ratio'))
-# The engine's counts in a status `sim_node: <av> plans`.
-PLAN_COUNTS = ('requests', 'accepted', 'refused', 'of_others', 'skipped', 'timed_out', 'realigned',
-               'steps_without_plan')
 # Prefix in the status of a tracked AV.
 _WORST = 'worst_'
 
@@ -150,7 +148,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             'gaps': int(numbers[-1]) - len(numbers),
             'scenario_steps': None if log is None else
             {'first': int(log.ks[0]), 'last': int(log.ks[-1])},
-            'planners': planners,
+            'planners': {av: each.as_dict() for av, each in planners.items()},
             'drivability': {'violations': len(collected.violations),
                             'list': collected.violations},
             'contacts': contacts,
@@ -160,8 +158,8 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
             'epoch': run.game.epoch,
             'notices': [*dict.fromkeys((
                 *(() if log is None else log.notices), *reader.notices, *reader.foreign_notices,
-                *(f'/{av}/plan: {entry["of_others"]} plans of other programs than its planner, '
-                  'which were not taken' for av, entry in planners.items() if entry['of_others']),
+                *(f'/{av}/plan: {each.of_others} plans of other programs than its planner, '
+                  'which were not taken' for av, each in planners.items() if each.of_others),
                 *unknown, *filter(None, [slowness(summary['real_time_ratio']['final'])])))]}
 
 
@@ -295,36 +293,27 @@ class _Collector:
             self.verdicts.append(VehicleDrivability(
                 vehicle, True, values.get('road_compliance') == 'false', hit, n))
 
-    def planner(self, av: str) -> dict[str, Any]:
-        """Return the report on one AV; None for values that were not recorded."""
+    def planner(self, av: str) -> PlanOutcome:
+        """Return what became of an AV's plans."""
         engine = self._statuses.get(f'sim_node: {av} plans', {})
         name = f'planner_node: {av}'
         node = self._statuses.get(name, {})
-        report: dict[str, Any] = {key: _count(engine, key) for key in PLAN_COUNTS}
-        # The node reports its counts at intervals, but every fallback immediately.
-        report['last_refusal'] = engine.get('last_refusal') or None
-        report['plans'] = max(self._answers[av], _count(node, 'plans') or 0)
-        report['fallback'] = _count(node, 'fallbacks')
-        report['fallback_reasons'] = dict(self._reasons[name]) or None
-        report['plan_time_ms'] = spread_of(self._plan_times_ms[name])
-        report['latency_ms'] = spread_of(self._latencies_ms[av])
-        report['first_latency_ms'] = self._first_latency_ms.get(av)
-        report['age_ms'] = spread_of(self._ages_ms[f'sim_node: {av} plans'])
-        report['worst_tracking_errors'] = {
-            key.removeprefix(_WORST).removesuffix('_error'): float(value)
-            for key, value in engine.items() if key.startswith(_WORST) and value} or None
-        return report
+        return PlanOutcome(
+            **{key: _count(engine, key) for key in PLAN_COUNTS},
+            last_refusal=engine.get('last_refusal') or None,
+            # The node reports its counts at intervals, but every fallback immediately.
+            plans=max(self._answers[av], _count(node, 'plans') or 0),
+            fallback=_count(node, 'fallbacks'),
+            fallback_reasons=dict(self._reasons[name]) or None,
+            plan_time_ms=spread_of(self._plan_times_ms[name]),
+            latency_ms=spread_of(self._latencies_ms[av]),
+            first_latency_ms=self._first_latency_ms.get(av),
+            age_ms=spread_of(self._ages_ms[f'sim_node: {av} plans']),
+            worst_tracking_errors={
+                key.removeprefix(_WORST).removesuffix('_error'): float(value)
+                for key, value in engine.items() if key.startswith(_WORST) and value} or None)
 
 
 def _count(values: dict[str, str], key: str) -> int | None:
     text = values.get(key, '')
     return int(text) if text.isdecimal() else None
-
-
-def spread_of(samples: Sequence[float] | NDArray[np.float64]) -> dict[str, float] | None:
-    """Return median, 99th percentile and maximum; None without samples."""
-    values = np.array(samples)
-    if not len(values):
-        return None
-    return {'p50': float(np.percentile(values, 50)), 'p99': float(np.percentile(values, 99)),
-            'max': float(values.max())}

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The registry of trackers, and its documentation."""
 
-import inspect
 from pathlib import Path
 import re
 
@@ -26,12 +25,11 @@ def test_the_names() -> None:
     assert TRACKERS.names()[:2] == ('lqr', 'pure-pursuit')
 
 
-def test_the_document_lists_every_name_and_option(document: str) -> None:
-    for registry, supplied in ((TRACKERS, {'vehicle', 'dt_s'}), (VEHICLE_MODELS, {'vehicle'})):
+def test_the_document_lists_every_name(document: str) -> None:
+    """Their options are in a table that is made of them (`test_key_tables`)."""
+    for registry in (TRACKERS, VEHICLE_MODELS):
         for name in registry.built_in:
-            row = next(line for line in document.splitlines() if line.startswith(f'| `{name}`'))
-            options = inspect.signature(registry.find(name)).parameters.keys() - supplied
-            assert all(f'`{option}`' in row for option in options - SPEED)
+            assert any(line.startswith(f'| `{name}`') for line in document.splitlines())
     assert all(f'`{option}`' in document for option in SPEED)
 
 

@@ -89,7 +89,7 @@ def endpoints(ros_domain: int) -> Endpoints:
 
 
 def _av(world: World, perceives: bool = True) -> DrivenAv:
-    return DrivenAv('av0', VEHICLE, world.ego(0),
+    return DrivenAv('av0', VEHICLE, world.ego(0), 'idm',
                     perception=world.perception.spec if perceives else None)
 
 

@@ -3,7 +3,6 @@
 """Planners are found and their options checked; the example of the documentation runs."""
 
 from importlib.metadata import EntryPoint
-import inspect
 from pathlib import Path
 import re
 
@@ -102,10 +101,8 @@ def test_the_documented_example_plans(tmp_path: Path, vehicle: VehicleParameters
         assert plan.states[-1, 3] == pytest.approx(expected)
 
 
-def test_the_document_lists_every_planner_and_option() -> None:
+def test_the_document_lists_every_planner() -> None:
+    """Their options are in a table that is made of them (`test_key_tables`)."""
     text = DOCUMENT.read_text(encoding='utf-8')
     for name in planner_registry.BUILT_IN:
-        row = next(line for line in text.splitlines() if line.startswith(f'| `{name}`'))
-        kind = planner_registry.planner_class(name)
-        for option in inspect.signature(kind).parameters:
-            assert f'`{option}`' in row
+        assert any(line.startswith(f'| `{name}`') for line in text.splitlines())

@@ -171,7 +171,7 @@ def test_objects_and_classes_drive_alike(run: OfflineRun) -> None:
                               ConstantVelocityPlanner())}
     assert len(hashes) == 1
     failed = crgame_ros.run(CUT_IN, planner=Failing, duration_s=1.0)
-    assert failed.answers['av0'].reasons == {'there is no way': 10}
+    assert failed.answers['av0'].fallback_reasons == {'there is no way': 10}
     assert failed.game.avs[0].planner == f'{__name__}:Failing'
     with pytest.raises(crgame_ros.InputError):
         PLANNERS.find(f'{__name__}:Missing')

@@ -14,13 +14,13 @@ from commonroad_dc.collision.collision_detection.pycrcc_collision_dispatch impor
 from commonroad_dc.feasibility import solution_checker
 from crgame_ros.analysis.scores.commonroad_costs import COSTS
 from crgame_ros.analysis.scores.measures import MEASURES
-from crgame_ros.analysis.scores.plan_record import plans_of_result
 from crgame_ros.analysis.scores.scored_run import score_run
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.paths import scenarios_directory
+from crgame_ros.recording.plan_outcome import plans_of_result
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.run_record import run_record_of, RunRecord
 from crgame_ros.scenario.loading import load_scenario

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 
+from crgame_ros.analysis.criticality.thresholds import OPTIONS
 import pytest
 from ros_domains import own_domain_id
 import yaml
@@ -58,6 +59,8 @@ def test_the_file_of_parameters_lists_every_one(project_root: Path) -> None:
             r"(?:declare_parameter|declare|text|flag)\(\s*'([a-z_]+)'", source))
         declared |= set(re.findall(r"declare_number\(\s*self(?:\._node)?,\s*'([a-z_]+)'",
                                    source))
+        if 'OPTIONS.items()' in source:
+            declared |= {name for name, _ in OPTIONS.values()}
         if 'TrustedCode(' in source:
             declared.add('roster')
         names = set(listed.get(path.stem, {}).get('ros__parameters', {}))

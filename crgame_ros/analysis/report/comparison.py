@@ -78,8 +78,8 @@ def worst_of_all(run: Run, name: str) -> str:
 
 def accepted(run: Run) -> str:
     """Return the text on how many plans of all AVs were accepted."""
-    entries = () if run.outcome is None else run.outcome['planners'].values()
-    asked, taken = (sum(entry[key] or 0 for entry in entries) for key in ('requests', 'accepted'))
+    asked = sum(found.requests or 0 for found in run.answers.values())
+    taken = sum(found.accepted or 0 for found in run.answers.values())
     return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING
 
 
@@ -97,8 +97,7 @@ def _least_pet(run: Run) -> str:
 
 
 def _latency(run: Run) -> str:
-    entries = () if run.outcome is None else run.outcome['planners'].values()
-    known = [entry['latency_ms']['p99'] for entry in entries if entry['latency_ms']]
+    known = [found.latency_ms['p99'] for found in run.answers.values() if found.latency_ms]
     return number(max(known), 1) if known else NOTHING
 
 

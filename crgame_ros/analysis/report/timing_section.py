@@ -9,6 +9,7 @@ from crgame_ros.analysis.report.run_section import named
 from crgame_ros.analysis.report.section import Plot, PlotLimit, PlotLine, Section
 from crgame_ros.analysis.report.text import free, note, NOTHING, number, share, table
 from crgame_ros.analysis.runs.run import Run
+from crgame_ros.recording.plan_outcome import PlanOutcome
 from crgame_ros.timing.late_step import CAUSE_WORDS
 
 # Rows of table I: key of `timing.json`, label, unit, factor, digits.
@@ -85,36 +86,32 @@ def plan_section(run: Run) -> Section | None:
         return None
     if run.outcome is None:
         return Section('plans', 'Plans', note('The recording does not tell.'))
-    planners = run.outcome['planners']
-    rows = [(named(run, av.id), free(av.planner), *_counts(planners.get(av.id, {})))
-            for av in run.log.game.avs]
+    plans = {av.id: run.answers.get(av.id, PlanOutcome()) for av in run.game.avs}
+    rows = [(named(run, av.id), free(av.planner), *_counts(plans[av.id])) for av in run.game.avs]
     html = table('What became of plan requests', (
         'AV', 'planner', 'requests', 'accepted', 'of requests', 'refused', 'timed out', 'skipped',
         'braking plans', 'steps without plan'), rows, 'numbers')
     html += table('How long planners took [ms]', (
         'AV', 'latency p50', 'p99', 'max', 'first', 'planning p50', 'p99', 'max'), [
-            (named(run, av.id), *_times(planners.get(av.id, {}))) for av in run.log.game.avs],
-        'numbers')
-    for av in run.log.game.avs:
-        refusal = planners.get(av.id, {}).get('last_refusal')
-        if refusal:
-            html += note(f'Last refusal of {named(run, av.id)}: {free(refusal)}')
+            (named(run, av), *_times(found)) for av, found in plans.items()], 'numbers')
+    for av, found in plans.items():
+        if found.last_refusal:
+            html += note(f'Last refusal of {named(run, av)}: {free(found.last_refusal)}')
     return Section('plans', 'Plans', html)
 
 
-def _counts(entry: Mapping[str, Any]) -> Sequence[str]:
-    keys = ('refused', 'timed_out', 'skipped', 'fallback', 'steps_without_plan')
-    return (_count(entry.get('requests')), _count(entry.get('accepted')),
-            share(entry.get('accepted'), entry.get('requests')),
-            *(_count(entry.get(key)) for key in keys))
+def _counts(found: PlanOutcome) -> Sequence[str]:
+    return (_count(found.requests), _count(found.accepted), share(found.accepted, found.requests),
+            *map(_count, (found.refused, found.timed_out, found.skipped, found.fallback,
+                          found.steps_without_plan)))
 
 
 def _count(value: int | None) -> str:
     return NOTHING if value is None else str(value)
 
 
-def _times(entry: Mapping[str, Any]) -> Sequence[str]:
-    latency, planning = (entry.get(key) or {} for key in ('latency_ms', 'plan_time_ms'))
+def _times(found: PlanOutcome) -> Sequence[str]:
+    latency, planning = found.latency_ms or {}, found.plan_time_ms or {}
     return (*(number(latency.get(key), 1) for key in ('p50', 'p99', 'max')),
-            number(entry.get('first_latency_ms'), 1),
+            number(found.first_latency_ms, 1),
             *(number(planning.get(key), 1) for key in ('p50', 'p99', 'max')))

@@ -31,8 +31,8 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.pictures.critical_moments import Moment, Touch
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
-    from crgame_ros.analysis.scores.plan_record import PlanRecord
     from crgame_ros.analysis.scores.run_scores import RunScores
+    from crgame_ros.recording.plan_outcome import PlanOutcome
     from crgame_ros.recording.recorded_plans import RecordedPlan
 
 FloatArray = NDArray[np.float64]
@@ -207,9 +207,9 @@ class Run:
         return None if self.outcome is None else self.outcome['contacts']
 
     @property
-    def answers(self) -> 'dict[str, PlanRecord]':
+    def answers(self) -> 'dict[str, PlanOutcome]':
         """Return the known answers of planners, by AV."""
-        from crgame_ros.analysis.scores.plan_record import plans_of_report
+        from crgame_ros.recording.plan_outcome import plans_of_report
         return plans_of_report(self.outcome)
 
     @property

@@ -5,10 +5,10 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from crgame_ros.analysis.scores.plan_record import PlanRecord
 from crgame_ros.analysis.scores.scored_drives import score_drives
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import CrgameError, one_line
+from crgame_ros.recording.plan_outcome import PlanOutcome
 from crgame_ros.recording.run_record import RunRecord
 from shapely.errors import GEOSException
 
@@ -25,7 +25,7 @@ class RunScores(NamedTuple):
     refusal: str = ''
 
 
-def scores_of(record: RunRecord, plans: Mapping[str, PlanRecord], *, drives_only: bool = False,
+def scores_of(record: RunRecord, plans: Mapping[str, PlanOutcome], *, drives_only: bool = False,
               progress: Callable[[float], object] = lambda _: None) -> RunScores:
     """
     Score a run as `crgame score` does.

@@ -6,20 +6,20 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.nuplan import Expert, NuplanScore, NuplanScorer
-from crgame_ros.analysis.scores.plan_record import PlanRecord
 from crgame_ros.analysis.scores.scored_drive import drive_of
 from crgame_ros.analysis.scores.scored_scenario import ScoredScenario
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.errors import InputError
 from crgame_ros.game.objects import Role
 from crgame_ros.geometry.reference_point import shifted
+from crgame_ros.recording.plan_outcome import PlanOutcome
 from crgame_ros.recording.run_trajectories import RunTrajectories
 from crgame_ros.scenario.loading import parse_scenario
 import numpy as np
 
 
 def score_drives(log: RunTrajectories, *, expert: Expert | None = None,
-                 plans: Mapping[str, PlanRecord] | None = None,
+                 plans: Mapping[str, PlanOutcome] | None = None,
                  put_back: Mapping[str, Sequence[int]] | None = None
                  ) -> tuple[VehicleScores, ...]:
     """

@@ -14,8 +14,8 @@ from commonroad.common.solution import (
 )
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
 from commonroad.scenario.trajectory import Trajectory
+from crgame_ros.analysis.scores.goal_record import find_goal
 from crgame_ros.analysis.scores.nuplan import NuplanScore, NuplanScorer
-from crgame_ros.analysis.scores.plan_record import find_goal
 from crgame_ros.analysis.scores.planner import PlannerScores, REMARKS
 from crgame_ros.analysis.scores.scored_drive import drive_among, ScoredDrive, Track
 from crgame_ros.analysis.scores.scored_drives import recorded_expert

@@ -5,9 +5,10 @@
 from dataclasses import dataclass
 from typing import Any, TYPE_CHECKING
 
+from crgame_ros.analysis.scores.goal_record import GoalRecord
 from crgame_ros.analysis.scores.measures import MEASURES
 from crgame_ros.analysis.scores.nuplan import NuplanScore
-from crgame_ros.analysis.scores.plan_record import GoalRecord, PlanRecord
+from crgame_ros.recording.plan_outcome import PlanOutcome
 
 if TYPE_CHECKING:  # The checker takes a second to import, and reports of runs do without it.
     from crgame_ros.analysis.scores.solution_judge import SolutionScores
@@ -34,7 +35,7 @@ class VehicleScores:
     nuplan: NuplanScore | None
     commonroad: 'SolutionScores | None'
     goal: GoalRecord | None
-    plans: PlanRecord | None
+    plans: PlanOutcome | None
     remarks: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -42,8 +43,9 @@ class VehicleScores:
         return {
             'vehicle': self.vehicle_id, 'role': self.role, 'planner': self.planner,
             **{name: None if part is None else part.as_dict() for name, part in (
-                ('commonroad', self.commonroad), ('nuplan', self.nuplan), ('goal', self.goal),
-                ('plans', self.plans))},
+                ('commonroad', self.commonroad), ('nuplan', self.nuplan), ('goal', self.goal))},
+            'plans': None if self.plans is None else {
+                'accepted_share': self.plans.accepted_share, **self.plans.as_dict()},
             'remarks': list(self.remarks)}
 
     def values(self) -> dict[str, float | None]:
@@ -60,7 +62,7 @@ class VehicleScores:
             found |= {'reached_s': self.goal.reached_s, 'last_distance_m': self.goal.last_distance}
         if self.plans is not None:
             found['accepted_share'] = self.plans.accepted_share
-            for name in ('latency_ms', 'age_ms'):
-                spread = self.plans.spreads[name]
+            for name, spread in (('latency_ms', self.plans.latency_ms),
+                                 ('age_ms', self.plans.age_ms)):
                 found[name] = None if spread is None else spread['p50']
         return found

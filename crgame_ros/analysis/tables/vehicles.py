@@ -143,14 +143,14 @@ def _count_name(key: str) -> str:
 
 def _planning(run: Run) -> Mapping[str, Sequence[Any]]:
     ids = [item.id for item in run.log.vehicles]
-    planners = {} if run.outcome is None else run.outcome['planners']
+    answers = run.answers
     tallies = [run.tallies.get(name) for name in ids]
     latencies = [None if tally is None or not tally.latencies_s else tally.latencies_s
                  for tally in tallies]
     return {
         **{_count_name(key):
-           [planners.get(name, {}).get(key) for name in ids] for key in COUNTS},
-        'fallbacks': [planners.get(name, {}).get('fallback') for name in ids],
+           [getattr(answers.get(name), key, None) for name in ids] for key in COUNTS},
+        'fallbacks': [getattr(answers.get(name), 'fallback', None) for name in ids],
         'plans': [None if tally is None else tally.answers for tally in tallies],
         'plans_passing': [None if tally is None or tally.checked < tally.answers
                           else tally.passing for tally in tallies],

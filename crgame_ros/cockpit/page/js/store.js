@@ -14,11 +14,11 @@ import { SampleRing } from './samples.js';
 /** @import { CriticalityFrame, StateFrame } from './frames.js' */
 /** @import { History } from './history.js' */
 /** @import { Alarm, AlarmsMessage, EventsMessage, FilesMessage } from './messages.js' */
-/** @import { Exposure, FiredEvent, HelloMessage, Measure, NoticeMessage, Scene } from './messages.js' */
-/** @import { SceneMessage, Seat, SeatsMessage, SignalsMessage, Status } from './messages.js' */
+/** @import { Exposure, FiredEvent, HelloMessage, Measure, NoticeMessage } from './messages.js' */
+/** @import { Scene, SceneMessage, Seat, SeatsMessage, SignalsMessage } from './messages.js' */
 /** @import { DeviceDelay, PeopleMessage, Present, Rights } from './people_messages.js' */
 /** @import { YouMessage } from './people_messages.js' */
-/** @import { StatusMessage, StoreMessage } from './messages.js' */
+/** @import { Status, StatusMessage, StoreMessage } from './messages.js' */
 /** @import { TasksMessage } from './tasks/task_messages.js' */
 
 // Samples for a replay of the last 10 s: states at 100 Hz, and scenario steps at up to 25 Hz.

@@ -26,7 +26,7 @@ const DASHES = ['solid', 'dot', 'dash'];
  * @typedef {{name: string, health: 'lag'|'step_error'}} HealthLine
  * @typedef {{latency: true, name?: string}} LatencyLine
  * @typedef {{critical: string, name?: string}} CriticalLine
- * @typedef {{exposures: string}} ExposureLines of this unit, one for each measure over a run
+ * @typedef {{exposures: string, name?: string}} ExposureLines measures over a run, of a unit
  * @typedef {{limit: string, name: string}} LimitLine
  * @typedef {ColumnLine|HealthLine|LatencyLine|CriticalLine|ExposureLines|LimitLine} Line
  */

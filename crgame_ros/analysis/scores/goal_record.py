@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The crgame_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The record of how an AV reached its goal."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from commonroad.geometry.shape import ShapeGroup
+from commonroad.planning.planning_problem import PlanningProblem
+from commonroad.scenario.state import KSState
+from crgame_ros.analysis.scores.driven_states import goal_step
+from crgame_ros.scenario.exact_values import group_outline
+import numpy as np
+import shapely
+
+
+@dataclass(frozen=True)
+class GoalRecord:
+    """
+    A vehicle's way to its goal.
+
+    :param reached_s: time at which a state first met the goal, since the run's start; None: never
+        [s]
+    :param last_distance: from the centre to the goal's area at the end; None: it has no area [m]
+    :param least_distance: smallest such distance of the run [m]
+    """
+
+    reached_s: float | None
+    last_distance: float | None
+    least_distance: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the fields as a JSON-compatible dictionary."""
+        return {'reached_s': self.reached_s, 'last_distance_m': self.last_distance,
+                'least_distance_m': self.least_distance}
+
+
+def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) -> GoalRecord:
+    """
+    Find when a drive reached its goal, and how near it came.
+
+    :param states: states from time step 0 on.
+    """
+    step = goal_step(problem, list(states))
+    points = shapely.points([state.position for state in states])
+    areas = [_area(state.position) for state in problem.goal.state_list
+             if getattr(state, 'position', None) is not None]
+    away = np.min([shapely.distance(points, area) for area in areas], axis=0) if areas else None
+    return GoalRecord(None if step is None else step * dt_s,
+                      None if away is None else float(away[-1]),
+                      None if away is None else float(away.min()))
+
+
+def _area(position: Any) -> shapely.Geometry:
+    return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))
