@@ -290,22 +290,17 @@ class Run:
         """Return the most critical value of each measure (V, K); NaN where there was none."""
         from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
         log = self.log
-        shape = len(log.vehicles), len(log.ks)
-        course = {name: np.full(shape, np.nan) for name in MEASURES}
+        course = np.full((len(MEASURES), len(log.vehicles), len(log.ks)), np.nan)
         row = 0
 
         def add_step(found: Criticality) -> None:
             nonlocal row
             for tick in found.latest:
-                for place, (name, measure) in enumerate(MEASURES.items()):
-                    values = tick.values[:, place]
-                    values = values[~np.isnan(values) & (values != measure.undefined)]
-                    if len(values):
-                        course[name][tick.subject, row] = \
-                            values.min() if measure.worst < 0 else values.max()
+                values, others = tick.worst()
+                course[:, tick.subject, row] = np.where(others >= 0, values, np.nan)
             row += 1
         self.measure(add_step)
-        return course
+        return dict(zip(MEASURES, course, strict=True))
 
     @cached_property
     def usual_behaviour(self) -> 'tuple[DriverBehaviour, ...]':
