@@ -107,7 +107,7 @@ class SyntheticRun:
                 ('/scenario/xml', setup.loaded.xml_text),
                 ('/scenario/objects', OBJECTS.write(
                     (*setup.vehicle_descriptions, *self.objects))),
-                ('/scenario/game', GAME.write(describe_game( setup)))):
+                ('/scenario/game', GAME.write(describe_game(setup)))):
             yield topic, STRING, EPOCH_NS, encode(STRING, text)
         names = [name for item in setup.vehicle_ids for name in vehicle_joint_names(item)]
         rows, columns = CycleRows(['hv0'], 1), STORE.types['std_msgs/msg/MultiArrayDimension']

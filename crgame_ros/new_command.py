@@ -94,5 +94,3 @@ def _pose(state: 'VehicleState') -> 'PoseSpawn':
     from crgame_ros.game.game import PoseSpawn
     return PoseSpawn(round(state.x, 2), round(state.y, 2), round(state.yaw, 4),
                      round(state.speed, 2))
-
-

@@ -103,7 +103,7 @@ def replay_notices(setup: Setup) -> tuple[str, ...]:
         bag = _bag(setup, source)
         recorded = read_game_document(bag)
         _check_same(setup, recorded, bag)
-        present = describe_game( setup)
+        present = describe_game(setup)
         here, there = (document.human(human.id) for document in (present, recorded))
         other = [name for key, name in (('state', 'start'), ('vehicle', 'vehicle'),
                                         ('dynamics', 'vehicle model'))

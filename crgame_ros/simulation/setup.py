@@ -214,9 +214,9 @@ def build_setup(game: Game, loaded: LoadedScenario | None = None) -> Setup:
         source = parse_source(spec.driver)
         timeline = timeline_text(load_timeline(source, game.base)) \
             if source.has_timeline else ''
-        humans.append(DrivenHuman(spec.id, parameters, state,
-                                 _from_anywhere(spec.driver, game.base), timeline,
-                                 spec.dynamics))
+        humans.append(DrivenHuman(
+            spec.id, parameters, state, _from_anywhere(spec.driver, game.base), timeline,
+            spec.dynamics))
     scheduler = ScenarioScheduler.from_rate(loaded.time_step_s, game.timing.rate, k0)
     setup = Setup(game, loaded, network, obstacles, tuple(humans), avs, scheduler,
                   tuple(map(one_line, notices)))

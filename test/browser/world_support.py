@@ -42,7 +42,7 @@ class RecordedRun:
         result = run_offline(setup, duration_s=duration_s)
         self.dt_s = setup.scheduler.dt_s
         self.steps_per_tick = setup.scheduler.steps_per_tick
-        game = describe_game( setup)
+        game = describe_game(setup)
         self.scene = scene_document(setup.loaded, setup.descriptions, game)
         count, vehicles, columns = result.vehicle_states.shape
         self.states: FloatArray = np.full((count, vehicles, STATE_COLUMNS), np.nan)
