@@ -24,7 +24,7 @@ def test_cells_are_runs_and_have_scores(tmp_path: Path) -> None:
     scores = own.scores()['av0']
     assert scores.nuplan is not None and vehicle['score_nuplan'] == scores.nuplan.score
     assert vehicle['score_accepted_share'] == own.answers['av0'].accepted_share
-    assert vehicle['requests'] == own.answers['av0'].counts['requests']
+    assert vehicle['requests'] == own.answers['av0'].requests
     # CommonRoad's tools take too long for thousands of cells.
     assert vehicle['score_sm1'] is None
     again = crgame_ros.evaluate(PLAN, tmp_path / 'out', computing=crgame_ros.Computing())

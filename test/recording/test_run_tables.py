@@ -291,6 +291,7 @@ def test_plans_are_compared_with_what_was_driven(recorded: Recorded, tmp_path: P
     plans = [_plan(result, 5, 0.3, own[5]), _plan(result, 6, 0.0, own[6]),
              _plan(result, 7, 2.0, own[7]), _plan(result, last - 15, 0.0, None),
              RecordedPlan('av0', 900_000_000, 9, 0.2, None, 'has no points', None)]
+
     class Planned(Run):
         """A run with these plans."""
 
