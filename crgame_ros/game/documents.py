@@ -9,6 +9,7 @@ neither the game's files nor the engine.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,6 +40,7 @@ _COMMON = ('name', 'label', 'kind', 'when')
 _LARGEST = 2**31 * 10**9
 Count = Annotated[int, Interval(ge=0, lt=_LARGEST)]
 Period = Annotated[int, Interval(ge=1, lt=_LARGEST)]
+Amount = Annotated[float, Interval(ge=0.0, lt=math.inf)]
 
 
 def document_entry(event: EventSpec) -> dict[str, Any]:
@@ -101,9 +103,9 @@ class GameDocument:
     steps_per_tick: Period
     k0: Count
     clock_offset_ns: Count
-    real_time_factor: float = 1.0
+    real_time_factor: Amount = 1.0
     seed: int
-    duration: float | None = None
+    duration: Amount | None = None
     humans: Annotated[tuple[DrivenHuman, ...], Bounded(MAX_VEHICLES)]
     avs: Annotated[tuple[DrivenAv, ...], Bounded(MAX_VEHICLES)]
     prediction: Annotated[PredictionSpec, Declared()] = PredictionSpec()

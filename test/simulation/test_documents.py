@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 import json
 import math
 from pathlib import Path
+import random
 from typing import Any
 
 from crgame_ros.errors import InputError
@@ -136,6 +137,36 @@ def test_spoilt_game_is_refused(text: str, spoil: Callable[[dict[str, Any]], Non
     spoil(content)
     with pytest.raises(InputError, match='/scenario/game: (is no game document|drivability: )'):
         GAME.read(json.dumps(content))
+
+
+STRANGE = (None, True, -1, 1e308, 'x', '', [], {}, [[]], 2**70, '9' * 5000, [1] * 1000,
+           {'hv0': [{}]}, '\ud800', [[[[[1]]]]])
+
+
+def test_whatever_is_written_into_a_game_is_read_or_refused(text: str) -> None:
+    """One value or key is another one, anywhere; what is read can be written."""
+    rng = random.Random(5)
+    read = 0
+    for _ in range(1500):
+        content = json.loads(text)
+        inner: Any = content
+        while True:
+            key = rng.choice(list(inner) if isinstance(inner, dict) else range(len(inner)))
+            if not isinstance(inner[key], dict | list) or not inner[key] or rng.random() < 0.3:
+                break
+            inner = inner[key]
+        if rng.random() < 0.2:
+            del inner[key]
+        else:
+            inner[key] = rng.choice(STRANGE)
+        try:
+            game = GAME.read(json.dumps(content).replace('1e+308', '1e999'))
+        except InputError as error:
+            assert str(error).startswith('/scenario/game: ')
+        else:
+            assert GAME.read(GAME.write(game)) == game
+            read += 1
+    assert 50 < read < 1200
 
 
 GARBAGE = ['', 'no json', '[]', '7', 'null', '{}', '"text"', '[' * 100_000, '\x00', '[[[]]]',
