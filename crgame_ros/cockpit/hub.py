@@ -35,9 +35,8 @@ _MEASURES = [
      'worst': measure.worst, 'limit': USUAL.of(name), 'definition': measure.definition}
     for name, measure in MEASURED.items()]
 _EXPOSURES = [
-    {'name': name, 'label': each.label, 'unit': each.unit.replace('^2', '²'),
-     'definition': each.definition}
-    for name, each in ((name, each.told(USUAL)) for name, each in EXPOSURES.items())]
+    {'name': name, 'label': told.label, 'unit': told.symbol, 'definition': told.definition}
+    for name, each in EXPOSURES.items() for told in (each.told(USUAL),)]
 
 
 @dataclass(frozen=True)

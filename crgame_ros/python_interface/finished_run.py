@@ -4,10 +4,9 @@
 
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping
-from copy import copy
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 import warnings
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -118,13 +117,7 @@ class Run(MeasuredRun):
         :param scores: whether vehicles are scored, which takes most of the time.
         """
         from crgame_ros.analysis.tables.run_tables import tables_of
-        return Named('table', tables_of([self.scored(scores)]))
-
-    def scored(self, scores: bool = True) -> Self:
-        """Return the same run, for tables with or without scores."""
-        run = copy(self)
-        run.scoring = 'all' if scores else 'none'
-        return run
+        return Named('table', tables_of([self.scored('all' if scores else 'none')]))
 
     def report(self, path: FileName) -> Path:
         """

@@ -5,7 +5,6 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from crgame_ros.analysis.runs.run import run_name
 from crgame_ros.errors import InputError
 from crgame_ros.launcher.arguments import RunRequest
 from crgame_ros.launcher.run_plan import effective_setup
@@ -14,7 +13,7 @@ from crgame_ros.python_interface.games import as_path, FileName
 from crgame_ros.recording.conversion import convert_log
 from crgame_ros.recording.recorded_game import read_game_document
 from crgame_ros.recording.recorded_states import recorded_states
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.simulation.setup import Setup
 import numpy as np

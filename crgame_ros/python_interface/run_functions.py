@@ -67,7 +67,7 @@ def export(runs: Run | FileName | Sequence[Run | FileName], folder: FileName, *,
         raise InputError(f'is "{to}"', 'to', f'give one of {", ".join(FORMATS)}')
     tabulated, ids = [], set[str]()
     for each in _several(runs):
-        found = each.scored(scores)
+        found = each.scored('all' if scores else 'none')
         found.id = own_id(found.id, ids)
         ids.add(found.id)
         tabulated.append(found)

@@ -13,6 +13,7 @@ FINISHED_MARK = '.finished'
 # Suffix of the folder of a restarted recorder.
 _PART = re.compile(r'_part([1-9][0-9]*)$')
 _LATER = re.compile(r'run_([1-9][0-9]*)')
+_BAG = re.compile(r'bag(_[0-9]+|_part[0-9]+)*')
 # In the folder of a study: its file, and the folder with those of its participants.
 STUDY_FILE, PARTICIPANTS = Path('study', 'study.yaml'), 'participants'
 
@@ -51,6 +52,21 @@ def folder_name(path: Path) -> str:
     """Return the name of a run's folder, also for a recording in it."""
     whole = path.resolve()
     return whole.parent.name if whole.name.startswith('bag') and whole.parent.name else whole.name
+
+
+def run_name(path: Path) -> str:
+    """
+    Return a run's name: that of its folder, given either the folder or the recording in it.
+
+    A later run of a session, in its `run_2`, has the session's name and another epoch.
+    """
+    path = path.resolve()
+    if path.is_file():
+        # The name of a recording without a folder of its own.
+        path = path.with_suffix('') if not _BAG.fullmatch(path.stem) else path.parent
+    if _BAG.fullmatch(path.name) and path.parent.name:
+        path = path.parent
+    return path.parent.name if _LATER.fullmatch(path.name) else path.name
 
 
 def bags_of(folder: Path) -> list[Path]:

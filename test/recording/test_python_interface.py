@@ -162,6 +162,8 @@ def test_an_offline_run_knows_what_a_recording_tells(tmp_path: Path) -> None:
     assert '<td>collision with av0</td>' in text.replace('<bdi>', '').replace('</bdi>', '')
     assert f'<td>{counters.requests}</td>' in text and 'An offline run keeps no clock' in text
     assert 'does not tell' not in text
+    # Its report has scored it; tables without scores stay without.
+    assert run.tables(scores=False)['vehicles']['score_nuplan'].null_count == 2
 
 
 def test_objects_and_classes_drive_alike(run: OfflineRun) -> None:

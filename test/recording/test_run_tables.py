@@ -10,7 +10,7 @@ import shutil
 import tracemalloc
 from typing import Any, NamedTuple
 
-from crgame_ros.analysis.runs.run import Run, run_name
+from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables import pairs as pairs_table
 from crgame_ros.analysis.tables import run_tables
 from crgame_ros.analysis.tables import states as states_table
@@ -27,6 +27,7 @@ from crgame_ros.messages.plan import Plan
 from crgame_ros.paths import scenarios_directory
 from crgame_ros.recording.recorded_inputs import recorded_inputs
 from crgame_ros.recording.recorded_plans import RecordedPlan
+from crgame_ros.recording.run_folder import run_name
 from crgame_ros.recording.run_record import run_record_of, RunRecord
 from crgame_ros.simulation.offline import OfflineResult, run_offline
 from crgame_ros.simulation.setup import build_setup

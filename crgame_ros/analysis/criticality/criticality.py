@@ -32,6 +32,7 @@ from crgame_ros.geometry.reference_point import shifted, shifted_velocities
 from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.roads.route import goal_lanelets
 from crgame_ros.simulation.observer import ObservedRun
+from crgame_ros.units import unit_symbol
 from crgame_ros.vehicle.state import pose_rates, StateColumn
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class Measure(NamedTuple):
     @property
     def symbol(self) -> str:
         """Return the unit as people write it."""
-        return self.unit.replace('^2', '²')
+        return unit_symbol(self.unit)
 
     def matters(self, value: float) -> bool:
         """Return whether a value is worth telling: longer times come from equal speeds."""
@@ -112,6 +113,11 @@ class Exposure(NamedTuple):
     definition: str
     variant: str
     rate: Callable[[Sequence[float], Thresholds], float]
+
+    @property
+    def symbol(self) -> str:
+        """Return the unit as people write it."""
+        return unit_symbol(self.unit)
 
     def told(self, limits: Thresholds) -> 'Exposure':
         """Return it with the thresholds in its texts."""

@@ -61,6 +61,7 @@ class Thresholds(NamedTuple):
 
 
 USUAL = Thresholds()
+_SENTENCES = sentences_of(Thresholds)
 # By field: the name of an option or parameter, and what the threshold is.
-OPTIONS = {name: (name.removesuffix('_s'), sentence)
-           for name, sentence in sentences_of(Thresholds).items()}
+OPTIONS = {field: (field.removesuffix('_s'), _SENTENCES.get(field, ''))
+           for field in Thresholds._fields}

@@ -49,7 +49,7 @@ def criticality_section(run: Run) -> Section:
                       'numbers worst') if rows else f'<p>{caption}: no other was near.</p>'
     told = [each.told(limits) for each in EXPOSURES.values()]
     html += table('Over the whole run', ('vehicle', *(
-        f'{each.label} [{each.unit.replace("^2", "²")}]' for each in told)), [
+        f'{each.label} [{each.symbol}]' for each in told)), [
             (named(run, vehicle.vehicle_id), *map(number, vehicle.exposures.values()))
             for vehicle in measured], 'numbers')
     following = [row for vehicle in measured for row in _headways(run, vehicle)]

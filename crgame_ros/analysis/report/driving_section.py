@@ -14,6 +14,7 @@ from crgame_ros.analysis.report.section import colours_of, Plot, PlotLine, Secti
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, note, number, plain, table
 from crgame_ros.analysis.runs.run import Run
+from crgame_ros.units import unit_symbol
 
 # Longer times to lane crossing are not meaningful [s].
 _SHOWN_S = 10.0
@@ -64,7 +65,7 @@ def _measures(found: Sequence[DriverBehaviour]) -> Iterator[Sequence[str]]:
         values = [each.values.get(name, math.nan) for each in found]
         if any(map(math.isfinite, values)):
             title = plain(f'{measure.definition}; {measure.variant}; at: {measure.reference}')
-            yield (f'<span title="{title}">{word}</span>', measure.unit.replace('^3', '³'),
+            yield (f'<span title="{title}">{word}</span>', unit_symbol(measure.unit),
                    *map(number, values))
 
 

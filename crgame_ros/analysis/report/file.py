@@ -130,7 +130,7 @@ def report_html(runs: Sequence[Run], software: str = '') -> str:
     :raises CrgameError: if Plotly is not installed.
     """
     for run in runs:
-        # It measures them as well.
+        # Criticality and its course are measured at once; the sections would first ask for either.
         run.course  # noqa: B018
     if len(runs) > 1:
         runs = [run.as_part(f'run{number}') for number, run in enumerate(runs, 1)]

@@ -25,8 +25,9 @@ def run_section(run: Run) -> Section:
     if people:
         html += table('Drivers', ('vehicle', 'driver', 'took part as', 'device', 'browser',
                                   'steps', 'input delay [ms]'), people, 'people')
-    if run.notices:
-        items = ''.join(f'<li>{free(text)}</li>' for text in run.notices)
+    notices = dict.fromkeys((*run.missing, *run.notices))
+    if notices:
+        items = ''.join(f'<li>{free(text)}</li>' for text in notices)
         html += f'<div class="notices"><p>Of the recording:</p><ul>{items}</ul></div>'
     if game.file:
         text = game.file if len(game.file) <= _LONGEST_FILE else game.file[:_LONGEST_FILE] + ' …'

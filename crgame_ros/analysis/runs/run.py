@@ -7,17 +7,17 @@ from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-import re
-from typing import Any, Literal, TYPE_CHECKING
+from typing import Any, Literal, Self, TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.game.documents import GameDocument
 from crgame_ros.game.driven_vehicle import DrivenVehicle
 from crgame_ros.recording.epochs import read_epoch
 from crgame_ros.recording.offline_outcome import offline_outcome
+from crgame_ros.recording.plan_outcome import PlanOutcome, plans_of_report
 from crgame_ros.recording.reader import BagReader
 from crgame_ros.recording.run_cycles import read_cycles
-from crgame_ros.recording.run_folder import recording_in
+from crgame_ros.recording.run_folder import recording_in, run_name
 from crgame_ros.recording.run_record import record_of_log, run_record_of, RunRecord
 from crgame_ros.recording.run_trajectories import read_trajectories, RunTrajectories
 from crgame_ros.recording.timing_report import timing_report
@@ -32,7 +32,6 @@ if TYPE_CHECKING:  # They take a second to import, and only measures need them.
     from crgame_ros.analysis.pictures.scene_frame import FrameScene
     from crgame_ros.analysis.pictures.timing_figure import TimedRun
     from crgame_ros.analysis.scores.run_scores import RunScores
-    from crgame_ros.recording.plan_outcome import PlanOutcome
     from crgame_ros.recording.recorded_plans import RecordedPlan
 
 FloatArray = NDArray[np.float64]
@@ -40,12 +39,6 @@ FloatArray = NDArray[np.float64]
 RunProgress = Callable[[str, float], object]
 # Which scores a run has: those of CommonRoad's tools take most of the time.
 Scoring = Literal['all', 'drives', 'none']
-_PART_OF_SESSION = re.compile(r'run_[1-9][0-9]*')
-_BAG = re.compile(r'bag(_[0-9]+|_part[0-9]+)*')
-
-
-def _untold(_criticality: object) -> None:
-    """Tell nobody."""
 
 
 @dataclass
@@ -143,11 +136,20 @@ class Run:
     def id(self, text: str) -> None:  # noqa: A003
         self._id = text
 
-    def as_part(self, key: str) -> 'Run':
+    def as_part(self, key: str) -> Self:
         """Return the same run with another key: one of several in a report."""
         part = copy(self)
         part.key = key
         return part
+
+    def scored(self, scoring: Scoring) -> Self:
+        """Return the same run with other scores."""
+        run = copy(self)
+        if scoring != run.scoring:
+            run.scoring = scoring
+            # Those that are known already are others.
+            run.__dict__.pop('usual_scores', None)
+        return run
 
     @property
     def vehicles(self) -> tuple[str, ...]:
@@ -206,10 +208,9 @@ class Run:
         """Return the first contacts as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['contacts']
 
-    @property
-    def answers(self) -> 'dict[str, PlanOutcome]':
+    @cached_property
+    def answers(self) -> dict[str, PlanOutcome]:
         """Return the known answers of planners, by AV."""
-        from crgame_ros.recording.plan_outcome import plans_of_report
         return plans_of_report(self.outcome)
 
     @property
@@ -263,7 +264,8 @@ class Run:
         return partial(read_plans, self.bag, self.game.epoch,
                        self.telling('reading the plans of'))
 
-    def measure(self, on_tick: 'Callable[[Criticality], object] | None' = None) -> 'Criticality':
+    def measure(self, on_tick: 'Callable[[Criticality], object]' = lambda _: None,
+                ) -> 'Criticality':
         """
         Measure how critical it was by the usual thresholds, and keep the result.
 
@@ -272,7 +274,7 @@ class Run:
         """
         from crgame_ros.analysis.criticality.recorded import measure_log
         self._criticality = measure_log(
-            self.log, progress=self.telling('measuring'), on_tick=on_tick or _untold)
+            self.log, progress=self.telling('measuring'), on_tick=on_tick)
         return self._criticality
 
     @property
@@ -339,18 +341,3 @@ class Run:
     def telling(self, what: str) -> Callable[[float], object]:
         """Return the function to call with the share done of some work, as in `reading`."""
         return partial(self._progress, f'{what} {self.name}')
-
-
-def run_name(path: Path) -> str:
-    """
-    Return a run's name: that of its folder, given either the folder or the recording in it.
-
-    A later run of a session, in its `run_2`, has the session's name and another epoch.
-    """
-    path = path.resolve()
-    if path.is_file():
-        # The name of a recording without a folder of its own.
-        path = path.with_suffix('') if not _BAG.fullmatch(path.stem) else path.parent
-    if _BAG.fullmatch(path.name) and path.parent.name:
-        path = path.parent
-    return path.parent.name if _PART_OF_SESSION.fullmatch(path.name) else path.name

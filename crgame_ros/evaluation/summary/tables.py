@@ -16,6 +16,7 @@ from crgame_ros.evaluation.summary.summary import (
     PairedDifferences,
     Summary,
 )
+from crgame_ros.units import unit_symbol
 
 NOTHING = '-'
 _ALWAYS_TOLD = ('scenario', 'planner', 'seed')
@@ -110,7 +111,7 @@ def known_measures(summary: Summary) -> Iterator[tuple[int, SummaryMeasure]]:
 
 def measure_label(measure: SummaryMeasure) -> str:
     """Return the label of a measure with its unit."""
-    unit = '%' if measure.is_share else measure.unit.replace('^2', '²').replace('^3', '³')
+    unit = '%' if measure.is_share else unit_symbol(measure.unit)
     return measure.label if unit == '1' else f'{measure.label} [{unit}]'
 
 

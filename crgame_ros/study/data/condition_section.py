@@ -12,6 +12,7 @@ from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER
 from crgame_ros.study.data.study_data import StudyData
 from crgame_ros.study.data.trials_table import measure_columns, TASK_COLUMNS
 from crgame_ros.study.trial_plan import conditions_of
+from crgame_ros.units import unit_symbol
 import numpy as np
 from numpy.typing import NDArray
 
@@ -330,7 +331,7 @@ def _differs(means: ConditionMeans) -> bool:
 
 
 def _unit(column: Column) -> str:
-    return '' if column.unit == '1' else column.unit.replace('^2', '²').replace('^3', '³')
+    return '' if column.unit == '1' else unit_symbol(column.unit)
 
 
 def _digits(value: float) -> int:
