@@ -32,7 +32,6 @@ from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.run_profile import (
     can_believe,
     check_believing,
-    own_topics,
     write_run_profile,
 )
 from crgame_ros.ros.shared_memory import remove_stale
@@ -281,9 +280,8 @@ def believing_own_nodes(plan: RunPlan) -> Iterator[None]:
         return
     setup = plan.setup
     write_run_profile(
-        plan.dds_profile, request.namespace,
-        own_topics([item.id for item in setup.humans], [item.id for item in setup.avs]),
-        request.own_orders)
+        plan.dds_profile, request.namespace, [item.id for item in setup.humans],
+        [item.id for item in setup.avs], request.own_orders)
     before = {name: os.environ.get(name) for name in PROFILE_VARIABLES}
     os.environ |= dict.fromkeys(PROFILE_VARIABLES, str(plan.dds_profile))
     try:

@@ -19,6 +19,7 @@ from crgame_ros.recording.run_folder import run_folder
 from crgame_ros.ros.namespace_lock import hold_namespace
 from crgame_ros.ros.node_main import run_node, StopFlag
 from crgame_ros.ros.other_simulation import refuse_another
+from crgame_ros.ros.run_profile import open_topics
 from crgame_ros.simulation.roster import Participants
 from crgame_ros.simulation.setup import build_setup, Setup
 from crgame_ros.timing.time_slice import lock_memory, shorten_time_slice
@@ -116,6 +117,13 @@ class SimNode(Node):
         self._write_roster(setup)
         for notice in setup.notices:
             self.get_logger().info(notice)
+        unprotected = open_topics(self.get_namespace(), [item.id for item in setup.humans],
+                                  [item.id for item in setup.avs])
+        if unprotected:
+            self.get_logger().warning(
+                f'other programs can publish {unprotected[0]} and {len(unprotected) - 1} more '
+                'topics of vehicles that were not in the first game: to exclude them, start the '
+                'run with this game')
         self.get_logger().info(
             f'{setup.loaded.benchmark_id}: {len(setup.humans)} human(s), {len(setup.avs)} AV(s), '
             f'{len(setup.obstacles.descriptions)} objects, '

@@ -33,12 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _write(values: argparse.Namespace) -> int:
     from crgame_ros.ros.environment import PROFILE_VARIABLES
-    from crgame_ros.ros.run_profile import check_believing, own_topics, write_run_profile
+    from crgame_ros.ros.run_profile import check_believing, write_run_profile
     file = values.file.absolute()
     if not file.exists():
         check_believing('dds-profile')
         try:
-            write_run_profile(file, values.namespace, own_topics((), ()), values.own_orders)
+            write_run_profile(file, values.namespace, own_orders=values.own_orders)
         except OSError as error:
             raise InputError(f'cannot be written ({error.strerror})', str(file),
                              'name a file in a folder of yours') from error

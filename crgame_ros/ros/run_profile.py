@@ -8,7 +8,7 @@ are in it and in the default one as well, so that every program of the domain ca
 compares partitions when it matches a writer with a reader, so a message costs nothing more.
 """
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator, Sequence
 import copy
 import os
 from pathlib import Path
@@ -54,23 +54,22 @@ def check_believing(what: str) -> None:
                          f'unset {PROFILE_VARIABLES[0]} and RMW_IMPLEMENTATION')
 
 
-def own_topics(humans: Collection[str], avs: Collection[str]) -> Iterator[str]:
+def own_topics(humans: Sequence[str], avs: Sequence[str]) -> Iterator[str]:
     """Yield the names of the topics that only a run's own nodes publish, and read."""
-    humans = sorted({*humans, *(f'hv{number}' for number in NUMBERS)})
-    avs = sorted({*avs, *(f'av{number}' for number in NUMBERS)})
     for topic in load_contract().topics.values():
         if topic.is_own:
             yield from topic.names(humans, avs)
 
 
-def write_run_profile(path: Path, namespace: str, topics: Iterable[str],
-                      own_orders: bool = False) -> None:
+def write_run_profile(path: Path, namespace: str, humans: Collection[str] = (),
+                      avs: Collection[str] = (), own_orders: bool = False) -> None:
     """
     Write the profile of one run, which begins with the default one.
 
     :param path: of the file, which only its owner may read.
     :param namespace: of the run's nodes.
-    :param topics: that the nodes take from each other alone.
+    :param humans: ids of the humans' vehicles, beside hv0 and so on with the first NUMBERS.
+    :param avs: likewise of the AVs.
     :param own_orders: whether this holds for orders as well: services, and ORDER_TOPICS.
     """
     ElementTree.register_namespace('', _NAMESPACE)
@@ -83,6 +82,8 @@ def write_run_profile(path: Path, namespace: str, topics: Iterable[str],
                 profiles.remove(item)
     key = secrets.token_urlsafe(16)
     inside, both = key, f';{key}'
+    topics = own_topics(sorted({*humans, *(f'hv{number}' for number in NUMBERS)}),
+                        sorted({*avs, *(f'av{number}' for number in NUMBERS)}))
     named = (*topics, *(ORDER_TOPICS if own_orders else ()))
     names = [(f'{namespace.rstrip("/")}{topic}', inside) for topic in named]
     if own_orders:
@@ -97,6 +98,28 @@ def write_run_profile(path: Path, namespace: str, topics: Iterable[str],
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(descriptor, 'wb') as file:
         tree.write(file, 'utf-8', xml_declaration=True)
+
+
+def open_topics(namespace: str, humans: Sequence[str], avs: Sequence[str]) -> list[str]:
+    """
+    Return those of a run's own topics that this process takes from every program all the same.
+
+    :param namespace: of the run's nodes.
+    :param humans: ids of the humans' vehicles in the present game.
+    :param avs: ids of its AVs.
+    :return: their names; none where this process has no profile of a run.
+    """
+    path = os.environ.get(PROFILE_VARIABLES[0])
+    if not path or is_loopback_profile(path):
+        return []
+    try:
+        readers = ElementTree.parse(path).getroot().iter(f'{{{_NAMESPACE}}}data_reader')
+    except (OSError, ElementTree.ParseError):
+        return []
+    covered = {item.get('profile_name', '') for item in readers}
+    names = [f'{namespace.rstrip("/")}{topic}' for topic in own_topics(humans, avs)]
+    missing = [name for name in names if name not in covered]
+    return missing if len(missing) < len(names) else []
 
 
 def _partitions(value: str) -> ElementTree.Element:

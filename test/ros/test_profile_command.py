@@ -6,7 +6,8 @@ from pathlib import Path
 import shlex
 
 from crgame_ros.cli import main
-from crgame_ros.ros.environment import PROFILE_VARIABLES
+from crgame_ros.ros.environment import loopback_profile, PROFILE_VARIABLES
+from crgame_ros.ros.run_profile import open_topics, write_run_profile
 import pytest
 
 
@@ -35,3 +36,18 @@ def test_what_cannot_be_is_refused_in_a_line(
     said = capsys.readouterr()
     assert said.err.startswith('error: dds-profile: needs Fast DDS') and not said.out
     assert not file.exists()
+
+
+def test_vehicles_of_a_later_game_that_the_profile_leaves_open(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first numbers and those of the first game are covered; others are named."""
+    file = tmp_path / 'fastdds.xml'
+    write_run_profile(file, '/exp1', ['hv200'])
+    monkeypatch.setenv(PROFILE_VARIABLES[0], str(file))
+    assert open_topics('/exp1', ['hv0', 'hv15', 'hv200'], ['av0', 'av15']) == []
+    found = open_topics('/exp1', ['hv0'], ['av15', 'av16'])
+    assert '/exp1/av16/plan_request' in found
+    assert all('/av16/' in name for name in found)
+    for other in (loopback_profile(), tmp_path / 'none.xml', Path(__file__)):
+        monkeypatch.setenv(PROFILE_VARIABLES[0], str(other))
+        assert open_topics('/exp1', ['hv0'], ['av16']) == []
