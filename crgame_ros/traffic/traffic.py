@@ -13,7 +13,7 @@ from crgame_ros.roads.network import RoadNetwork
 from crgame_ros.traffic.changing.changing import LaneChanges
 from crgame_ros.traffic.changing.courtesy import fading, note_leaders
 from crgame_ros.traffic.changing.lane_change_intents import Situations
-from crgame_ros.traffic.crossing.crossings import AT_LINE, Crossings
+from crgame_ros.traffic.crossing.crossings import AT_LINE, Crossings, MOVES_UP
 from crgame_ros.traffic.crossing.crosswalks import Crosswalks
 from crgame_ros.traffic.crossing.exit_room import queues
 from crgame_ros.traffic.crossing.junctions import arrivals, passages
@@ -313,7 +313,10 @@ class Traffic:
         at_light = np.isfinite(light) & (light < np.minimum(gap, halt + AT_LINE))
         agents.blocker[slots[at_light]] = FREE
         if (agents.waits[slots] > self._waiting).any():
-            stuck = break_circles(k, agents.table, slots, self._waiting, self._insisting)
+            moves_up = np.zeros(agents.count, dtype=bool)
+            moves_up[slots[shut & (gap > MOVES_UP)]] = True
+            stuck = break_circles(k, agents.table, slots, moves_up, self._waiting,
+                                  self._insisting)
             self._turn_off(np.union1d(slots[shut], stuck))
         return np.minimum(before_light, halt)
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Agents that wait for each other in a circle."""
 
+from itertools import pairwise, product
 import json
 import math
 from pathlib import Path
@@ -27,6 +28,9 @@ RADIUS, PARTS = 14.0, 4
 # Near enough that no agent sets off, and far enough apart to be placed [m].
 STANDSTILL_GAP = 4.0
 SPACING = CAR.length + 3.2
+# The sides of a block, its corners' radius, and where a street crosses each side [m].
+STREET, CORNER, CROSSING = 60.0, 6.0, (26.0, 34.0)
+QUARTER = STREET + 0.5 * math.pi * CORNER
 
 
 def ring() -> Scenario:
@@ -94,6 +98,48 @@ traffic: {{recorded: reactive, options: {{standstill_gap: {STANDSTILL_GAP}}}}}
     out, err = capfd.readouterr()
     assert json.loads(out)['taken_off'] == 1
     assert 'removed 1 agent of the traffic' in err
+
+
+def on_block(s: float) -> tuple[float, float, float]:
+    """Return the pose at an arc length of the way around a square block, counter-clockwise."""
+    side, s = divmod(s, QUARTER)
+    over = max(s - STREET, 0.0) / CORNER
+    x, y = 30.0 + CORNER * math.cos(over), min(s, STREET) - 30.0 + CORNER * math.sin(over)
+    angle = 0.5 * math.pi * side
+    return (x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle),
+            over + angle + 0.5 * math.pi)
+
+
+def block() -> Scenario:
+    """Return the streets around a block. In the middle of each side another street crosses."""
+    lanes = []
+    for side in range(4):
+        for part, (begin, end) in enumerate(pairwise((0.0, *CROSSING, QUARTER))):
+            number = 3 * side + part
+            lanes.append(lane_strip(
+                1 + number, [on_block(side * QUARTER + s)[:2] for s in np.arange(
+                    begin, end + 0.1, (end - begin) / 40)],
+                successor=[1 + (number + 1) % 12], predecessor=[1 + (number - 1) % 12]))
+        x, y, yaw = on_block(side * QUARTER + 0.5 * STREET)
+        lanes.append(lane_strip(20 + side, [
+            (x + s * math.sin(yaw), y - s * math.cos(yaw)) for s in np.linspace(34.0, -16.0, 50)]))
+    return roads(*lanes)
+
+
+def test_a_circle_of_queues_moves_up_into_its_crossings() -> None:
+    """Each queue reaches back to a crossing, so there is no room behind it for one more."""
+    standing = []
+    for side, n in product(range(4), range(8)):
+        pose = on_block((side * QUARTER + CROSSING[0] - 0.5 * CAR.length - 0.5 - SPACING * n)
+                        % (4 * QUARTER))
+        standing.append(driving(10 * side + n, [pose, pose], 0.0))
+    run = Run(block(), TrafficSpec(options={'standstill_gap': STANDSTILL_GAP}), 0,
+              adopted=standing)
+    assert np.isfinite(run.poses[0][:, 0]).all()
+    run.ticks(800)
+    way = np.hypot(*(run.poses[-1] - run.poses[0])[:, :2].T)
+    assert run.traffic.taken_off == 0 and way[::8].min() > 5.0
+    assert run.overlaps() == []
 
 
 @pytest.mark.exhaustive

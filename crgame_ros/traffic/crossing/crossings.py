@@ -34,6 +34,8 @@ import numpy as np
 AT_LINE = 3.0
 # An agent that can halt with this braking lets another go that has waited very long [m/s^2].
 MERCY = 1.5
+# An agent that opens a circle of waiting agents moves up by at least this [m].
+MOVES_UP = 3.0
 # A grant ends this far behind its junction [m].
 PASSED = 1.0
 
@@ -95,7 +97,8 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     for i, slot in enumerate(slots):
         # No agent is let in past another that waits before the same junction.
         stopped[i] = _is_stopped(at, i, passage.hold[i])
-        full[i] = is_full(rules, promised, agents, slot, way, passage, at, i)
+        full[i] = agents.insists_until[slot] <= k and is_full(
+            rules, promised, agents, slot, way, passage, at, i)
     # Other agents leave the room behind the junction to an agent that has waited very long.
     first = full & ~stopped
     next_in = first & (agents.waits[slots] > ticks[3])
@@ -112,7 +115,8 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
         if passage.first[i] < 0 or halt[i] < math.inf:
             continue
         # Agents let in before it take room as well.
-        full[i] = full[i] or is_full(rules, promised, agents, slot, way, passage, at, i)
+        full[i] = full[i] or (agents.insists_until[slot] <= k and is_full(
+            rules, promised, agents, slot, way, passage, at, i))
         if passage.inside[i] < STARTED and not stopped[i] or _may_enter(
                 rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
             if not waits_inside(passage, i):
@@ -233,7 +237,11 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
                             or passage.hold[i] >= 4.0):
         return False
     easily = speed**2 < 2.0 * MERCY * passage.hold[i]
+    insists = agents.insists_until[slot] > k
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
+        if insists and meeting.inside[n] and meeting.into[n] > BEFORE + MOVES_UP:
+            # It halts behind the other, in the junction.
+            continue
         if meeting.step[n] > passage.granted[i] and (
                 _yields(ticks, k, agents, passage, meeting, at, i, n)
                 or (easily and _has_mercy(ticks, k, agents, meeting, at, i, n))):

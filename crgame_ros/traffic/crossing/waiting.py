@@ -3,7 +3,7 @@
 """Circles of agents that wait for each other: they are found, and one agent goes first."""
 
 from crgame_ros.traffic.compiling.compiled import compiled
-from crgame_ros.traffic.fleet.agents import AgentTable
+from crgame_ros.traffic.fleet.agents import AgentTable, BoolArray
 from crgame_ros.traffic.lanes.lane_graph import FloatArray, IntArray
 from crgame_ros.vehicle.state import QUEUEING
 import numpy as np
@@ -28,7 +28,7 @@ def note_standing(agents: AgentTable, slots: IntArray, acceleration: FloatArray)
 
 
 @compiled
-def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int,
+def break_circles(k: int, agents: AgentTable, slots: IntArray, moves_up: BoolArray, waits: int,
                   insists: int) -> IntArray:
     """
     Make one agent of each circle of waiting agents go first.
@@ -36,6 +36,8 @@ def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int,
     Each standing agent waits for one other at most (`AgentTable.blocker`). The chain of blockers
     ends, or leads around in a circle. There the agent goes first that has insisted longest ago.
 
+    :param moves_up: (A) whether an agent could move up, but stays out of a junction because there
+        is no room behind it.
     :param waits: ticks of standing that count as waiting.
     :param insists: ticks for which it goes first.
     :return: the agents in circles.
@@ -47,7 +49,7 @@ def break_circles(k: int, agents: AgentTable, slots: IntArray, waits: int,
         current = first = _in_circle(agents, slot, seen, waits)
         if current < 0:
             continue
-        chosen = _least_insistent(k, agents, current)
+        chosen = _least_insistent(k, agents, current, moves_up)
         if chosen >= 0:
             agents.insists_until[chosen] = k + insists
         while True:
@@ -78,13 +80,13 @@ def _in_circle(agents: AgentTable, slot: int, seen: IntArray, ticks: int) -> int
 
 
 @compiled
-def _least_insistent(k: int, agents: AgentTable, start: int) -> int:
-    """Return the agent of a circle to go first, none behind its leader; -1 while one insists."""
+def _least_insistent(k: int, agents: AgentTable, start: int, moves_up: BoolArray) -> int:
+    """Return the agent of a circle to go first, none close to its leader; -1 while one insists."""
     chosen, current = -1, start
     while True:
         if agents.insists_until[current] > k:
             return -1
-        if agents.blocker[current] != agents.leader[current] and (
+        if (agents.blocker[current] != agents.leader[current] or moves_up[current]) and (
                 chosen < 0 or agents.insists_until[current] < agents.insists_until[chosen]):
             chosen = current
         current = agents.blocker[current]
