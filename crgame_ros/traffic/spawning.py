@@ -111,8 +111,6 @@ JAM_SHARE, JAM_TIME = 0.25, 20.0
 CALMING = 3
 # Recorded vehicles may take bends faster than agents by this factor of the speed.
 TOO_FAST = 1.2
-# Distance within which a newcomer checks for junctions, lights and lane ends [m].
-FARTHEST = 150.0
 
 
 def is_long(length: float) -> bool:
@@ -345,7 +343,7 @@ class Spawner:
         """
         Return the initial speed of a newcomer.
 
-        It could still stop before a junction, the end of the lane or a light that is not green,
+        It can still stop before a junction, the end of the lane or a light that is not green,
         and slow down for the bends and limits on its way.
         """
         graph, routes = self._graph, self._routes
@@ -354,7 +352,7 @@ class Spawner:
         entry = self._conflicts.table.entry[int(agents.width[slot] > NARROW)]
         offset, destination = -s - 0.5 * float(agents.length[slot]) - STOP_GAP, int(
             agents.destination[slot])
-        while offset < FARTHEST:
+        while offset < speed**2 / (2.0 * COASTING):
             rest = np.inf
             if entry[lane] < np.inf:
                 rest = offset + hold_before(float(entry[lane]))

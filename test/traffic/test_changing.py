@@ -260,3 +260,29 @@ def test_no_change_begins_where_a_junction_is_near_behind_a_short_lanelet() -> N
         poses, _ = run.series(0)
         begins.append(float(poses[np.argmax(poses[:, 1] > -3.4), 0]))
     assert all(150.0 < x < 206.0 - 15.0 or x > 230.0 for x in begins), begins
+
+
+def test_no_change_for_speed_into_a_lane_with_a_merge_within_the_braking_distance() -> None:
+    """A ramp merges into the right lane behind x = 400; the braking is 2 m/s^2."""
+    lanes = []
+    for first, begin, end in ((1, 0.0, 400.0), (3, 400.0, 460.0), (5, 460.0, 1100.0)):
+        for lane, y, side in ((first, 0.0, 'right'), (first + 1, -3.5, 'left')):
+            links = {'predecessor': [lane - 2] + [7] * (lane == 6)} if first > 1 else {}
+            links |= {'successor': [lane + 2]} if first < 5 else {}
+            lanes.append(support.straight_lane(
+                lane, y, begin, end, **links, **{
+                    f'adjacent_{side}': 2 * first + 1 - lane,
+                    f'adjacent_{side}_same_direction': True}))
+    ramp = support.lane_strip(7, [(x, -3.5 - 0.1 * (460.0 - x)) for x in np.linspace(
+        200.0, 460.0, 60)], successor=[6])
+    begins = []
+    for start in range(10, 330, 20):
+        # A slow vehicle ahead in the left lane.
+        run = support.Run(support.roads(*lanes, ramp), TrafficSpec(), 0,
+                          [support.human(start + 60.0, 0.0, 0.0, 15.0)],
+                          [agent(1, float(start), 0.0, 27.0)]).ticks(150)
+        poses, speeds = run.series(0)
+        at = int(np.argmax(poses[:, 1] < -0.1))
+        begins.append((float(400.0 - poses[at, 0]), float(speeds[at])**2 / 4.0))
+    assert any(rest > braking for rest, braking in begins), begins
+    assert all(rest > braking or rest < -50.0 for rest, braking in begins), begins

@@ -63,6 +63,23 @@ def test_it_goes_first_if_the_gap_is_long_enough(maps: Path) -> None:
     assert np.nanmin(run.series(0)[1]) > 11.0
 
 
+@pytest.mark.parametrize('room', [1.3, 1.0])
+def test_who_stopped_a_little_too_late_waits_all_the_same(maps: Path, room: float) -> None:
+    """Its front stands in the conflict, but the vehicle with the right of way can pass."""
+    roads = network(maps)
+    x, _, yaw = roads.pose_on(21, roads.line(21).length)
+    # The other one drives along y = -1.75.
+    y = -1.75 - 0.5 * support.CAR.width - room - 0.5 * support.CAR.length
+    run = support.Run(maps / NAME, TrafficSpec(), 0, (), [
+        coming(roads, 1, 11, 32, 25.0, 13.0),
+        support.driving(2, [(x, y, yaw), roads.pose_on(42, 50.0)], 0.0)]).ticks(120)
+    (major, fast), (minor, _) = run.series(0), run.series(1)
+    passed = int(np.nanargmax(major[:, 0] > x + 4.0))
+    assert np.nanmin(fast[:passed]) > 12.0
+    assert np.hypot(*(minor[passed] - minor[0])[:2]) < 0.5
+    assert minor[-1, 1] > minor[0, 1] + 5.0 and run.overlaps() == []
+
+
 def test_agents_yield_to_a_human_on_the_priority_road(maps: Path) -> None:
     roads = network(maps)
     human = support.human(-90.0, -1.75, 0.0, 13.0)

@@ -75,6 +75,22 @@ def test_a_lane_carries_what_the_manual_says() -> None:
     assert run.overlaps() == []
 
 
+def test_a_fast_arrival_can_still_halt_before_a_junction_far_ahead() -> None:
+    """Two fast roads cross behind 200 m. Who comes in can halt there, with 1.5 m/s^2 at most."""
+    across = support.lane_strip(3, [(220.0, y) for y in np.linspace(-220.0, 200.0, 80)])
+    run = support.Run(support.roads(
+        support.straight_lane(1, 0.0, 0.0, 200.0, successor=[2]),
+        support.straight_lane(2, 0.0, 200.0, 500.0, predecessor=[1]), across),
+        TrafficSpec(flow=400.0, truck_share=0.0, speed_factor=3.0), 1).ticks(1500)
+    poses, speeds = np.array(run.poses), np.array(run.speeds)
+    came = ~np.isnan(poses[1:, :, 0]) & np.isnan(poses[:-1, :, 0])
+    at, entered = poses[1:][came], speeds[1:][came]
+    rest = 218.0 - np.where(at[:, 0] < 219.0, at[:, 0], 218.0 + at[:, 1] + 2.0)
+    assert len(rest) > 15
+    assert (entered**2 < 2.0 * 1.5 * rest).all()
+    assert entered.max() > 20.0
+
+
 def test_an_agent_at_the_end_of_the_map_is_absent_for_a_tick_at_least() -> None:
     run = support.Run(one_lane(), TrafficSpec(flow=1800.0, capacity=6, truck_share=0.0),
                       1).ticks(700)

@@ -137,7 +137,7 @@ def driving(number: int, poses: Sequence[tuple[float, float, float]], speed: flo
 
 
 def lane_strip(number: int, line: Sequence[tuple[float, float]], width: float = 3.5,
-               limit: float | None = None, **links: object) -> Lanelet:
+               **links: object) -> Lanelet:
     """Make a lanelet around a polyline."""
     points = np.array(line, dtype=float)
     tangent = np.gradient(points, axis=0)

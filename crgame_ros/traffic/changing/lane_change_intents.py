@@ -136,16 +136,23 @@ def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slo
         # Where a lane ends there is no other place to change. An agent too fast for the rest
         # brakes instead, so that it does not leave the road.
         return bool(rest > SWERVE_TIME * speed)
-    if _is_inside(to, agents, slot, lane) or at.halt[i] < _no_change(speed):
-        return False
+    return bool(at.halt[i] >= _no_change(speed)
+                and not _nears_junction(lanes, to, agents, slot, lane, rest))
+
+
+@bare
+def _nears_junction(lanes: LaneTable, to: Destinations, agents: AgentTable, slot: int, lane: int,
+                    rest: float) -> bool:
+    """Return whether an agent on a lane, with a rest of it ahead [m], is near a junction."""
     # Short lanelets may lie between a lane and its junction.
-    onto = to.next[agents.destination[slot], lane]
-    while onto >= 0 and rest <= _no_change(speed):
+    onto, no_change = lane, _no_change(agents.speed[slot])
+    rest -= lanes.length[lane]
+    while onto >= 0 and rest <= no_change:
         if _is_inside(to, agents, slot, onto):
-            return False
+            return True
         rest += lanes.length[onto]
         onto = to.next[agents.destination[slot], onto]
-    return True
+    return False
 
 
 @bare
@@ -158,10 +165,12 @@ def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots:
         beside = lanes.left[lane] if side > 0 else lanes.right[lane]
         if not free[i] or beside < 0 or not math.isfinite(to.cost[destination, beside]):
             continue
-        # An agent that enters a junction by a lane change was not let in.
-        if _is_inside(to, agents, slot, beside) and not to.drops[lane]:
-            continue
         speed, s = agents.speed[slot], agents.s[slot]
+        # An agent that enters a junction by a lane change was not let in.
+        if not to.drops[lane] and _nears_junction(
+                lanes, to, agents, slot, beside, lanes.length[beside] * (
+                    1.0 - s / lanes.length[lane])):
+            continue
         needs, remaining = to.change[destination, lane], to.remaining[destination, lane] - s
         if at.blocked[i] < PREPARE or (needs == side and remaining < PREPARE):
             found.urgency[used] = urgency(min(remaining, at.blocked[i]), speed)

@@ -5,8 +5,8 @@
 import math
 from typing import NamedTuple
 
-from crgame_ros.traffic.compiling.compiled import compiled
-from crgame_ros.traffic.crossing.junctions import Arrivals, Passages, time_to, waits_inside
+from crgame_ros.traffic.compiling.compiled import compiled, inlined
+from crgame_ros.traffic.crossing.junctions import Arrivals, FIRM, Passages, time_to, waits_inside
 from crgame_ros.traffic.fleet.agents import AgentTable
 from crgame_ros.traffic.following.leaders import Ways
 from crgame_ros.traffic.lanes.conflicts import ConflictTable, extent, spare_room, touch
@@ -149,11 +149,12 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     continue
                 # Others may drive beside the middle of their lane.
                 pair = extent(agents.width[slot], arrivals.width[theirs]) if owner >= 0 else 1
-                if _into(conflicts, arrivals, mine, pair) <= 0.0:
+                spare = spare_room(agents.width[slot], arrivals.width[theirs])
+                if _has_entered(_into(conflicts, arrivals, mine, pair), agents.speed[slot],
+                                spare):
                     continue
                 if owner >= 0 and (stays[owner] or waits_inside(passage, owner)) \
-                        and _into(conflicts, arrivals, theirs, pair) > -spare_room(
-                            agents.width[slot], arrivals.width[theirs]) \
+                        and _into(conflicts, arrivals, theirs, pair) > -spare \
                         and not is_let_in(agents, at.slots[owner], passage, owner,
                                           arrivals.step[theirs]) \
                         and not (conflicts.merges[conflict] and (next_in[owner] or (
@@ -161,7 +162,8 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     continue
                 if used == len(found.other):
                     found = _grown(found)
-                _compare(conflicts, rules, arrivals, mine, theirs, pair, at.desired, found, used)
+                _compare(conflicts, rules, arrivals, mine, theirs, pair, spare, at.desired, found,
+                         used)
                 used += 1
         found.begin[i + 1] = used
     return found
@@ -229,9 +231,24 @@ def _out(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> flo
     return float(arrivals.offset[n] + arrivals.half[n] + conflicts.end[pair, arrivals.conflict[n]])
 
 
+@inlined
+def _has_entered(into: float, speed: float, spare: float) -> bool:
+    """
+    Return whether a vehicle is in a conflict for good.
+
+    It is not if its front is, or halts, where there is room to pass it: who waits before a
+    conflict may stop a little late.
+
+    :param into: distance of its front from the conflict [m]
+    :param spare: see `spare_room` [m]
+    """
+    return bool(into <= 0.0 and into - speed**2 / (2.0 * FIRM) <= -spare)
+
+
 @compiled
 def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
-             theirs: int, pair: int, desired: FloatArray, found: Meetings, n: int) -> None:
+             theirs: int, pair: int, spare: float, desired: FloatArray, found: Meetings,
+             n: int) -> None:
     """Write the meeting of two arrivals, with the conflict's extent for both, into row n."""
     owner, conflict = arrivals.owner[theirs], arrivals.conflict[mine]
     into, out = (_into(conflicts, arrivals, theirs, pair), _out(conflicts, arrivals, theirs, pair))
@@ -267,7 +284,7 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.priority[n] = conflicts.priority[conflict]
     ahead = (rules.ring if ring else rules.merging) if joins else rules.gap_before
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
-    found.inside[n] = into <= 0.0 and out > 0.0
+    found.inside[n] = out > 0.0 and _has_entered(into, speed, spare if owner >= 0 else 0.0)
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
     found.courteous[n] = owner >= 0 and into > 2.0 * speed + speed**2 / 3.0
     found.tapers[n] = conflicts.tapers[conflict]
