@@ -275,7 +275,9 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     else:
         early = max(time_to(into, speed, rules.acceleration, desired[owner]),
                     arrivals.soonest[theirs])
-        late = time_to(clear, speed, TIMID, max(0.8 * desired[owner], 2.0))
+        # In a bend it is no faster than the bend allows.
+        late = max(time_to(clear, speed, TIMID, max(0.8 * desired[owner], 2.0)),
+                   clear / arrivals.pace[theirs])
     there = time_to(here, arrivals.speed[mine], HURRY, desired[i])
     gone = slower + time_to(leave, arrivals.speed[mine], rules.acceleration,
                             min(desired[i], arrivals.pace[mine]))
