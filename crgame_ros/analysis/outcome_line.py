@@ -43,10 +43,8 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
     worst = [each.worst['ttc'].value for each in found if 'ttc' in each.worst]
     if worst:
         parts.append(f'least TTC {min(worst):.2f} s')
-    # The last request of a run has no answer yet.
     plans = plans_of_report(outcome).values()
-    due = sum(count or 0 for found in plans
-              for count in (found.accepted, found.refused, found.timed_out))
+    due = sum(found.due for found in plans)
     if due:
         driven = sum(found.driven for found in plans)
         parts.append(f'{driven} of {_counted(due, "plan")} accepted')

@@ -95,6 +95,11 @@ class PlanOutcome:
         return max(0, (self.accepted or 0) - (self.fallback or 0))
 
     @property
+    def due(self) -> int:
+        """Return how many requests were decided; the last one of a run may have no answer yet."""
+        return sum(count or 0 for count in (self.accepted, self.refused, self.timed_out))
+
+    @property
     def accepted_share(self) -> float | None:
         """Return the share of answers that were accepted and no fallback; None if unknown."""
         known = self.accepted is not None and self.plans

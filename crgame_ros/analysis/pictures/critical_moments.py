@@ -104,7 +104,7 @@ def _critical(criticality: Criticality) -> Iterator[_Ranked]:
     limits = criticality.thresholds
     for vehicle in criticality.report():
         for name in ('ttc', 'drac'):
-            worst = vehicle.worst.get(name)
+            worst, measure = vehicle.worst.get(name), MEASURES[name]
             value = 0.0 if worst is None else worst.value
             if worst is None or value == 0.0 or math.isinf(value):
                 # They touch.
@@ -113,14 +113,14 @@ def _critical(criticality: Criticality) -> Iterator[_Ranked]:
             if excess > 1.0 or name == 'ttc' and value < NOTICED_S:
                 yield _Ranked(_CRITICAL if excess > 1.0 else _NOTICED, -excess, Moment(
                     worst.time_s,
-                    f'{name} of {vehicle.vehicle_id} to {worst.other} is {value:.2f} '
-                    f'{MEASURES[name].unit}', (vehicle.vehicle_id, worst.other)))
+                    f'{measure.label} of {vehicle.vehicle_id} to {worst.other} is {value:.2f} '
+                    f'{measure.symbol}', (vehicle.vehicle_id, worst.other)))
         for crossing in vehicle.crossings:
             if limits.exceeded('pet', crossing.pet_s):
                 first, second = (criticality.ids[i] for i in (crossing.first, crossing.second))
                 yield _Ranked(_CRITICAL, -limits.pet_s / max(crossing.pet_s, _LEAST), Moment(
                     crossing.entered_s,
-                    f'{second} enters {crossing.pet_s:.2f} s after {first} has left (pet)',
+                    f'{second} enters {crossing.pet_s:.2f} s after {first} has left (PET)',
                     tuple(sorted((first, second), key=lambda each: each != vehicle.vehicle_id))))
 
 

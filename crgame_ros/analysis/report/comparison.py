@@ -77,10 +77,10 @@ def worst_of_all(run: Run, name: str) -> str:
 
 
 def accepted(run: Run) -> str:
-    """Return the text on how many plans of all AVs were accepted."""
-    asked = sum(found.requests or 0 for found in run.answers.values())
-    taken = sum(found.accepted or 0 for found in run.answers.values())
-    return f'{taken} of {asked} ({share(taken, asked)})' if asked else NOTHING
+    """Return the text on how many plans of all AVs were accepted, as the run's last line does."""
+    due = sum(found.due for found in run.answers.values())
+    driven = sum(found.driven for found in run.answers.values())
+    return f'{driven} of {due} ({share(driven, due)})' if due else NOTHING
 
 
 def _format_value(run: Run, say: Callable[[Any], str]) -> str:

@@ -38,7 +38,7 @@ def test_the_smallest_ttc_is_the_moment(straight: Make) -> None:
     assert 0.0 < ttc_s < 3.0
     first = moments[0]
     assert first.time_s == pytest.approx(2.9)
-    assert f'ttc of hv0 to av0 is {ttc_s:.2f} s' in first.why
+    assert f'Time to collision (TTC) of hv0 to av0 is {ttc_s:.2f} s' in first.why
     assert set(first.vehicles) == {'hv0', 'av0'}
     # They are nearest at 3.0 s: within a second of it, so it is one moment.
     assert f'hv0 and av0 are {gap - 30.0:.2f} m apart' in first.why and len(moments) == 1
