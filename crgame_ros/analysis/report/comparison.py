@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import MEASURES
-from crgame_ros.analysis.report.criticality_section import marked
 from crgame_ros.analysis.report.planners_section import planners_compared
 from crgame_ros.analysis.report.run_section import title_of
 from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, PLOTTED, Section
 from crgame_ros.analysis.report.story_section import moment
-from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
+from crgame_ros.analysis.report.text import free, marked, NOTHING, number, share, table
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.vehicle.state import StateColumn
 

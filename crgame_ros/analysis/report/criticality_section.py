@@ -23,7 +23,7 @@ from crgame_ros.analysis.report.section import (
     Section,
 )
 from crgame_ros.analysis.report.story_section import moment
-from crgame_ros.analysis.report.text import note, number, plain, share, table
+from crgame_ros.analysis.report.text import marked, note, number, plain, share, table
 from crgame_ros.analysis.runs.run import Run
 import numpy as np
 from numpy.typing import NDArray
@@ -63,12 +63,6 @@ def criticality_section(run: Run) -> Section:
             'vehicle', 'first', 'second', 'second entered at [s]', 'PET [s]'), crossings,
             'numbers')
     return Section('criticality', 'Criticality', html, tuple(_plots(run, limits)))
-
-
-def marked(text: str, critical: bool) -> str:
-    """Return a text as HTML, marked if it is critical: not by colour alone."""
-    return f'<strong class="critical">{text}<span class="sign"> ‼</span></strong>' \
-        if critical else text
 
 
 def _worst(run: Run, vehicle: VehicleCriticality,

@@ -1,14 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The HTML document of a page: it contains its style and scripts, and permits no others."""
+"""
+A page of results as one HTML file, for runs, evaluations and studies.
+
+It contains its style and scripts, and permits no others.
+"""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 import hashlib
 from pathlib import Path
 import re
 
-from crgame_ros.analysis.report.text import plain
+from crgame_ros.analysis.report.plot_data import plot_data
+from crgame_ros.analysis.report.section import Plot, Section
+from crgame_ros.analysis.report.text import free, plain
 from crgame_ros.page_libraries import plotly_script
 
 PAGE = Path(__file__).resolve().parent / 'page'
@@ -18,38 +25,113 @@ _EMPTY = ''
 _STYLE_OF_MAPS = re.compile(r'getElementById\("([0-9a-f]{64})"\)')
 
 
-def plotted_document(title: str, body: str, data: str) -> str:
+@dataclass(frozen=True)
+class Article:
     """
-    Return the document of a page with plots.
+    A part of a page: one of several runs, or all of the page if it has no title.
 
-    :param title: text, shown in the browser's tab.
-    :param body: HTML.
-    :param data: data of the plots, JSON that is safe in a script.
-    :raises CrgameError: if Plotly has not been fetched.
+    :param sections: of it.
+    :param key: unique key, with which the addresses of its sections begin; empty for none.
+    :param title: heading, HTML.
+    :param letter: that identifies it in plots.
+    :param lead: HTML below the heading.
+    :param facts: names and values, HTML.
     """
-    script = (PAGE / 'report.js').read_text(encoding='utf-8')
-    plotly = plotly_script().read_text(encoding='utf-8')
-    done = ''.join(f'<template id="{found}"></template>'
-                   for found in dict.fromkeys(_STYLE_OF_MAPS.findall(plotly)))
-    return _document(title, (page_style(), _EMPTY), done, '\n'.join((
-        body, f'<script id="plots" type="application/json">{data}</script>',
-        f'<script>{plotly}</script>', f'<script>{script}</script>')), (plotly, script))
+
+    sections: Sequence[Section]
+    key: str = ''
+    title: str = ''
+    letter: str = ''
+    lead: str = ''
+    facts: Sequence[tuple[str, str]] = ()
+
+    def address(self, section: Section) -> str:
+        """Return the address of one of its sections within the page."""
+        return f'{self.key}-{section.key}' if self.key else section.key
+
+    def links(self) -> Iterator[tuple[str, str]]:
+        """Yield the addresses and names (HTML) to list on top of the page."""
+        if self.title:
+            yield self.key, f'{self.letter}: {self.title}'
+        else:
+            yield from ((self.address(each), each.title) for each in self.sections)
+
+    def html(self) -> str:
+        """Return it as HTML."""
+        if not self.title:
+            return '\n'.join(_section(self.address(each), each, 2) for each in self.sections)
+        return '\n'.join((
+            f'<article id="{self.key}"><h2><span class="letter">{self.letter}</span> '
+            f'{self.title}</h2><p class="lead">{self.lead}</p>{_chips(self.facts)}',
+            *(_section(self.address(each), each, 3) for each in self.sections), '</article>'))
 
 
-def plain_document(title: str, body: str, style: str) -> str:
+@dataclass(frozen=True)
+class Page:
     """
-    Return the document of a page without scripts.
+    A page of results: of runs, of an evaluation or of a study.
 
-    :param title: text, shown in the browser's tab.
-    :param body: HTML.
-    :param style: style rules in addition to those of all reports.
+    :param title: text, also shown in the browser's tab.
+    :param lead: HTML below the title.
+    :param facts: names and values, HTML.
+    :param articles: its content.
+    :param footer: HTML.
+    :param style: style rules in addition to those of all pages.
     """
-    return _document(title, (f'{page_style()}\n{style}',), '', body, ())
+
+    title: str
+    lead: str
+    facts: Sequence[tuple[str, str]]
+    articles: Sequence[Article]
+    footer: str = ''
+    style: str = ''
+
+    def html(self) -> str:
+        """
+        Return the document.
+
+        :raises CrgameError: if it has plots, and Plotly has not been fetched.
+        """
+        links = ''.join(f'<li><a href="#{address}">{words}</a></li>'
+                        for article in self.articles for address, words in article.links())
+        body = '\n'.join((
+            f'<header><h1>{free(self.title)}</h1><p class="lead">{self.lead}</p>'
+            f'{_chips(self.facts)}</header>',
+            f'<nav aria-label="Parts of the report"><ul>{links}</ul></nav>', '<main>',
+            *(article.html() for article in self.articles),
+            f'</main><footer>{self.footer}</footer>'))
+        plots = [(f'{article.address(section)}-{plot.key}', plot) for article in self.articles
+                 for section in article.sections for plot in section.plots]
+        style = f'{(PAGE / "report.css").read_text(encoding="utf-8")}\n{self.style}'
+        if not plots:
+            return _document(self.title, (style,), '', body, ())
+        script = (PAGE / 'report.js').read_text(encoding='utf-8')
+        plotly = plotly_script().read_text(encoding='utf-8')
+        done = ''.join(f'<template id="{found}"></template>'
+                       for found in dict.fromkeys(_STYLE_OF_MAPS.findall(plotly)))
+        return _document(self.title, (style, _EMPTY), done, '\n'.join((
+            body, f'<script id="plots" type="application/json">{plot_data(plots)}</script>',
+            f'<script>{plotly}</script>', f'<script>{script}</script>')), (plotly, script))
 
 
-def page_style() -> str:
-    """Read the style of all reports."""
-    return (PAGE / 'report.css').read_text(encoding='utf-8')
+def _chips(facts: Sequence[tuple[str, str]]) -> str:
+    items = ''.join(f'<div><dt>{words}</dt><dd>{value}</dd></div>' for words, value in facts)
+    return f'<dl class="chips">{items}</dl>' if items else ''
+
+
+def _section(address: str, section: Section, level: int) -> str:
+    plots = ''.join(_plot(f'{address}-{plot.key}', plot) for plot in section.plots)
+    if plots:
+        plots = f'<div class="plots">{plots}</div>'
+    return (f'<section id="{address}">'
+            f'<h{level}>{section.title}</h{level}>{section.html}{plots}</section>')
+
+
+def _plot(address: str, plot: Plot) -> str:
+    unit = f' <span class="unit">[{plot.unit}]</span>'
+    return (f'<figure class="chart{" plane" if plot.plane else ""}"><figcaption>{plot.title}{unit}'
+            f'</figcaption><div class="plot" id="{address}" role="img" '
+            f'aria-label="Plot of {plot.title}"></div></figure>')
 
 
 def _document(title: str, styles: Sequence[str], head: str, body: str,

@@ -75,3 +75,9 @@ def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]],
 def note(html: str) -> str:
     """Return a remark of lower emphasis as HTML."""
     return f'<p class="note">{html}</p>'
+
+
+def marked(text: str, critical: bool) -> str:
+    """Return a text as HTML, marked if it is critical: not by colour alone."""
+    return f'<strong class="critical">{text}<span class="sign"> ‼</span></strong>' \
+        if critical else text

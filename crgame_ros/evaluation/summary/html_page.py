@@ -7,7 +7,9 @@ import math
 from pathlib import Path
 from typing import NamedTuple
 
-from crgame_ros.analysis.report.document import plain_document
+from crgame_ros.analysis.report.document import Article, Page
+from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
 from crgame_ros.analysis.report.text import free, note, plain, table
 from crgame_ros.evaluation.summary.markdown import relative
 from crgame_ros.evaluation.summary.measures import SummaryMeasure
@@ -30,15 +32,11 @@ from crgame_ros.evaluation.summary.tables import (
 )
 from crgame_ros.version import __version__
 from crgame_ros.whole_file import write_text
-import numpy as np
 
 # Sizes in the picture, which is scaled as a whole [px].
 WIDTH, _ROW, _TOP, _AXIS = 420, 22, 6, 24
 _NAMES, _NUMBERS, _EDGE = 116, 58, 8
 _LONGEST_NAME = 17
-
-# Least relative range of an axis; a narrower one has no distinct marks.
-_NARROWEST = 1e-9
 
 
 class PlottedInterval(NamedTuple):
@@ -68,8 +66,8 @@ def interval_svg(rows: Sequence[PlottedInterval], with_zero: bool) -> str:
     :param rows: rows; one with a mean of NaN stays empty.
     :param with_zero: whether the picture includes zero, as a line.
     """
-    ticks = _ticks([number for row in rows for number in (row.value, row.low, row.high)],
-                   with_zero)
+    ticks = axis_ticks([number for row in rows for number in (row.value, row.low, row.high)],
+                       4, with_zero)
     low, high = ticks[0], ticks[-1]
     left, right = _NAMES, WIDTH - _NUMBERS - _EDGE
 
@@ -100,23 +98,7 @@ def _tick(x: float, value: float, bottom: float, with_zero: bool) -> str:
     kind = 'zero' if with_zero and value == 0.0 else 'grid'
     return (f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP}" y2="{bottom}"/>'
             f'<text class="tick" x="{x:.1f}" y="{bottom + 16}">'
-            f'{format(value, "g").replace("-", "−")}</text>')
-
-
-def _ticks(numbers: Sequence[float], with_zero: bool) -> list[float]:
-    """Return the values labelled on the axis, including the picture's ends."""
-    # Imported here because it takes long, and only pages need it.
-    from matplotlib.ticker import MaxNLocator
-    known = [number for number in numbers if math.isfinite(number)]
-    if with_zero or not known:
-        known.append(0.0)
-    low, high = min(known), max(known)
-    size = max(abs(low), abs(high))
-    if high - low <= _NARROWEST * max(size, 1.0):
-        margin = 0.5 * size if size > _NARROWEST else 0.5
-        low, high = low - margin, high + margin
-    ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return [float(np.format_float_positional(tick, 12)) + 0.0 for tick in ticks]
+            f'{tick_text(value)}</text>')
 
 
 _STYLE = Path(__file__).resolve().parent / 'page' / 'summary.css'
@@ -139,27 +121,16 @@ def summary_html(summary: Summary, folder: Path) -> str:
 
     :param folder: folder in which it will be.
     """
-    title = summary_title(summary)
-    sections = [(each.key, each.title, _section(summary, each, folder))
+    sections = [Section(each.key, plain(each.title), _section(summary, each, folder))
                 for each in summary_tables(summary)]
-    sections.append(('measures', 'Measures', _definitions(summary)))
-    links = ''.join(f'<li><a href="#{key}">{plain(words)}</a></li>' for key, words, _ in sections)
-    body = [f'<header><h1>{free(title)}</h1><p class="lead">{free(summary_lead(summary))}</p>'
-            f'{_chips(summary)}</header>',
-            f'<nav aria-label="Parts of the summary"><ul>{links}</ul></nav>', '<main>',
-            *(f'<section id="{key}"><h2>{plain(words)}</h2>{html}</section>'
-              for key, words, html in sections),
-            f'</main><footer><p>crgame_ros {plain(__version__)}</p></footer>']
-    return plain_document(title, '\n'.join(body), _STYLE.read_text(encoding='utf-8'))
-
-
-def _chips(summary: Summary) -> str:
-    facts = {'cells finished': str(summary.cells), 'failed': str(summary.failed),
-             'scenarios': str(summary.scenarios),
-             f'groups by {" × ".join(summary.by)}': str(len(summary.groups)),
-             'baseline': free(summary.baseline or '–')}
-    return '<dl class="chips">' + ''.join(
-        f'<div><dt>{words}</dt><dd>{value}</dd></div>' for words, value in facts.items()) + '</dl>'
+    sections.append(Section('measures', 'Measures', _definitions(summary)))
+    facts = [('cells finished', str(summary.cells)), ('failed', str(summary.failed)),
+             ('scenarios', str(summary.scenarios)),
+             (f'groups by {" × ".join(summary.by)}', str(len(summary.groups))),
+             ('baseline', free(summary.baseline or '–'))]
+    return Page(summary_title(summary), free(summary_lead(summary)), facts, [Article(sections)],
+                f'<p>crgame_ros {plain(__version__)}</p>',
+                _STYLE.read_text(encoding='utf-8')).html()
 
 
 def _section(summary: Summary, content: SummaryTable, folder: Path) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
+from crgame_ros.analysis.report.svg_axis import axis_ticks, tick_text
 from crgame_ros.analysis.report.text import free, note, number, plain, table
 from crgame_ros.analysis.tables.column import Column, FLAG, NUMBER
 from crgame_ros.study.data.study_data import StudyData
@@ -151,8 +152,8 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
     :param words: alternative text of the plot.
     :param digits: decimal places of the means.
     """
-    ticks = _ticks([value for each in conditions for value in (
-        *each.points.values(), each.mean - each.half, each.mean + each.half, each.mean)])
+    ticks = axis_ticks([value for each in conditions for value in (
+        *each.points.values(), each.mean - each.half, each.mean + each.half, each.mean)], 5)
     low, high = ticks[0], ticks[-1]
 
     def y(value: float) -> float:
@@ -161,7 +162,7 @@ def condition_svg(conditions: Sequence[ConditionMean], words: str, digits: int) 
     wide = (WIDTH - _LEFT) / len(conditions)
     marks = [f'<line class="grid" x1="{_LEFT}" x2="{WIDTH}" y1="{y(tick):.1f}" '
              f'y2="{y(tick):.1f}"/><text class="tick" x="{_LEFT - 6}" y="{y(tick) + 4:.1f}">'
-             f'{format(tick, "g").replace("-", "−")}</text>' for tick in ticks]
+             f'{tick_text(tick)}</text>' for tick in ticks]
     # A condition is labelled by its levels, one per line.
     lines = max(each.condition.count('/') + 1 for each in conditions)
     for place, each in enumerate(conditions):
@@ -211,18 +212,6 @@ def _mean_mark(each: ConditionMean, x: float, y: Callable[[float], float]) -> st
 def _fitting(name: str, wide: float) -> str:
     most = max(3, min(_LONGEST_NAME, int(wide / _CHARACTER)))
     return name if len(name) <= most else f'{name[:most - 1]}…'
-
-
-def _ticks(numbers: Sequence[float]) -> list[float]:
-    """Return the values of the axis ticks, including both ends."""
-    from matplotlib.ticker import MaxNLocator
-    known = [number for number in numbers if math.isfinite(number)] or [0.0]
-    low, high = min(known), max(known)
-    if high - low <= 1e-9 * max(abs(low), abs(high), 1.0):
-        margin = 0.5 * max(abs(low), 1.0)
-        low, high = low - margin, high + margin
-    ticks = MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return [float(np.format_float_positional(tick, 12)) + 0.0 for tick in ticks]
 
 
 class ShownMeasure(NamedTuple):

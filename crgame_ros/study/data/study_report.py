@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from crgame_ros.analysis.report.document import plain_document
-from crgame_ros.analysis.report.text import free, note, NOTHING, number, plain, table
+from crgame_ros.analysis.report.document import Article, Page
+from crgame_ros.analysis.report.section import Section
+from crgame_ros.analysis.report.text import free, marked, note, NOTHING, number, plain, table
 from crgame_ros.study.data.condition_section import condition_section
 from crgame_ros.study.data.paper_section import paper_section
 from crgame_ros.study.data.study_data import CountedTrial, StudyData
@@ -41,31 +42,26 @@ def study_html(data: StudyData) -> str:
     """Return the page as HTML."""
     study = data.folder.study
     title = study.title.in_language(study.language) or study.name
-    sections = [('conditions', 'Conditions', condition_section(data)),
-                ('people', 'Who took part', _people(data)),
-                ('troubles', 'Left out, aborted, repeated', _troubles(data)),
-                ('timing', 'Timing of each trial', _timing(data)),
-                ('paper', 'What to report in a paper', paper_section(data))]
-    links = ''.join(f'<li><a href="#{key}">{words}</a></li>' for key, words, _ in sections)
-    body = [f'<header><h1>{free(title)}</h1><p class="lead">study {free(study.name)}</p>'
-            f'{_chips(data)}</header>',
-            f'<nav aria-label="Parts of the report"><ul>{links}</ul></nav>', '<main>',
-            *(f'<section id="{key}"><h2>{words}</h2>{html}</section>'
-              for key, words, html in sections), '</main>']
-    return plain_document(title, '\n'.join(body), _STYLE.read_text(encoding='utf-8'))
+    sections = [
+        Section('conditions', 'Conditions', condition_section(data)),
+        Section('people', 'Who took part', _people(data)),
+        Section('troubles', 'Left out, aborted, repeated', _troubles(data)),
+        Section('timing', 'Timing of each trial', _timing(data)),
+        Section('paper', 'What to report in a paper', paper_section(data))]
+    return Page(title, f'study {free(study.name)}', _facts(data), [Article(sections)],
+                style=_STYLE.read_text(encoding='utf-8')).html()
 
 
-def _chips(data: StudyData) -> str:
+def _facts(data: StudyData) -> list[tuple[str, str]]:
     complete = sum(record.complete for record in data.records)
     planned = sum(row['trials_planned'] for row in _rows(data, 'participants'))
     flagged = sum(trial.row['timing_flag'] for trial in data.trials)
-    facts = {'participants': f'{len(data.records)}', 'of them complete': f'{complete}',
-             'planned': f'{data.folder.study.participants}',
-             'trials that count': f'{len(data.trials)} <small>of {planned}</small>',
-             'without measures': str(len(data.problems)),
-             'beyond a bound of timing': str(flagged)}
-    return '<dl class="chips">' + ''.join(
-        f'<div><dt>{words}</dt><dd>{value}</dd></div>' for words, value in facts.items()) + '</dl>'
+    return [
+        ('participants', f'{len(data.records)}'), ('of them complete', f'{complete}'),
+        ('planned', f'{data.folder.study.participants}'),
+        ('trials that count', f'{len(data.trials)} <small>of {planned}</small>'),
+        ('without measures', str(len(data.problems))),
+        ('beyond a bound of timing', str(flagged))]
 
 
 def _people(data: StudyData) -> str:
@@ -128,8 +124,7 @@ def _timed(trials: Sequence[CountedTrial]) -> Iterator[Sequence[str]]:
     for trial in trials:
         row = trial.row
         reason = row['timing_reason']
-        beyond = f'<strong class="critical">{free(reason)}<span class="sign"> ‼</span></strong>' \
-            if reason else free(row['problem']) if row['problem'] else ''
+        beyond = marked(free(reason), True) if reason else free(row['problem'] or '')
         yield (free(row['participant']), str(row['trial']), free(row['condition']),
                *(_value(row.get(name), factor, digits) for name, _, factor, digits in _TIMES),
                beyond)
