@@ -151,7 +151,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                 pair = extent(agents.width[slot], arrivals.width[theirs]) if owner >= 0 else 1
                 spare = spare_room(agents.width[slot], arrivals.width[theirs])
                 if _has_entered(_into(conflicts, arrivals, mine, pair), agents.speed[slot],
-                                spare):
+                                spare, arrivals.speed[theirs]):
                     continue
                 if owner >= 0 and (stays[owner] or waits_inside(passage, owner)) \
                         and _into(conflicts, arrivals, theirs, pair) > -spare \
@@ -232,17 +232,19 @@ def _out(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> flo
 
 
 @inlined
-def _has_entered(into: float, speed: float, spare: float) -> bool:
+def _has_entered(into: float, speed: float, spare: float, passing: float) -> bool:
     """
     Return whether a vehicle is in a conflict for good.
 
-    It is not if its front is, or halts, where there is room to pass it: who waits before a
-    conflict may stop a little late.
+    It is not if its front is, or halts, where there is room for another to pass: who waits before
+    a conflict may stop a little late. Where the other does not pass, there was no room.
 
     :param into: distance of its front from the conflict [m]
     :param spare: see `spare_room` [m]
+    :param passing: speed of the other [m/s]
     """
-    return bool(into <= 0.0 and into - speed**2 / (2.0 * FIRM) <= -spare)
+    return bool(into <= 0.0 and (passing < QUEUEING
+                                 or into - speed**2 / (2.0 * FIRM) <= -spare))
 
 
 @compiled
@@ -286,7 +288,8 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.priority[n] = conflicts.priority[conflict]
     ahead = (rules.ring if ring else rules.merging) if joins else rules.gap_before
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
-    found.inside[n] = out > 0.0 and _has_entered(into, speed, spare if owner >= 0 else 0.0)
+    found.inside[n] = out > 0.0 and _has_entered(
+        into, speed, spare if owner >= 0 else 0.0, arrivals.speed[mine])
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
     found.courteous[n] = owner >= 0 and into > 2.0 * speed + speed**2 / 3.0
     found.tapers[n] = conflicts.tapers[conflict]
