@@ -166,11 +166,6 @@ def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots:
         if not free[i] or beside < 0 or not math.isfinite(to.cost[destination, beside]):
             continue
         speed, s = agents.speed[slot], agents.s[slot]
-        # An agent that enters a junction by a lane change was not let in.
-        if not to.drops[lane] and _nears_junction(
-                lanes, to, agents, slot, beside, lanes.length[beside] * (
-                    1.0 - s / lanes.length[lane])):
-            continue
         needs, remaining = to.change[destination, lane], to.remaining[destination, lane] - s
         if at.blocked[i] < PREPARE or (needs == side and remaining < PREPARE):
             found.urgency[used] = urgency(min(remaining, at.blocked[i]), speed)
@@ -180,6 +175,11 @@ def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots:
                 or to.remaining[destination, beside] - s > COMMITTED):
             found.urgency[used] = -1.0
         else:
+            continue
+        # An agent that enters a junction by a lane change was not let in.
+        if not to.drops[lane] and _nears_junction(
+                lanes, to, agents, slot, beside, lanes.length[beside] * (
+                    1.0 - s / lanes.length[lane])):
             continue
         found.slots[used], found.side[used], found.lane[used] = slot, side, beside
         found.room[used] = at.blocked[i]

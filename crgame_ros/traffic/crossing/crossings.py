@@ -97,8 +97,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
     for i, slot in enumerate(slots):
         # No agent is let in past another that waits before the same junction.
         stopped[i] = _is_stopped(at, i, passage.hold[i])
-        full[i] = agents.insists_until[slot] <= k and is_full(
-            rules, promised, agents, slot, way, passage, at, i)
+        full[i] = is_full(k, rules, promised, agents, slot, way, passage, at, i)
     # Other agents leave the room behind the junction to an agent that has waited very long.
     first = full & ~stopped
     next_in = first & (agents.waits[slots] > ticks[3])
@@ -115,8 +114,7 @@ def _halts(conflicts: ConflictTable, rules: CrossingRules, ticks: IntArray, dt_s
         if passage.first[i] < 0 or halt[i] < math.inf:
             continue
         # Agents let in before it take room as well.
-        full[i] = full[i] or (agents.insists_until[slot] <= k and is_full(
-            rules, promised, agents, slot, way, passage, at, i))
+        full[i] = full[i] or is_full(k, rules, promised, agents, slot, way, passage, at, i)
         if passage.inside[i] < STARTED and not stopped[i] or _may_enter(
                 rules, ticks, k, agents, passage, meeting, at, stopped, full, i):
             if not waits_inside(passage, i):

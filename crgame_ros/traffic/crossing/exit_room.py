@@ -73,17 +73,18 @@ def promise(promised: Promises, agents: AgentTable, slot: int, way: Ways, step: 
 
 
 @compiled
-def is_full(rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int, way: Ways,
-            passage: Passages, at: Situation, i: int) -> bool:
+def is_full(k: int, rules: CrossingRules, promised: Promises, agents: AgentTable, slot: int,
+            way: Ways, passage: Passages, at: Situation, i: int) -> bool:
     """
     Return whether there is no room for an agent behind its next junction.
 
-    In a roundabout agents close up, so that those behind them get to their exits.
+    In a roundabout agents close up, so that those behind them get to their exits. One that opens a
+    circle of waiting agents moves up in any case.
     """
     step = passage.last[i]
     # Agents that go there through the same lane are leaders and already count in `rear_stop`.
     taken = 0.0
     if 0 <= step < way.depth[i] - 1:
         taken = promised.behind[way.lane[i, step + 1]] - promised.through[way.lane[i, step]]
-    return bool(not passage.ring[i] and at.rear_stop[i] - taken
-                < passage.end[i] + agents.length[slot] + rules.room)
+    return bool(not passage.ring[i] and agents.insists_until[slot] <= k and (
+        at.rear_stop[i] - taken < passage.end[i] + agents.length[slot] + rules.room))

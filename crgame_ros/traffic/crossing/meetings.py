@@ -149,12 +149,11 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     continue
                 # Others may drive beside the middle of their lane.
                 pair = extent(agents.width[slot], arrivals.width[theirs]) if owner >= 0 else 1
-                spare = spare_room(agents.width[slot], arrivals.width[theirs])
-                if _has_entered(_into(conflicts, arrivals, mine, pair), agents.speed[slot],
-                                spare, arrivals.speed[theirs]):
+                if _has_entered(arrivals, mine, theirs, _into(conflicts, arrivals, mine, pair)):
                     continue
                 if owner >= 0 and (stays[owner] or waits_inside(passage, owner)) \
-                        and _into(conflicts, arrivals, theirs, pair) > -spare \
+                        and _into(conflicts, arrivals, theirs, pair) > -spare_room(
+                            agents.width[slot], arrivals.width[theirs]) \
                         and not is_let_in(agents, at.slots[owner], passage, owner,
                                           arrivals.step[theirs]) \
                         and not (conflicts.merges[conflict] and (next_in[owner] or (
@@ -162,8 +161,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     continue
                 if used == len(found.other):
                     found = _grown(found)
-                _compare(conflicts, rules, arrivals, mine, theirs, pair, spare, at.desired, found,
-                         used)
+                _compare(conflicts, rules, arrivals, mine, theirs, pair, at.desired, found, used)
                 used += 1
         found.begin[i + 1] = used
     return found
@@ -232,25 +230,25 @@ def _out(conflicts: ConflictTable, arrivals: Arrivals, n: int, pair: int) -> flo
 
 
 @inlined
-def _has_entered(into: float, speed: float, spare: float, passing: float) -> bool:
+def _has_entered(arrivals: Arrivals, n: int, other: int, into: float) -> bool:
     """
     Return whether a vehicle is in a conflict for good.
 
-    It is not if its front is, or halts, where there is room for another to pass: who waits before
-    a conflict may stop a little late. Where the other does not pass, there was no room.
+    An agent is not if its front is, or halts, where there is room for the other to pass: who waits
+    before a conflict may stop a little late. Where the other does not pass, there was no room.
 
+    :param n: row of its arrival, and of the other's.
     :param into: distance of its front from the conflict [m]
-    :param spare: see `spare_room` [m]
-    :param passing: speed of the other [m/s]
     """
-    return bool(into <= 0.0 and (passing < QUEUEING
-                                 or into - speed**2 / (2.0 * FIRM) <= -spare))
+    if into > 0.0 or arrivals.owner[n] < 0 or arrivals.speed[other] < QUEUEING:
+        return into <= 0.0
+    room = spare_room(arrivals.width[other], arrivals.width[n])
+    return bool(into - arrivals.speed[n]**2 / (2.0 * FIRM) <= -room)
 
 
 @compiled
 def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
-             theirs: int, pair: int, spare: float, desired: FloatArray, found: Meetings,
-             n: int) -> None:
+             theirs: int, pair: int, desired: FloatArray, found: Meetings, n: int) -> None:
     """Write the meeting of two arrivals, with the conflict's extent for both, into row n."""
     owner, conflict = arrivals.owner[theirs], arrivals.conflict[mine]
     into, out = (_into(conflicts, arrivals, theirs, pair), _out(conflicts, arrivals, theirs, pair))
@@ -288,8 +286,7 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.priority[n] = conflicts.priority[conflict]
     ahead = (rules.ring if ring else rules.merging) if joins else rules.gap_before
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
-    found.inside[n] = out > 0.0 and _has_entered(
-        into, speed, spare if owner >= 0 else 0.0, arrivals.speed[mine])
+    found.inside[n] = out > 0.0 and _has_entered(arrivals, theirs, mine, into)
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
     found.courteous[n] = owner >= 0 and into > 2.0 * speed + speed**2 / 3.0
     found.tapers[n] = conflicts.tapers[conflict]
