@@ -99,7 +99,7 @@ class Page:
             f'{_chips(self.facts)}</header>',
             f'<nav aria-label="Parts of the report"><ul>{links}</ul></nav>', '<main>',
             *(article.html() for article in self.articles),
-            f'</main><footer>{self.footer}</footer>'))
+            '</main>' + (f'<footer>{self.footer}</footer>' if self.footer else '')))
         plots = [(f'{article.address(section)}-{plot.key}', plot) for article in self.articles
                  for section in article.sections for plot in section.plots]
         style = f'{(PAGE / "report.css").read_text(encoding="utf-8")}\n{self.style}'

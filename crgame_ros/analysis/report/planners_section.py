@@ -63,7 +63,8 @@ def planners_compared(runs: Sequence[Run], letters: Sequence[str]) -> str:
     drivers = [_Driver(f'{letter}: {_who(run, each)}', each)
                for run, letter in zip(runs, letters, strict=True)
                for each in run.usual_scores.vehicles if each.role != 'human']
-    return _table('How planners drove, the runs side by side', drivers) if drivers else ''
+    return _table('How planners drove, the runs side by side', drivers,
+                  'numbers comparison') if drivers else ''
 
 
 def _who(run: Run, scores: VehicleScores) -> str:
@@ -75,9 +76,9 @@ def _is_whole(drivers: Sequence[_Driver]) -> bool:
     return any(each.scores.commonroad is not None for each in drivers)
 
 
-def _table(caption: str, drivers: Sequence[_Driver]) -> str:
+def _table(caption: str, drivers: Sequence[_Driver], kind: str = 'numbers') -> str:
     return table(caption, ('score', 'unit', *(each.head for each in drivers)), _rows(drivers),
-                 'numbers')
+                 kind)
 
 
 def _rows(drivers: Sequence[_Driver]) -> Iterator[Sequence[str]]:

@@ -137,20 +137,19 @@ def _is_free(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slo
         # brakes instead, so that it does not leave the road.
         return bool(rest > SWERVE_TIME * speed)
     return bool(at.halt[i] >= _no_change(speed)
-                and not _nears_junction(lanes, to, agents, slot, lane, rest))
+                and not _nears_junction(lanes, to, agents, slot, lane, agents.s[slot]))
 
 
 @bare
 def _nears_junction(lanes: LaneTable, to: Destinations, agents: AgentTable, slot: int, lane: int,
-                    rest: float) -> bool:
-    """Return whether an agent on a lane, with a rest of it ahead [m], is near a junction."""
+                    s: float) -> bool:
+    """Return whether a junction is near for an agent on a lane, at an arc length of it [m]."""
     # Short lanelets may lie between a lane and its junction.
-    onto, no_change = lane, _no_change(agents.speed[slot])
-    rest -= lanes.length[lane]
-    while onto >= 0 and rest <= no_change:
+    onto, offset, no_change = lane, -s, _no_change(agents.speed[slot])
+    while onto >= 0 and offset <= no_change:
         if _is_inside(to, agents, slot, onto):
             return True
-        rest += lanes.length[onto]
+        offset += lanes.length[onto]
         onto = to.next[agents.destination[slot], onto]
     return False
 
@@ -178,8 +177,7 @@ def _list(k: int, lanes: LaneTable, to: Destinations, agents: AgentTable, slots:
             continue
         # An agent that enters a junction by a lane change was not let in.
         if not to.drops[lane] and _nears_junction(
-                lanes, to, agents, slot, beside, lanes.length[beside] * (
-                    1.0 - s / lanes.length[lane])):
+                lanes, to, agents, slot, beside, s * lanes.length[beside] / lanes.length[lane]):
             continue
         found.slots[used], found.side[used], found.lane[used] = slot, side, beside
         found.room[used] = at.blocked[i]
