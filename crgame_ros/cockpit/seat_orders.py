@@ -5,7 +5,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from crgame_ros.driver.seat_state import after, GAME_DRIVER
 from crgame_ros.driver.source import COCKPIT
+from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatDemand, SeatEntry
 
 # Interval of repetition [s]: an order sent while the simulation loads another game is lost.
@@ -74,15 +76,23 @@ def _is_so(demand: SeatDemand, entry: SeatEntry | None) -> bool:
     """Return whether an order is fulfilled."""
     if entry is None:
         return False
-    drives = entry.source == COCKPIT
-    if demand.source == COCKPIT:
-        return drives and (demand.person is None or (
-            entry.here and entry.person is not None and entry.person.id == demand.person.id))
-    # If the game's driver is the cockpit, a seat that is given back stays the cockpit's, empty.
-    return not drives or (entry.driver == COCKPIT and entry.person is None)
+    then = _after(demand, entry)
+    return then is not None and _driver(then) == _driver(entry)
 
 
 def _is_in_vain(demand: SeatDemand, entry: SeatEntry) -> bool:
-    """Return whether a person at another cockpit has taken the seat first."""
-    return demand.source == COCKPIT and demand.person is not None and entry.person is not None \
-        and entry.here and entry.person.id not in (demand.person.id, demand.displaced)
+    """Return whether an order is refused, because a person at another cockpit was first."""
+    return _after(demand, entry) is None
+
+
+def _after(demand: SeatDemand, entry: SeatEntry) -> SeatEntry | None:
+    try:
+        return after(entry, demand, COCKPIT if entry.driver == COCKPIT else GAME_DRIVER)
+    except InputError:
+        return None
+
+
+def _driver(entry: SeatEntry) -> tuple[bool, bool, str | None]:
+    """Return what an order about a seat decides: people may change their names meanwhile."""
+    return (entry.source == COCKPIT, entry.here,
+            None if entry.person is None else entry.person.id)

@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING
 
 from crgame_ros.driver.device_map import load_device_map
+from crgame_ros.driver.seat_state import GAME_DRIVER
 from crgame_ros.driver.source import (
     DriverSource,
     EvdevDriver,
@@ -26,7 +27,6 @@ from crgame_ros.ros.live_driver import live_driver
 from crgame_ros.ros.live_force import LiveForce
 from crgame_ros.ros.messages import from_time, to_joy, to_time
 from crgame_ros.ros.node_main import run_node, StopFlag
-from crgame_ros.ros.seat import GAME_DRIVER
 from crgame_ros.ros.spinning import PromptNode, spin_promptly
 from crgame_ros.ros.trusted_code import TrustedCode
 from diagnostic_msgs.msg import DiagnosticStatus

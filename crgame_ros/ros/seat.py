@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """One vehicle's seat in a live run: the latest command of its driver."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from crgame_ros.driver.seat_state import GAME_DRIVER, PLANNER, REPLAY
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.driver.watchdog import SeatWatchdog
 from crgame_ros.errors import InputError
@@ -16,11 +18,6 @@ if TYPE_CHECKING:  # The driver's process does not need it, and it takes long to
     from crgame_ros.driver.replay_driver import ReplayDriver
 
 NS = 1e-9
-# The game's own driver, an AV's planner, and the recorded take-over of an AV; any other source
-# names its own driver.
-GAME_DRIVER = 'game'
-PLANNER = 'planner'
-REPLAY = 'replay'
 # Commands of its driver that a seat reads in one cycle.
 COMMAND_DEPTH = 10
 # A page with a driver's hands on the controls publishes that every 50 ms [ns].
@@ -84,12 +81,17 @@ class Seat:
         return REPLAY if self.taken_over_again and self.source == PLANNER else self.source
 
     @property
+    def state(self) -> SeatEntry:
+        """Return who has the seat, by orders."""
+        if self.tenant is None:
+            return SeatEntry(self.source, self.driver)
+        return SeatEntry(self.source, self.driver, self.tenant.person, self.tenant.here,
+                         self.tenant.ready)
+
+    @property
     def entry(self) -> SeatEntry:
         """Return its entry of `/seats`."""
-        if self.tenant is None:
-            return SeatEntry(self.published_source, self.driver)
-        return SeatEntry(self.published_source, self.driver, self.tenant.person,
-                         self.tenant.here, self.tenant.ready)
+        return replace(self.state, source=self.published_source)
 
     def obey(self, source: str, now_ns: int) -> None:
         """

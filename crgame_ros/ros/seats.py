@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, MutableMapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from crgame_ros.driver.source import COCKPIT, parse_source
+from crgame_ros.driver.seat_state import after, home_of, PLANNER, RETURNING
+from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import (
     DRIVERS,
@@ -14,13 +15,12 @@ from crgame_ros.game.seat_documents import (
     DrivingSpells,
     MAX_SOURCE_LENGTH,
     ORDER,
-    SeatDemand,
     SeatOccupant,
     SeatPerson,
     SEATS,
 )
 from crgame_ros.ros.endpoints import Endpoints, PolledSubscription, SHARED_DEPTH
-from crgame_ros.ros.seat import GAME_DRIVER, PLANNER, Seat
+from crgame_ros.ros.seat import Seat
 from crgame_ros.vehicle.driver_command import DriverCommand
 
 if TYPE_CHECKING:  # The driver's process needs neither, and they take half a second to load.
@@ -100,7 +100,7 @@ class Seats:
         self._sources = sources
         self._tenants = {} if tenants is None else tenants
         self.humans = [
-            Seat(human.id, human.driver, _home(human.driver),
+            Seat(human.id, human.driver, home_of(human.driver),
                  endpoints.polled('/<v>/driver_command', human.id, depth=SHARED_DEPTH,
                                   strict=True),
                  clock_offset_ns, drivers.get(human.id)) for human in setup.humans]
@@ -194,60 +194,18 @@ class Seats:
         if seat is None:
             raise InputError(f'there is no seat {demand.seat[:MAX_SOURCE_LENGTH]!r}', ORDER.topic,
                              'it has ' + ', '.join(item.id for item in self.all))
-        before = (seat.source, seat.tenant)
-        if demand.source is None:
-            self._seat_person(seat, demand)
-        elif demand.source == COCKPIT:
-            self._assign_to_cockpit(seat, demand, now_ns)
-        else:
-            self._assign(seat, demand.source, now_ns)
-        return (seat.source, seat.tenant) != before
-
-    def _assign(self, seat: Seat, source: str, now_ns: int) -> None:
-        """Assign a seat to another source."""
-        if source == PLANNER != seat.home:
-            raise InputError(f'{seat.id} has no planner', ORDER.topic, 'give game')
-        if source in (GAME_DRIVER, PLANNER):
+        before = seat.state
+        now = after(before, demand, seat.home)
+        if demand.source in RETURNING:
             # Returned for good: in the next game its own driver has the seat.
-            source = seat.home
             self._sources.pop(seat.id, None)
+        elif demand.source is not None and (before.source, now.source) != (COCKPIT, COCKPIT):
+            self._sources[seat.id] = now.source
+        if now.occupant is None:
+            self._tenants.pop(seat.id, None)
         else:
-            self._sources[seat.id] = source
-        self._tenants.pop(seat.id, None)
-        seat.tenant = None
-        if source != seat.source:
-            seat.obey(source, now_ns)
-
-    def _assign_to_cockpit(self, seat: Seat, demand: SeatDemand, now_ns: int) -> None:
-        """Assign a seat to a person at a page unless it is already occupied."""
-        sits = None if seat.tenant is None else seat.tenant.person
-        taker = demand.person
-        if sits is not None and (taker is None or sits.id not in (taker.id, demand.displaced)):
-            raise InputError(f'{sits.name or "another person"} has {seat.id}', ORDER.topic,
-                             'ask for it')
-        if seat.source != COCKPIT:
-            self._assign(seat, COCKPIT, now_ns)
-        if taker is not None:
-            same = seat.tenant is not None and seat.tenant.person.id == taker.id
-            self._settle(seat, replace(seat.tenant, person=taker, here=True)
-                         if same and seat.tenant is not None else SeatOccupant(taker))
-
-    def _seat_person(self, seat: Seat, demand: SeatDemand) -> None:
-        """Update the person in a seat."""
-        tenant = seat.tenant
-        if tenant is None:
-            raise InputError(f'no person has {seat.id}', ORDER.topic, 'claim it')
-        if demand.left is not None and demand.left == tenant.person.id:
-            self._settle(seat, replace(tenant, here=False, ready=False))
-        elif demand.person is not None and demand.person.id == tenant.person.id:
-            self._settle(seat, replace(
-                tenant, person=demand.person,
-                ready=tenant.ready if demand.ready is None else demand.ready))
-
-    def _settle(self, seat: Seat, tenant: SeatOccupant) -> None:
-        seat.tenant = self._tenants[seat.id] = tenant
-
-
-def _home(driver: str) -> str:
-    """Return the source name of the game's driver."""
-    return COCKPIT if parse_source(driver).kind == COCKPIT else GAME_DRIVER
+            self._tenants[seat.id] = now.occupant
+        seat.tenant = now.occupant
+        if now.source != before.source:
+            seat.obey(now.source, now_ns)
+        return now != before

@@ -6,17 +6,23 @@ import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
 import { recall, remember } from '../../crgame_ros/cockpit/page/js/panels/memory.js';
-import { createTabs } from '../../crgame_ros/cockpit/page/js/panels/tabs.js';
+import { addPanels, createTabs } from '../../crgame_ros/cockpit/page/js/panels/tabs.js';
 import { click, openPage, send } from './dom_support.mjs';
 
 const NAMES = ['drive', 'history', 'scenario', 'events', 'criticality', 'timing', 'runs'];
 const PAGE = `<div id="bar-end"></div><aside id="panels"><div id="tabs" role="tablist"></div>
-  ${NAMES.map((name) => `<section id="panel-${name}" role="tabpanel">
-    <button id="in-${name}">x</button></section>`).join('')}</aside><p id="else">text</p>`;
+  </aside><p id="else">text</p>`;
 
+const find = (selector) => document.querySelector(selector);
 let root, panels;
 
-beforeEach(() => openPage(PAGE));
+beforeEach(() => {
+  openPage(PAGE);
+  addPanels(find('#panels'));
+  const button = document.createElement('button');
+  button.id = 'in-drive';
+  find('#panel-drive').append(button);
+});
 
 /** Open the page with what it has remembered. */
 function begin(kept = {}) {
@@ -27,7 +33,6 @@ function begin(kept = {}) {
   panels = createTabs(root);
 }
 
-const find = (selector) => document.querySelector(selector);
 const shown = () => NAMES.filter((name) => !find(`#panel-${name}`).hidden);
 const selected = () => NAMES.filter(
   (name) => find(`#tab-${name}`).getAttribute('aria-selected') === 'true');

@@ -21,6 +21,7 @@ from crgame_ros.cockpit.page_messages import (
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.cockpit.seat_orders import SeatOrders
 from crgame_ros.cockpit.seat_table import SeatTable
+from crgame_ros.driver.seat_state import GAME_DRIVER
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.game.seat_documents import SeatDemand, SeatPerson, SEATS
@@ -28,7 +29,6 @@ from crgame_ros.nodes.cockpit.feed import CockpitFeed
 from crgame_ros.nodes.cockpit.orders import CockpitOrders
 from crgame_ros.ros.endpoints import Endpoints
 from crgame_ros.ros.messages import to_joy
-from crgame_ros.ros.seat import GAME_DRIVER
 from crgame_ros.vehicle.driver_command import DriverCommand
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node

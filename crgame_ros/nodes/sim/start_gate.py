@@ -5,11 +5,11 @@
 from collections.abc import Callable, Iterable, Sequence
 import math
 
+from crgame_ros.driver.seat_state import GAME_DRIVER
 from crgame_ros.nodes.sim.control import SimControl
 from crgame_ros.nodes.sim.inputs import SimInputs
 from crgame_ros.nodes.sim.outputs import SimOutputs
 from crgame_ros.ros.heard_topics import HeardTopics
-from crgame_ros.ros.seat import GAME_DRIVER
 from crgame_ros.ros.seats import Seats
 from crgame_ros.simulation.engine import Simulation, StepResult
 

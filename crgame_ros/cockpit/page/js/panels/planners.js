@@ -39,7 +39,7 @@ const ERRORS = [
 /**
  * Make the table.
  *
- * @param {HTMLElement} root #planners
+ * @param {HTMLElement} root #panel-timing
  * @param {Store} store
  * @param {Connection} connection
  */

@@ -3,6 +3,7 @@
 /** Buttons that save what the page shows: the plots, the map or the 3D view, and the tables. */
 
 import { element, part } from '../dom.js';
+import { PANELS } from '../parts.js';
 import { toolButton } from '../world/toolbar.js';
 import { picturesOf, rasterised } from './chart_picture.js';
 import { errorText } from './format.js';
@@ -11,8 +12,6 @@ import { csvOf, fileName, rowsOf, save } from './saved_file.js';
 /** @import { HistoryPanel } from './history.js' */
 /** @import { Store } from '../store.js' */
 
-const TABLES = ['timing', 'criticality'];
-const PLOTS = ['history', 'criticality'];
 const DOWN = 'M12 4v11M7 10l5 5 5-5M4 17v3h16v-3';
 
 /**
@@ -39,7 +38,7 @@ export function createSaving(root, store) {
         text: `The plots cannot be saved: ${errorText(error)}` });
     }
   };
-  for (const name of PLOTS) {
+  for (const name of panelsThatSave('plots')) {
     const choice = element('select', { 'aria-label': 'Save the plots', title: 'Save the plots',
       on: { change: () => {
         const format = choice.value;
@@ -49,13 +48,21 @@ export function createSaving(root, store) {
       ([value, text]) => element('option', { value, text })));
     part(root, `panel-${name}`).querySelector('.history-bar')?.append(choice);
   }
-  for (const name of TABLES) {
+  for (const name of panelsThatSave('tables')) {
     const panel = part(root, `panel-${name}`);
     panel.append(element('button', { type: 'button', 'data-action': 'save-tables',
       text: 'Save the tables as CSV', on: { click: () => saveTables(panel, name) } }));
   }
   addViewButton(store);
   return { savePlots };
+}
+
+/**
+ * @param {'plots'|'tables'} what
+ * @returns {string[]} their names
+ */
+function panelsThatSave(what) {
+  return PANELS.filter(({ saves }) => saves?.includes(what)).map(({ name }) => name);
 }
 
 /**

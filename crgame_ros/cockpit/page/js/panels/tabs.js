@@ -3,15 +3,22 @@
 /** The panels at the right: their tabs, their width, and collapsing them. */
 
 import { element, part } from '../dom.js';
+import { PANELS } from '../parts.js';
 import { icon } from './icons.js';
 import { recall, remember } from './memory.js';
 
-const NAMES = [
-  ['drive', 'Drive'], ['history', 'History'], ['scenario', 'Scenario'], ['events', 'Events'],
-  ['criticality', 'Criticality'], ['timing', 'Timing'], ['runs', 'Runs'],
-];
 const NARROWEST_REM = 22;
 const WIDEST_SHARE = 0.6;
+
+/**
+ * Add the panels, which are empty and hidden.
+ *
+ * @param {HTMLElement} root aside#panels
+ */
+export function addPanels(root) {
+  root.append(...PANELS.map(({ name }) => element('section', {
+    id: `panel-${name}`, class: 'panel', role: 'tabpanel', hidden: true })));
+}
 
 /**
  * Make the tabs.
@@ -36,7 +43,7 @@ export function createTabs(root) {
     },
   };
   // No arrow keys here, unlike in other tab lists: they steer the car.
-  for (const [name, label] of NAMES) {
+  for (const { name, label } of PANELS) {
     const open = () => {
       collapse(root, false);
       panels.show(name);
@@ -50,7 +57,7 @@ export function createTabs(root) {
     list.append(tab);
   }
   const first = recall('panel');
-  panels.show(tabs.has(first) ? first : NAMES[0][0]);
+  panels.show(tabs.has(first) ? first : PANELS[0].name);
   addCollapse(root);
   addHandle(root);
   releaseFocus(document);

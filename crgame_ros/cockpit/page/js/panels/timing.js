@@ -71,7 +71,7 @@ const MORE = [
 /**
  * Make the figures.
  *
- * @param {HTMLElement} root #timekeeping
+ * @param {HTMLElement} root #panel-timing
  * @param {Store} store
  */
 export function createTiming(root, store) {
