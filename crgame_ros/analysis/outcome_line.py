@@ -5,7 +5,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.scores.vehicle import VehicleScores
 from crgame_ros.recording.plan_outcome import plans_of_report
 from crgame_ros.timing.metrics import slowness
@@ -42,7 +42,7 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
     found = () if criticality is None else criticality.report()
     worst = [each.worst['ttc'].value for each in found if 'ttc' in each.worst]
     if worst:
-        parts.append(f'least TTC {min(worst):.2f} s')
+        parts.append(f'{MEASURES["ttc"].extreme} {min(worst):.2f} s')
     plans = plans_of_report(outcome).values()
     due = sum(found.due for found in plans)
     if due:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from crgame_ros.analysis.counterfactual import Alternative
-from crgame_ros.analysis.criticality.criticality import Criticality
+from crgame_ros.analysis.criticality.criticality import Criticality, MEASURES
 from crgame_ros.analysis.measure_command import HEAD, replay_rows
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
 from crgame_ros.analysis.report.story_section import moment_image
@@ -14,7 +14,8 @@ from crgame_ros.analysis.report.text import free, NOTHING, number, share, table
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.vehicle.state import StateColumn
 
-_HEAD = ('', 'driven by', 'greatest speed [m/s]', 'least TTC [s]', 'least distance [m]',
+_SHOWN = ('ttc', 'min_distance')
+_HEAD = ('', 'driven by', 'greatest speed [m/s]', *(MEASURES[name].head for name in _SHOWN),
          'contacts', 'plans accepted')
 
 
@@ -40,7 +41,7 @@ def _rows(run: Run) -> Iterator[Sequence[str]]:
     drivers = {item.id: item.driver for item in run.game.humans}
     drivers |= {item.id: item.planner for item in run.game.avs}
     for place, (name, found) in enumerate(run.vehicle_criticality.items()):
-        worst = [found.worst.get(key) for key in ('ttc', 'min_distance')]
+        worst = [found.worst.get(key) for key in _SHOWN]
         touched = None if run.contacts is None else sum(
             name in (item['vehicle'], item['with']) for item in run.contacts)
         answers = run.answers.get(name)

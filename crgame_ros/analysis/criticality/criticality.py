@@ -51,6 +51,9 @@ class Measure(NamedTuple):
     :param undefined: the value where there is nothing to measure.
     :param label: for people.
     :param definition: one sentence.
+    :param short: for people who know it, of the few that are plotted, compared and averaged.
+    :param most: greater values count as this one in means: they result from speeds that are almost
+        equal or gaps that are almost closed.
     """
 
     unit: str
@@ -58,11 +61,23 @@ class Measure(NamedTuple):
     undefined: float
     label: str
     definition: str
+    short: str = ''
+    most: float = math.inf
 
     @property
     def symbol(self) -> str:
         """Return the unit as people write it."""
         return unit_symbol(self.unit)
+
+    @property
+    def extreme(self) -> str:
+        """Return the name of its most critical value."""
+        return f'{"least" if self.worst < 0 else "greatest"} {self.short}'
+
+    @property
+    def head(self) -> str:
+        """Return the name of its most critical value, with the unit, as the head of a table."""
+        return f'{self.extreme} [{self.symbol}]'
 
     def matters(self, value: float) -> bool:
         """Return whether a value is worth telling: longer times come from equal speeds."""
@@ -72,24 +87,27 @@ class Measure(NamedTuple):
 # In the order of the columns of `TickMeasures.values`.
 MEASURES = {
     'gap': Measure('m', -1, math.nan, 'Gap to the leader',
-                   "from the subject's front to the leader's rear along its own path"),
+                   "from the subject's front to the leader's rear along its own path", 'gap'),
     'time_gap': Measure('s', -1, math.inf, 'Time gap',
                         "gap divided by the subject's speed"),
     'thw': Measure('s', -1, math.inf, 'Time headway (THW)',
-                   "time until the subject's front is where the leader's rear is now"),
+                   "time until the subject's front is where the leader's rear is now", 'THW',
+                   20.0),
     'ttc': Measure('s', -1, math.inf, 'Time to collision (TTC)',
-                   'gap divided by the closing speed along the path'),
+                   'gap divided by the closing speed along the path', 'TTC', 20.0),
     'ttc_a': Measure('s', -1, math.inf, 'TTC with accelerations',
                      'the same where each keeps its acceleration until it stands'),
     'drac': Measure('m/s^2', 1, 0.0, 'Deceleration to avoid a crash (DRAC)',
-                    'half the squared closing speed divided by the gap'),
+                    'half the squared closing speed divided by the gap', 'DRAC', 20.0),
     'a_req': Measure('m/s^2', -1, 0.0, 'Required acceleration',
                      'constant acceleration that just avoids contact'),
     'ttc_2d': Measure('s', -1, math.inf, 'TTC in the plane',
                       'time until footprints touch that keep velocity and yaw'),
     'min_distance': Measure('m', -1, math.nan, 'Distance',
-                            'distance of the footprints'),
+                            'distance of the footprints', 'distance'),
 }
+# Those that are plotted, compared and averaged.
+CHIEF = {name: measure for name, measure in MEASURES.items() if measure.short}
 COLUMN = {name: column for column, name in enumerate(MEASURES)}
 UNDEFINED = np.array([measure.undefined for measure in MEASURES.values()])
 _OF_LEADER = COLUMN['ttc_2d']

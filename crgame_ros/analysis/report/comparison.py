@@ -5,10 +5,10 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from crgame_ros.analysis.criticality.criticality import MEASURES
+from crgame_ros.analysis.criticality.criticality import CHIEF, MEASURES
 from crgame_ros.analysis.report.planners_section import planners_compared
 from crgame_ros.analysis.report.run_section import title_of
-from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, PLOTTED, Section
+from crgame_ros.analysis.report.section import Dash, Plot, PlotLine, Section
 from crgame_ros.analysis.report.story_section import moment
 from crgame_ros.analysis.report.text import free, marked, NOTHING, number, share, table
 from crgame_ros.analysis.runs.run import Run
@@ -19,8 +19,6 @@ _COLOURS = ('human-0', 'av-0', 'av-2', 'human-2', 'human-1', 'av-1')
 _DASHES: tuple[Dash, ...] = ('solid', 'dash', 'dot')
 # More lines in one plot are unreadable.
 _MOST_LINES = 18
-_COMPARED = {'ttc': 'least TTC [s]', 'thw': 'least THW [s]', 'gap': 'least gap [m]',
-             'drac': 'greatest DRAC [m/s²]', 'min_distance': 'least distance [m]'}
 
 
 def comparison_section(runs: Sequence[Run]) -> Section:
@@ -48,8 +46,8 @@ def _rows() -> Iterator[tuple[str, Callable[[Run], str]]]:
         f'{item.id} {free(item.planner)}' for item in run.log.game.avs) or NOTHING
     yield 'seed', lambda run: str(run.log.game.seed)
     yield 'length [s]', lambda run: number(float(run.times_s[-1]), 1)
-    for name, words in _COMPARED.items():
-        yield words, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
+    for name, measure in CHIEF.items():
+        yield measure.head, lambda run, name=name: worst_of_all(run, name)  # type: ignore[misc]
     yield 'time below the threshold of TTC [s]', lambda run: number(sum(
         each.exposures['tet_s'] for each in run.usual_criticality.report()))
     yield 'least PET [s]', _least_pet
@@ -101,7 +99,7 @@ def _latency(run: Run) -> str:
 
 
 def _plots(runs: Sequence[Run]) -> Iterator[Plot]:
-    units = {name: MEASURES[name].symbol for name in PLOTTED}
+    units = {name: MEASURES[name].symbol for name in CHIEF}
     yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
         :, i, StateColumn.SPEED], None)
     for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),

@@ -5,6 +5,7 @@
 from collections.abc import Iterator, Sequence
 
 from crgame_ros.analysis.criticality.criticality import (
+    CHIEF,
     EXPOSURES,
     MEASURES,
     VehicleCriticality,
@@ -19,7 +20,6 @@ from crgame_ros.analysis.report.section import (
     Plot,
     PlotLimit,
     PlotLine,
-    PLOTTED,
     Section,
 )
 from crgame_ros.analysis.report.story_section import moment
@@ -101,12 +101,12 @@ def _plots(run: Run, limits: Thresholds) -> Iterator[Plot]:
     lines_at = {'ttc': (PlotLimit(limits.ttc_s, 'critical below'),),
                 'drac': (PlotLimit(limits.drac, 'critical above'),),
                 'min_distance': (PlotLimit(0.0, 'contact'),), 'gap': (PlotLimit(0.0, 'contact'),)}
-    for name in PLOTTED:
+    for name, measure in CHIEF.items():
         values = run.course[name]
         if not np.isfinite(values).any():
             continue
-        unit = MEASURES[name].symbol
-        yield Plot(name.replace('_', '-'), MEASURES[name].label, unit, tuple(
+        unit = measure.symbol
+        yield Plot(name.replace('_', '-'), measure.label, unit, tuple(
             PlotLine(item.id, run.times_s, values[i], colours_of(run)[item.id], dash_of(item.role))
             for i, item in enumerate(run.log.vehicles)), lines_at.get(name, ()),
             bounds=_bounds(name, unit, values, limits))

@@ -5,6 +5,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from crgame_ros.analysis.criticality.criticality import MEASURES
 from crgame_ros.analysis.report.comparison import (
     accepted,
     comparison_section,
@@ -77,9 +78,8 @@ def _facts(run: Run) -> Iterator[tuple[str, str]]:
         yield 'contacts', str(len(contacts))
     if run.outcome is not None:
         yield 'violations', str(run.outcome['drivability']['violations'])
-    yield 'least TTC [s]', worst_of_all(run, 'ttc')
-    yield 'least distance [m]', worst_of_all(run, 'min_distance')
-    yield 'greatest DRAC [m/s²]', worst_of_all(run, 'drac')
+    for name in ('ttc', 'min_distance', 'drac'):
+        yield MEASURES[name].head, worst_of_all(run, name)
     if run.log.game.avs and run.outcome is not None:
         yield 'plans accepted', accepted(run).partition(' (')[0]
     if run.timing is not None:

@@ -10,8 +10,6 @@ from crgame_ros.game.objects import Role
 import numpy as np
 from numpy.typing import NDArray
 
-# Measures that are plotted over time.
-PLOTTED = ('gap', 'ttc', 'thw', 'drac', 'min_distance')
 # Colours of vehicles by role, in order; the page's style declares them.
 _COLOURS = {Role.HUMAN: ('human-0', 'human-1', 'human-2'),
             Role.AUTONOMOUS: ('av-0', 'av-1', 'av-2')}

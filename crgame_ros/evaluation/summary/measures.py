@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import math
 from typing import Literal, NamedTuple
 
-from crgame_ros.analysis.criticality.criticality import EXPOSURES
+from crgame_ros.analysis.criticality.criticality import CHIEF, EXPOSURES
 from crgame_ros.analysis.criticality.criticality import MEASURES as CRITICALITY
 from crgame_ros.analysis.criticality.thresholds import USUAL
 from crgame_ros.analysis.tables.column import FLAG, INTEGER, NUMBER
@@ -137,14 +137,11 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
     # All AVs count in its mean; in that of the least TTC only those that approached a leader.
     SummaryMeasure('inverse_ttc', 'greatest 1/TTC', 'max_inverse_ttc', -1, least=0.001),
-    SummaryMeasure('worst_ttc', 'least TTC', 'worst_ttc', 1, most=20.0,
-                   what='least TTC of the AVs that approached a leader; greater ones count as 20'),
-    SummaryMeasure('worst_thw', 'least THW', 'worst_thw', 1, most=20.0),
+    *(SummaryMeasure(f'worst_{name}', each.extreme, f'worst_{name}', -each.worst, most=each.most)
+      for name, each in CHIEF.items()),
     SummaryMeasure('time_gap', 'median time gap', 'time_gap_median_s', 1),
     SummaryMeasure('time_gap_below_1s', 'time with a time gap below 1 s', 'time_gap_below_1s',
                    -1),
-    SummaryMeasure('worst_min_distance', 'least distance', 'worst_min_distance', 1),
-    SummaryMeasure('worst_drac', 'greatest DRAC', 'worst_drac', -1, most=20.0),
     SummaryMeasure('worst_pet_s', 'least PET', 'worst_pet_s', 1),
     *(SummaryMeasure(name, each.told(USUAL).definition, name, -1)
       for name, each in EXPOSURES.items()),

@@ -17,7 +17,9 @@ from crgame_ros.traffic.crossing.junctions import (
 )
 from crgame_ros.traffic.crossing.meetings import (
     BoolArray,
+    can_let_go,
     CrossingRules,
+    GENTLE,
     is_let_in,
     meet,
     Meetings,
@@ -32,10 +34,8 @@ import numpy as np
 
 # An agent nearer than this to its waiting place is the first there [m].
 AT_LINE = 3.0
-# An agent that can halt with this braking lets another go that has waited very long [m/s^2].
-MERCY = 1.5
 # An agent that opens a circle of waiting agents moves up by at least this [m].
-MOVES_UP = 3.0
+MOVES_UP = 2.0
 # A grant ends this far behind its junction [m].
 PASSED = 1.0
 
@@ -148,7 +148,7 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
 @compiled
 def _is_near(speed: float, hold: float) -> bool:
     """Return whether a junction is so near that an agent asks to be let in."""
-    return hold < 10.0 + 1.5 * speed + speed * speed / (2.0 * MERCY)
+    return hold < 10.0 + 1.5 * speed + speed * speed / (2.0 * GENTLE)
 
 
 @compiled
@@ -234,7 +234,6 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
     if at.stop_sign[i] and (agents.waits[slot] < ticks[2] or speed >= STANDING
                             or passage.hold[i] >= 4.0):
         return False
-    easily = speed**2 < 2.0 * MERCY * passage.hold[i]
     insists = agents.insists_until[slot] > k
     for n in range(meeting.begin[i], meeting.begin[i + 1]):
         if insists and meeting.inside[n] and meeting.into[n] > BEFORE + MOVES_UP:
@@ -242,7 +241,8 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
             continue
         if meeting.step[n] > passage.granted[i] and (
                 _yields(ticks, k, agents, passage, meeting, at, i, n)
-                or (easily and _has_mercy(ticks, k, agents, meeting, at, i, n))):
+                or (can_let_go(meeting.into[n], speed)
+                    and _has_mercy(ticks, k, agents, meeting, at, i, n))):
             other = meeting.other[n]
             agents.blocker[slot] = at.slots[other] if other >= 0 else other
             return False

@@ -19,6 +19,8 @@ BoolArray = NDArray[np.bool_]
 
 # Acceleration of a fast agent towards a conflict, and of a slow one out of it [m/s^2].
 HURRY, TIMID = 1.8, 0.7
+# A vehicle lets another go first that waits, if it can halt with this braking after 2 s [m/s^2].
+GENTLE = 1.5
 # In a roundabout, an agent above this share of the speed that the road allows drives freely.
 FREELY = 0.85
 
@@ -246,6 +248,17 @@ def _has_entered(arrivals: Arrivals, n: int, other: int, into: float) -> bool:
     return bool(into - arrivals.speed[n]**2 / (2.0 * FIRM) <= -room)
 
 
+@inlined
+def can_let_go(into: float, speed: float) -> bool:
+    """
+    Return whether a vehicle can slow down gently, so that another goes first at a conflict.
+
+    :param into: distance of its front from the conflict [m]
+    :param speed: [m/s]
+    """
+    return into > 2.0 * speed + speed**2 / (2.0 * GENTLE)
+
+
 @compiled
 def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
              theirs: int, pair: int, desired: FloatArray, found: Meetings, n: int) -> None:
@@ -278,6 +291,9 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
         # In a bend it is no faster than the bend allows.
         late = max(time_to(clear, speed, TIMID, max(0.8 * desired[owner], 2.0)),
                    clear / arrivals.pace[theirs])
+        if joins and clear < 0.0:
+            # It has been ahead for that time.
+            late = clear / max(speed, 1.0)
     there = time_to(here, arrivals.speed[mine], HURRY, desired[i])
     gone = slower + time_to(leave, arrivals.speed[mine], rules.acceleration,
                             min(desired[i], arrivals.pace[mine]))
@@ -288,5 +304,5 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
     found.inside[n] = out > 0.0 and _has_entered(arrivals, theirs, mine, into)
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
-    found.courteous[n] = owner >= 0 and into > 2.0 * speed + speed**2 / 3.0
+    found.courteous[n] = owner >= 0 and can_let_go(into, speed)
     found.tapers[n] = conflicts.tapers[conflict]

@@ -12,10 +12,10 @@ import re
 from typing import Any
 
 from crgame_ros.analysis.behaviour.measures import MEASURES
+from crgame_ros.analysis.criticality.criticality import CHIEF
 from crgame_ros.analysis.report.driving_section import driving_section
 from crgame_ros.analysis.report.file import report_html
 from crgame_ros.analysis.report.planners_section import planners_section
-from crgame_ros.analysis.report.section import PLOTTED
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import MEASURES as MEASURES_OF_SCORES
 from crgame_ros.analysis.scores.run_scores import RunScores, scores_of
@@ -133,7 +133,7 @@ def _numbers(text: str) -> np.ndarray:
 def test_the_course_agrees_with_the_worst(run: Run) -> None:
     """The plotted line of a measure has its worst value at its time."""
     for i, vehicle in enumerate(run.usual_criticality.report()):
-        for name in PLOTTED:
+        for name in CHIEF:
             known = vehicle.worst.get(name)
             values = run.course[name][i]
             assert np.isfinite(values).any() == (known is not None)
