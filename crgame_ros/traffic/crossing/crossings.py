@@ -17,12 +17,12 @@ from crgame_ros.traffic.crossing.junctions import (
 )
 from crgame_ros.traffic.crossing.meetings import (
     BoolArray,
-    can_let_go,
     CrossingRules,
     GENTLE,
     is_let_in,
     meet,
     Meetings,
+    REACTION,
     Situation,
 )
 from crgame_ros.traffic.fleet.agents import Agents, AgentTable, FREE, NONE
@@ -147,8 +147,8 @@ def _grant(k: int, agents: AgentTable, slot: int, way: Ways, passage: Passages, 
 
 @compiled
 def _is_near(speed: float, hold: float) -> bool:
-    """Return whether a junction is so near that an agent asks to be let in."""
-    return hold < 10.0 + 1.5 * speed + speed * speed / (2.0 * GENTLE)
+    """Return whether a junction is so near that an agent asks to be let in, or lets others in."""
+    return hold < 10.0 + REACTION * speed + speed * speed / (2.0 * GENTLE)
 
 
 @compiled
@@ -241,8 +241,7 @@ def _may_enter(rules: CrossingRules, ticks: IntArray, k: int, agents: AgentTable
             continue
         if meeting.step[n] > passage.granted[i] and (
                 _yields(ticks, k, agents, passage, meeting, at, i, n)
-                or (can_let_go(meeting.into[n], speed)
-                    and _has_mercy(ticks, k, agents, meeting, at, i, n))):
+                or _has_mercy(ticks, k, agents, meeting, at, i, n)):
             other = meeting.other[n]
             agents.blocker[slot] = at.slots[other] if other >= 0 else other
             return False
@@ -275,7 +274,8 @@ def _has_mercy(ticks: IntArray, k: int, agents: AgentTable, meeting: Meetings, a
                i: int, n: int) -> bool:
     """Return whether an agent lets another go first that has waited very long."""
     other = meeting.other[n]
-    if other < 0 or meeting.apart[n] or agents.insists_until[at.slots[i]] > k:
+    if other < 0 or meeting.apart[n] or not meeting.gentle[n] or (
+            agents.insists_until[at.slots[i]] > k):
         return False
     waits = agents.waits[at.slots[other]]
     return bool(waits > ticks[3] and waits > agents.waits[at.slots[i]])

@@ -19,8 +19,9 @@ BoolArray = NDArray[np.bool_]
 
 # Acceleration of a fast agent towards a conflict, and of a slow one out of it [m/s^2].
 HURRY, TIMID = 1.8, 0.7
-# A vehicle lets another go first that waits, if it can halt with this braking after 2 s [m/s^2].
-GENTLE = 1.5
+# A vehicle lets another go first that waits, if it can halt with this braking [m/s^2] after this
+# time [s].
+GENTLE, REACTION = 1.5, 1.5
 # In a roundabout, an agent above this share of the speed that the road allows drives freely.
 FREELY = 0.85
 
@@ -102,6 +103,7 @@ class Meetings(NamedTuple):
     :param inside: (M) whether the other is in the conflict.
     :param committed: (M) whether the other can no longer stop before it.
     :param courteous: (M) whether the other can let the agent go by slowing down gently.
+    :param gentle: (M) whether the agent can let the other go in this way.
     :param tapers: (M) as in `ConflictTable`.
     """
 
@@ -115,6 +117,7 @@ class Meetings(NamedTuple):
     inside: BoolArray
     committed: BoolArray
     courteous: BoolArray
+    gentle: BoolArray
     tapers: BoolArray
 
 
@@ -164,6 +167,12 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                 if used == len(found.other):
                     found = _grown(found)
                 _compare(conflicts, rules, arrivals, mine, theirs, pair, at.desired, found, used)
+                found.gentle[used] = _can_let_go(
+                    found.into[used], agents.speed[slot],
+                    owner >= 0 and agents.blocker[slot] == at.slots[owner])
+                found.courteous[used] = owner >= 0 and _can_let_go(
+                    _into(conflicts, arrivals, theirs, pair), arrivals.speed[theirs],
+                    agents.blocker[at.slots[owner]] == slot)
                 used += 1
         found.begin[i + 1] = used
     return found
@@ -203,7 +212,7 @@ def _empty(agents: int, room: int) -> Meetings:
         np.zeros(agents + 1, np.int64), np.empty(room, np.int64), np.empty(room, np.int64),
         np.empty(room, np.int64), np.empty(room), np.empty(room, np.int64),
         np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_),
-        np.empty(room, np.bool_), np.empty(room, np.bool_))
+        np.empty(room, np.bool_), np.empty(room, np.bool_), np.empty(room, np.bool_))
 
 
 @compiled
@@ -214,7 +223,8 @@ def _grown(found: Meetings) -> Meetings:
     more.step[:size], more.theirs[:size] = found.step, found.theirs
     more.priority[:size], more.apart[:size] = found.priority, found.apart
     more.inside[:size], more.committed[:size] = found.inside, found.committed
-    more.courteous[:size], more.tapers[:size] = found.courteous, found.tapers
+    more.courteous[:size], more.gentle[:size] = found.courteous, found.gentle
+    more.tapers[:size] = found.tapers
     return more
 
 
@@ -249,14 +259,14 @@ def _has_entered(arrivals: Arrivals, n: int, other: int, into: float) -> bool:
 
 
 @inlined
-def can_let_go(into: float, speed: float) -> bool:
+def _can_let_go(into: float, speed: float, begun: bool) -> bool:
     """
     Return whether a vehicle can slow down gently, so that another goes first at a conflict.
 
     :param into: distance of its front from the conflict [m]
-    :param speed: [m/s]
+    :param begun: whether it does so already.
     """
-    return into > 2.0 * speed + speed**2 / (2.0 * GENTLE)
+    return into > (0.0 if begun else REACTION * speed) + speed**2 / (2.0 * GENTLE)
 
 
 @compiled
@@ -304,5 +314,4 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
     found.inside[n] = out > 0.0 and _has_entered(arrivals, theirs, mine, into)
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
-    found.courteous[n] = owner >= 0 and can_let_go(into, speed)
     found.tapers[n] = conflicts.tapers[conflict]
