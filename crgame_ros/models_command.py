@@ -7,12 +7,13 @@ from collections.abc import Iterator
 import importlib
 import inspect
 import textwrap
-from typing import Any, get_type_hints, NamedTuple, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 
 if TYPE_CHECKING:
     from crgame_ros.registry import ModelRegistry
+    from crgame_ros.schema.model_options import Option
 
 DESCRIPTION = """\
 List the exchangeable parts that a game file may name, with their options: what ships, what other
@@ -34,21 +35,6 @@ REGISTRIES = {
 _WIDTH = 99
 
 
-class Option(NamedTuple):
-    """
-    An option of a model.
-
-    :param wanted: kind of value, as text after "give".
-    :param default: as in a game file; empty if it is required.
-    :param meaning: with its unit.
-    """
-
-    name: str
-    wanted: str
-    default: str
-    meaning: str
-
-
 def registry_of(kind: str) -> 'ModelRegistry':
     """Return the registry of a kind of model."""
     module, name = REGISTRIES[kind]
@@ -56,33 +42,9 @@ def registry_of(kind: str) -> 'ModelRegistry':
     return found
 
 
-def options_of(registry: 'ModelRegistry', name: str) -> list[Option]:
-    """
-    Return the options of a model, as its constructor and docstring declare them.
-
-    :raises InputError: if there is no such model, or its package is not installed.
-    """
-    from crgame_ros.schema.declaration import sentences_of, wanted
-    kind = registry.find(name)
-    hints, sentences = get_type_hints(kind.__init__), sentences_of(kind)
-    return [Option(key, wanted(hints.get(key, Any)), _written(parameter, registry.left_out),
-                   sentences.get(key, ''))
-            for key, parameter in inspect.signature(kind).parameters.items()
-            if key not in registry.given
-            and parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)]
-
-
 def purpose_of(kind: type[Any]) -> str:
     """Return the first sentence of a class's docstring."""
     return inspect.cleandoc(kind.__doc__ or '').split('\n')[0]
-
-
-def _written(parameter: inspect.Parameter, left_out: str) -> str:
-    default = parameter.default
-    if default is parameter.empty:
-        return ''
-    return left_out if default is None else str(default).lower() if isinstance(default, bool) \
-        else str(default)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,6 +64,7 @@ def run(values: argparse.Namespace) -> int:
     :raises InputError: if there is no such model.
     """
     if values.name is not None:
+        from crgame_ros.schema.model_options import options_of
         registry = registry_of(values.kind)
         print(f'{values.name}: {purpose_of(registry.find(values.name))}')
         print('\n'.join(_option_lines(options_of(registry, values.name))))
@@ -123,7 +86,7 @@ def _model_lines(registry: 'ModelRegistry', name: str) -> list[str]:
                          subsequent_indent=' ' * 21)
 
 
-def _option_lines(options: list[Option]) -> Iterator[str]:
+def _option_lines(options: 'list[Option]') -> Iterator[str]:
     if not options:
         yield '  no options'
     width = max((len(option.name) for option in options), default=0)

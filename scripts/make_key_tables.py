@@ -21,7 +21,7 @@ import re
 import sys
 from typing import Any, get_args, get_origin
 
-from crgame_ros.models_command import options_of, purpose_of, REGISTRIES, registry_of
+from crgame_ros.models_command import purpose_of, REGISTRIES, registry_of
 from crgame_ros.schema.declaration import (
     choices_of,
     form_of,
@@ -34,6 +34,7 @@ from crgame_ros.schema.declaration import (
 )
 from crgame_ros.schema.file_kinds import FILE_KINDS
 from crgame_ros.schema.marks import Folder, Keyed, Meaning, Numbered, OnlyWith, Special
+from crgame_ros.schema.model_options import options_of
 from crgame_ros.schema.writing import write
 
 DOCS = Path(__file__).resolve().parent.parent / 'docs'

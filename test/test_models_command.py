@@ -6,7 +6,8 @@ from pathlib import Path
 
 from crgame_ros.cli import main
 from crgame_ros.errors import InputError
-from crgame_ros.models_command import options_of, REGISTRIES, registry_of
+from crgame_ros.models_command import REGISTRIES, registry_of
+from crgame_ros.schema.model_options import options_of
 import pytest
 
 OWN = '''\

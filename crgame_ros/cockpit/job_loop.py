@@ -5,8 +5,8 @@ The worker process of `job_process`, which answers jobs until its standard input
 
 Reading can take seconds and much memory. The process that serves the page, and may carry a
 driver's inputs, can afford neither. Jobs are JSON objects, one a line, with the name of the
-`job`, a `path` and further arguments; each is answered on the standard output, with one of
-`JobOutcome`.
+`job`, a `path` if it reads a file, and further arguments; each is answered on the standard
+output, with one of `JobOutcome`.
 """
 
 from collections.abc import Callable, Mapping
@@ -51,8 +51,8 @@ def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_C
     """
     Answer jobs until the standard input ends.
 
-    :param jobs: functions by name; each gets the path and the other arguments as keywords, and
-        returns JSON content.
+    :param jobs: functions by name; each gets the path, if there is one, and the other arguments as
+        keywords, and returns JSON content.
     :param subject: readable name of what they read.
     :param most_cpu_s: processor time after which a job is aborted [s].
     """
@@ -75,18 +75,20 @@ def serve_jobs(jobs: Mapping[str, Job], subject: str, most_cpu_s: float = MOST_C
 
 def _answer(jobs: Mapping[str, Job], job: dict[str, Any], answers: BinaryIO,
             subject: str, most_cpu_s: float) -> None:
+    path = Path(job.pop('path')) if 'path' in job else None
     try:
-        path = Path(job.pop('path'))
         signal.setitimer(signal.ITIMER_PROF, most_cpu_s)
         try:
-            result = jobs[job.pop('job')](path, **job)
+            result = jobs[job.pop('job')](*([path] if path else []), **job)
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
         outcome, text = JobOutcome.DONE, json.dumps(result, allow_nan=False, separators=(',', ':'))
     except CrgameError as error:
         # An answer must not reveal the folders of this machine.
         outcome = JobOutcome.GIVEN_UP if isinstance(error, _GivenUpError) else JobOutcome.REFUSED
-        text = str(error).replace(f'{path}', path.name).replace(f'{path.parent}/', '')
+        text = str(error)
+        if path is not None:
+            text = text.replace(f'{path}', path.name).replace(f'{path.parent}/', '')
     except (MemoryError, RecursionError):
         outcome, text = JobOutcome.GIVEN_UP, f'the {subject} is too large to be read'
     except Exception:

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.page_messages import clean_text
-from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.errors import CrgameError, InputError, short
 from crgame_ros.planner.registry import planner_names
 from crgame_ros.scenario import guard
 from crgame_ros.whole_file import write_whole
@@ -60,11 +60,13 @@ class Choice:
     :param id: id of an entry.
     :param drivers: driver source by human vehicle.
     :param planners: planner by AV.
+    :param options: options of planners by AV, as typed; AVs that are left out keep the game's.
     """
 
     id: str  # noqa: A003
     drivers: Mapping[str, str]
     planners: Mapping[str, str]
+    options: Mapping[str, Mapping[str, str]]
 
 
 class Library:
@@ -121,6 +123,17 @@ class Library:
         return await self._reader.run('preview', path=str(entry.path), kind=entry.kind,
                                       unwanted=unwanted)
 
+    async def planner_options(self, planner: str) -> bytes:
+        """
+        Return the options that a planner declares.
+
+        :return: the answer of /api/planner as JSON.
+        :raises CrgameError: if it cannot be chosen, or its package is not installed.
+        """
+        if planner not in planner_names():
+            raise InputError('cannot be chosen here', short(planner))
+        return await self._reader.run('planner_options', planner=planner)
+
     async def upload(self, data: bytes, title: str) -> str:
         """
         Store an uploaded file if it is a scenario.
@@ -175,7 +188,9 @@ class Library:
         entry = await self._entry(choice.id)
         answer = await self._reader.run(
             'compose', path=str(entry.path), kind=entry.kind, drivers=dict(choice.drivers),
-            planners=dict(choice.planners), allowed_drivers=list(DRIVERS),
+            planners=dict(choice.planners),
+            options={av: dict(given) for av, given in choice.options.items()},
+            allowed_drivers=list(DRIVERS),
             allowed_planners=list(planner_names()))
         text = json.loads(answer)['text'].encode()
         self._loaded = entry.id

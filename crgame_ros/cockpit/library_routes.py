@@ -18,6 +18,7 @@ from crgame_ros.errors import CrgameError, InputError
 
 MAX_VEHICLES = 1000
 MAX_TEXT = 1000
+MAX_OPTIONS = 100
 UPLOAD_S = 60.0
 
 _log = logging.getLogger(__name__)
@@ -27,20 +28,21 @@ Answer = Callable[[web.Request], Awaitable[web.StreamResponse]]
 def add_routes(app: web.Application, library: Library | None, backend: Backend,
                hub: Hub) -> None:
     """
-    Add the routes /api/scenarios, preview, upload, upload/delete and load.
+    Add the routes /api/scenarios, preview, planner, upload, upload/delete and load.
 
     :param library: None answers that there is nothing to choose.
     :param backend: loads the chosen game.
     :param hub: all clients.
     """
     if library is None:
-        for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('POST', 'upload'),
-                             ('POST', 'upload/delete'), ('POST', 'load')):
+        for method, path in (('GET', 'scenarios'), ('GET', 'preview'), ('GET', 'planner'),
+                             ('POST', 'upload'), ('POST', 'upload/delete'), ('POST', 'load')):
             app.router.add_route(method, f'/api/{path}', _nothing)
         return
     routes = _Routes(library, backend, hub)
     app.router.add_get('/api/scenarios', refusable(routes.scenarios))
     app.router.add_get('/api/preview', refusable(routes.preview))
+    app.router.add_get('/api/planner', refusable(routes.planner))
     app.router.add_post('/api/upload', refusable(routes.upload))
     app.router.add_post('/api/upload/delete', refusable(routes.delete))
     app.router.add_post('/api/load', refusable(routes.load))
@@ -69,6 +71,11 @@ class _Routes:
         actor(request, self._hub, 'load')
         content = await self._library.preview(request.query.get('id', '')[:MAX_TEXT],
                                               asker_gone(request))
+        return web.Response(text=without_paths(content.decode()), content_type='application/json')
+
+    async def planner(self, request: web.Request) -> web.Response:
+        actor(request, self._hub, 'load')
+        content = await self._library.planner_options(request.query.get('name', '')[:MAX_TEXT])
         return web.Response(text=without_paths(content.decode()), content_type='application/json')
 
     async def upload(self, request: web.Request) -> web.Response:
@@ -157,7 +164,9 @@ def _object(body: bytes) -> dict[str, Any]:
 def _choice(body: bytes) -> Choice:
     content = _object(body)
     return Choice(_text(content.get('id')), _by_vehicle(content.get('humans', []), 'driver'),
-                  _by_vehicle(content.get('avs', []), 'planner'))
+                  _by_vehicle(content.get('avs', []), 'planner'),
+                  {entry['id']: _options(entry['options']) for entry in content.get('avs', [])
+                   if 'options' in entry})
 
 
 def _by_vehicle(entries: Any, what: str) -> dict[str, str]:
@@ -166,6 +175,12 @@ def _by_vehicle(entries: Any, what: str) -> dict[str, str]:
     if not all(isinstance(entry, dict) for entry in entries):
         raise InputError('holds something other than vehicles', 'choice', 'load the page again')
     return {_text(entry.get('id')): _text(entry.get(what)) for entry in entries}
+
+
+def _options(value: Any) -> dict[str, str]:
+    if not isinstance(value, dict) or len(value) > MAX_OPTIONS:
+        raise InputError('holds something other than options', 'choice', 'load the page again')
+    return {_text(key): _text(given) for key, given in value.items()}
 
 
 def _text(value: Any) -> str:

@@ -3,7 +3,9 @@
 """Jobs that read scenarios for the page, in a process of their own (`job_loop`)."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -15,11 +17,13 @@ from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.file import load_game
 from crgame_ros.game.game import AvSpec, Game, HumanSpec
-from crgame_ros.planner.registry import create_planner
+from crgame_ros.planner.registry import PLANNERS
 from crgame_ros.scenario import guard
 from crgame_ros.scenario.loading import LoadedScenario, parse_scenario
+from crgame_ros.schema.model_options import options_of
 from crgame_ros.simulation.game_description import describe_game
 from crgame_ros.simulation.setup import build_setup, Setup
+from crgame_ros.yaml_text import parse_yaml
 
 UPLOAD = 'upload'
 
@@ -53,19 +57,33 @@ def preview(path: Path, kind: str) -> dict[str, Any]:
         'states': {'vehicles': _without_nan(vehicles), 'objects': _without_nan(objects)},
         'humans': [{'id': human.id, 'driver': human.driver} for human in setup.humans],
         'avs': [{'id': av.id, 'planner': av.spec.planner,
-                 'planning_problem': av.planning_problem.planning_problem_id}
+                 'planning_problem': av.planning_problem.planning_problem_id,
+                 'options': {key: _typed(value) for key, value in av.spec.options.items()}}
                 for av in setup.avs],
         'notices': list(setup.notices)}
 
 
+def planner_options(planner: str) -> dict[str, Any]:
+    """
+    Return the options that a planner declares.
+
+    :return: them as `options`, in order.
+    :raises InputError: if its package is not installed.
+    """
+    return {'options': [option._asdict() for option in options_of(PLANNERS, planner)]}
+
+
 def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping[str, str],
-            allowed_drivers: list[str], allowed_planners: list[str]) -> dict[str, Any]:
+            options: Mapping[str, Mapping[str, str]], allowed_drivers: list[str],
+            allowed_planners: list[str]) -> dict[str, Any]:
     """
     Return the text of the chosen game.
 
     :param kind: game, scenario or upload.
     :param drivers: drivers of humans; vehicles that are left out keep the game's.
     :param planners: planners of AVs; vehicles that are left out keep the game's.
+    :param options: options of planners by AV, as typed; AVs that are left out keep the game's,
+        with the game's planner.
     :param allowed_drivers: allowed choices besides the game's own.
     :param allowed_planners: allowed choices besides the game's own.
     :return: the game file as `text`.
@@ -79,13 +97,17 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
     avs = []
     for spec in (av.spec for av in setup.avs):
         planner = _choice(planners, spec.id, spec.planner, allowed_planners, 'planner')
-        if planner != spec.planner:
+        chosen = options.get(spec.id)
+        if planner != spec.planner or chosen is not None:
             # The options of another planner do not apply.
-            spec = replace(spec, planner=planner, options={})
-            create_planner(planner)
+            spec = replace(spec, planner=planner, options={
+                key: parse_yaml(text, f'{spec.id}: {key}', 'give a value as in a game file')
+                for key, text in (chosen or {}).items()})
+            PLANNERS.create(planner, spec.options, spec.id)
         avs.append(spec)
     _refuse_strangers(drivers, humans)
     _refuse_strangers(planners, avs)
+    _refuse_strangers(options, avs)
     game = replace(setup.game, humans=tuple(humans), avs=tuple(avs),
                    title=setup.game.title or setup.loaded.benchmark_id)
     build_setup(game, setup.loaded)
@@ -94,7 +116,8 @@ def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping
 
 def main() -> None:
     """Answer jobs until the standard input ends."""
-    serve_jobs({'check': check, 'preview': preview, 'compose': compose}, 'scenario')
+    serve_jobs({'check': check, 'preview': preview, 'compose': compose,
+                'planner_options': planner_options}, 'scenario')
 
 
 def _scenario(path: Path, source: str) -> LoadedScenario:
@@ -114,6 +137,15 @@ def _setup(path: Path, kind: str) -> Setup:
     return build_setup(game, _scenario(path, UPLOAD if kind == UPLOAD else path.name))
 
 
+def _typed(value: Any) -> str:
+    """Return the text that gives an option's value when it is typed."""
+    if isinstance(value, str):
+        with suppress(InputError):
+            if parse_yaml(value, '') == value:
+                return value
+    return json.dumps(value)
+
+
 def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str],
             what: str) -> str:
     value = chosen.get(vehicle, own)
@@ -126,7 +158,7 @@ def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str
     return value
 
 
-def _refuse_strangers(chosen: Mapping[str, str],
+def _refuse_strangers(chosen: Mapping[str, Any],
                       specs: list[HumanSpec] | list[AvSpec]) -> None:
     if not chosen.keys() <= {spec.id for spec in specs}:
         raise InputError('names a vehicle that the game does not have', 'choice',

@@ -10,6 +10,7 @@ from browser_support import Browser
 from live_browser_support import Graph, live_graph, LivePage, SCENARIOS, THROTTLE
 import pytest
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 import yaml
 
@@ -115,6 +116,10 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     epoch = page.run('return crgame.store.scene.time.epoch')
     driver = page.driver.find_element(By.CSS_SELECTOR, '.who select[aria-label^="hv0"]')
     assert Select(driver).first_selected_option.get_attribute('value') == 'cockpit'
+    options = page.driver.find_element(By.CSS_SELECTOR, '.planner-options summary')
+    options.send_keys(Keys.ENTER)
+    page.wait_for_text('.planner-options', 'desired speed')
+    page.driver.find_element(By.CSS_SELECTOR, '.planner-option input').send_keys('12.5')
     page.click('.start-area button.primary')
     page.wait('crgame.store.scene.time.epoch > arguments[0]'
               ' && crgame.store.scene.benchmark_id === arguments[1]', 'the uploaded scenario',
@@ -123,6 +128,8 @@ def test_a_file_is_uploaded_started_and_driven(page: LivePage, tmp_path: Path) -
     page.wait("crgame.driving.seat === 'hv0'", 'the seat of who has brought it')
     page.wait_for_run('running')
     page.wait('crgame.store.status.planners.av0?.accepted > 3', 'plans of its AV')
+    written, = (page.graph.launcher.out / 'cockpit' / 'games').iterdir()
+    assert yaml.safe_load(written.read_text())['avs'][0]['options'] == {'v0': 12.5}
     speed = page.vehicle(0)[3]
     page.hold('w')
     page.graph.wait_for_command('hv0', THROTTLE, 1.0, 1.0)

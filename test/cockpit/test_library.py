@@ -71,6 +71,11 @@ async def delete(running: Cockpit, entry_id: Any) -> tuple[int, dict[str, Any]]:
         return answer.status, await answer.json()
 
 
+async def planner(running: Cockpit, name: str) -> tuple[int, dict[str, Any]]:
+    async with running.http.get(f'{running.address}/api/planner', params={'name': name}) as answer:
+        return answer.status, await answer.json()
+
+
 async def load(running: Cockpit, **choice: Any) -> tuple[int, dict[str, Any]]:
     async with running.http.post(f'{running.address}/api/load', json=choice,
                                  headers=HEADER) as answer:
@@ -112,7 +117,8 @@ async def test_a_preview_shows_the_scene_and_where_everything_starts(tmp_path: P
     assert content['humans'][0]['driver'] == 'keys:cut_in.keys.yaml'
     assert content['avs'] == [
         {'id': 'av0', 'planner': setup.avs[0].spec.planner,
-         'planning_problem': setup.avs[0].planning_problem.planning_problem_id}]
+         'planning_problem': setup.avs[0].planning_problem.planning_problem_id,
+         'options': {}}]
 
 
 @pytest.mark.exhaustive
@@ -265,6 +271,44 @@ async def test_a_choice_becomes_a_game_that_the_backend_is_given(tmp_path: Path)
     assert (chosen.title, chosen.seed, chosen.humans[0].spawn, chosen.timing) == (
         own.title, own.seed, own.humans[0].spawn, own.timing)
     assert build_setup(chosen).loaded.xml_text.encode() == CUT_IN
+
+
+@in_loop
+async def test_a_planner_tells_its_options_and_is_given_those_that_are_typed(
+        tmp_path: Path) -> None:
+    async with with_library(tmp_path) as running:
+        status, content = await planner(running, 'idm')
+        assert status == 200
+        options = {option['name']: option for option in content['options']}
+        assert options['time_headway'] | {'meaning': ''} == {
+            'name': 'time_headway', 'wanted': 'a number', 'default': '1.5', 'meaning': ''}
+        assert '[s]' in options['time_headway']['meaning']
+        game = await entry(running, 'cut_in.yaml')
+        status, _ = await load(running, id=game, avs=[
+            {'id': 'av0', 'planner': 'idm', 'options': {'time_headway': '2.5'}}])
+        assert status == 200
+        avs = load_game(running.backend.games[0]).avs
+        assert avs is not None and avs[0].options == {'time_headway': 2.5}
+        for typed, told in (
+                ({'time_headway': 'long'}, 'av0: options of planner idm: "time_headway"'),
+                ({'tyme_gap': '2'}, '"tyme_gap" is unknown'),
+                ({'time_headway': '{'}, 'av0: time_headway:'), ([], 'something other'),
+                ({'time_headway': 2}, 'misses a text')):
+            status, content = await load(running, id=game, avs=[
+                {'id': 'av0', 'planner': 'idm', 'options': typed}])
+            assert status == 400 and told in content['error'], content
+        assert len(running.backend.games) == 1
+
+
+@in_loop
+async def test_no_code_is_asked_for_its_options(tmp_path: Path) -> None:
+    evil, mark = tmp_path / 'evil.py', tmp_path / 'ran'
+    evil.write_text(f'open({str(mark)!r}, "w")\nclass P: pass\n')
+    async with with_library(tmp_path) as running:
+        for name in (f'{evil}:P', 'os:system', 'crgame_ros.planner.idm:IdmPlanner', '', '\x00'):
+            status, content = await planner(running, name)
+            assert status == 400 and 'cannot be chosen here' in content['error']
+    assert not mark.exists()
 
 
 @in_loop

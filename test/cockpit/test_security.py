@@ -61,7 +61,8 @@ async def test_names_that_others_made_point_here_get_nothing() -> None:
     async with cockpit() as running:
         port = running.port
         for host in (f'evil.example:{port}', f'{HOST}:{port + 1}', HOST, f'{HOST}.nip.io:{port}'):
-            for target in ('/', '/static/js/main.js', '/api/scenarios', '/ws'):
+            for target in ('/', '/static/js/main.js', '/api/scenarios', '/api/planner?name=idm',
+                           '/ws'):
                 status, answer = await get(port, target, *UPGRADE[1:], host=host)
                 assert status == 403 and b'<html' not in answer
         assert (await get(port, '/', host=f'localhost:{port}'))[0] == 200

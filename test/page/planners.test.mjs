@@ -14,11 +14,11 @@ const GOOD = { running: true, stale: false, latency_ms: 12.4, age_ms: 87.6, acce
   refused: 2, plan_time_ms: 8.25, fallbacks: 1, planner: 'idm', last_refusal: '',
   tracking: null };
 
-let panel, root, server, store;
+let root, server, store;
 
 beforeEach(() => {
-  openPage('<section id="panel-timing"><div id="planners"></div></section>');
-  [panel, root] = ['panel-timing', 'planners'].map((id) => document.getElementById(id));
+  openPage('<section id="panel-timing"></section>');
+  root = document.getElementById('panel-timing');
   globalThis.window.crgame = { world: { followed: null } };
   server = new Server();
   store = liveStore(VEHICLES, { planners: { av0: 'idm', av1: '/home/x/mine.py:Mine' } });
@@ -166,10 +166,10 @@ test('the AV that is followed says how much it sees', () => {
 });
 
 test('nothing is written while the panel is hidden, and all when it is shown', async () => {
-  panel.hidden = true;
+  root.hidden = true;
   show(GOOD, GOOD);
   assert.deepEqual(figures('av0'), ['–', '–', '–', '–', '–']);
-  panel.hidden = false;
+  root.hidden = false;
   await globalThis.window.happyDOM.waitUntilComplete();
   assert.deepEqual(figures('av0'), ['12', '88', '12\u202f345', '2', '1']);
 });

@@ -186,3 +186,63 @@ test('hostile names of vehicles and planners are text', () => {
   assert.equal(root.querySelector('strong').textContent, IMAGE);
   assert.deepEqual(form.choices.humans, [{ id: IMAGE, driver: IMAGE }]);
 });
+
+/** Let the planner `idm` tell its options, and count how often it is asked. */
+function answering(options) {
+  const asked = [];
+  globalThis.fetch = async (path) => {
+    asked.push(path);
+    const content = path.endsWith('=idm') ? { options } : { error: 'lattice: is not installed' };
+    return new Response(JSON.stringify(content), { status: content.error ? 400 : 200 });
+  };
+  return asked;
+}
+
+const GAP = { name: 'time_gap', wanted: 'a number', default: '1.5', meaning: 'to the leader [s]' };
+const MODE = { name: 'mode', wanted: 'text', default: '', meaning: IMAGE };
+
+async function opened(id) {
+  const details = select(id).closest('.who-row').querySelector('details');
+  details.open = true;
+  send(details, 'toggle');
+  while (textOf(details).includes('Asking')) {
+    await new Promise((done) => { setTimeout(done, 0); });
+  }
+  return details;
+}
+
+test("a planner's options are asked for when they are opened, and sent when typed", async () => {
+  const asked = answering([GAP, MODE]);
+  const form = formOf({ humans: [], avs: [
+    { id: 'av0', planner: 'idm', planning_problem: null, options: { time_gap: '2' } }] });
+  assert.deepEqual([asked, form.choices.avs], [[], [{ id: 'av0', planner: 'idm' }]]);
+  const details = await opened('av0');
+  assert.deepEqual(asked, ['/api/planner?name=idm']);
+  const [gap, mode] = details.querySelectorAll('input');
+  assert.deepEqual([gap.value, gap.placeholder, mode.value, mode.placeholder],
+    ['2', '1.5', '', 'required']);
+  assert.ok(textOf(details).includes('to the leader [s]; a number') && !root.querySelector('img'));
+  mode.value = ' fast ';
+  assert.deepEqual(form.choices.avs[0].options, { time_gap: '2', mode: 'fast' });
+  gap.value = '';
+  assert.deepEqual(form.choices.avs[0].options, { mode: 'fast' });
+  await opened('av0');
+  assert.equal(asked.length, 1, 'they are known');
+});
+
+test('another planner has other options; why it tells none is said', async () => {
+  answering([GAP]);
+  const form = formOf({ humans: [], avs: [
+    { id: 'av0', planner: 'idm', planning_problem: null, options: { time_gap: '2' } }] });
+  await opened('av0');
+  select('av0').value = 'lattice';
+  send(select('av0'), 'change');
+  assert.deepEqual(form.choices.avs, [{ id: 'av0', planner: 'lattice' }]);
+  const details = await opened('av0');
+  assert.ok(textOf(details).includes('lattice: is not installed'));
+  assert.deepEqual(form.choices.avs, [{ id: 'av0', planner: 'lattice' }]);
+  select('av0').value = 'idm';
+  send(select('av0'), 'change');
+  await opened('av0');
+  assert.deepEqual(form.choices.avs[0].options, { time_gap: '2' });
+});

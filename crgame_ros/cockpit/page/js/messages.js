@@ -367,12 +367,14 @@ export {};
  */
 
 /**
- * Types of /api/scenarios, /api/preview and /api/load.
+ * Types of /api/scenarios, /api/preview, /api/planner and /api/load.
  *
  * @typedef {{id: string, kind: 'game'|'scenario'|'upload', name: string, title: string}} Entry
  * @typedef {{folders: {name: string, entries: Entry[]}[], planners: string[],
  *   drivers: string[]}} Offer
- * @typedef {{id: string, planner: string, planning_problem: number|null}} PreviewAv
+ * @typedef {{id: string, planner: string, planning_problem: number|null,
+ *   options?: Record<string, string>}} PreviewAv
+ * @typedef {{name: string, wanted: string, default: string, meaning: string}} PlannerOption
  * @typedef {object} Preview
  * @property {Scene} scene
  * @property {{vehicles: (number|null)[][], objects: (number|null)[][]}} states rows, as in frames
@@ -385,5 +387,5 @@ export {};
  * @typedef {object} Choice
  * @property {string} id of an entry
  * @property {{id: string, driver: string}[]} humans
- * @property {{id: string, planner: string}[]} avs
+ * @property {{id: string, planner: string, options?: Record<string, string>}[]} avs
  */

@@ -81,8 +81,7 @@ export function createPlanners(root, store, connection) {
   store.on('scene', rebuild);
   store.on('status', update);
   store.on('connection', update);
-  new MutationObserver(update).observe(
-    /** @type {HTMLElement} */ (root.parentElement), { attributeFilter: ['hidden'] });
+  new MutationObserver(update).observe(root, { attributeFilter: ['hidden'] });
   rebuild();
 }
 

@@ -4,7 +4,7 @@
 
 import { oneLine } from './format.js';
 
-/** @import { Choice, Offer, Preview } from '../messages.js' */
+/** @import { Choice, Offer, PlannerOption, Preview } from '../messages.js' */
 
 /** Header of all requests that change something: a page of another site cannot add it. */
 export const OWN = { 'X-Crgame': '1' };
@@ -26,6 +26,14 @@ export function fetchScenarios() {
  */
 export function fetchPreview(id, signal) {
   return ask(`/api/preview?id=${encodeURIComponent(id)}`, { signal });
+}
+
+/**
+ * @param {string} planner one of those that can be chosen
+ * @returns {Promise<PlannerOption[]>}
+ */
+export async function fetchPlannerOptions(planner) {
+  return (await ask(`/api/planner?name=${encodeURIComponent(planner)}`)).options;
 }
 
 /**
@@ -52,7 +60,7 @@ export async function deleteUpload(id) {
 }
 
 /**
- * @param {Choice} choice id, humans [{id, driver}], avs [{id, planner}]
+ * @param {Choice} choice id, humans [{id, driver}], avs [{id, planner, options}]
  * @returns {Promise<string>} what was done
  */
 export async function load(choice) {

@@ -4,6 +4,8 @@
 
 import { element, setText } from '../dom.js';
 import { baseName } from './event_words.js';
+import { PlannerOptions } from './planner_options.js';
+import { fetchPlannerOptions } from './scenario_api.js';
 
 /** @import { Preview } from '../messages.js' */
 
@@ -17,6 +19,8 @@ const DRIVERS = {
 export class ScenarioForm {
   /** @type {Map<string, {select: HTMLSelectElement, error: HTMLElement}>} */
   #rows = new Map();
+  /** @type {Map<string, PlannerOptions>} */
+  #options = new Map();
   /** @type {string[]} */
   #humans = [];
   /** @type {string[]} */
@@ -33,6 +37,7 @@ export class ScenarioForm {
    */
   show(preview, drivers, planners) {
     this.#rows.clear();
+    this.#options.clear();
     this.#humans = preview.humans.map((human) => human.id);
     this.#avs = preview.avs.map((av) => av.id);
     /** @type {HTMLElement[]} */
@@ -40,11 +45,15 @@ export class ScenarioForm {
     for (const { id, driver } of preview.humans) {
       nodes.push(this.#row(id, 'human', 'driven by', driver, drivers, driverWords));
     }
-    for (const { id, planner, planning_problem: problem } of preview.avs) {
+    for (const { id, planner, planning_problem: problem, options } of preview.avs) {
       const row = this.#row(id, 'av', 'planned by', planner, planners, baseName);
       if (problem !== null && problem !== undefined) {
         row.title = `planning problem ${problem}`;
       }
+      const select = /** @type {HTMLSelectElement} */ (this.#rows.get(id)?.select);
+      const more = new PlannerOptions(select, options ?? {}, fetchPlannerOptions);
+      this.#options.set(id, more);
+      row.append(more.root);
       nodes.push(row);
     }
     this.root.replaceChildren(...nodes);
@@ -53,16 +62,20 @@ export class ScenarioForm {
   /** Clear the form. */
   clear() {
     this.#rows.clear();
+    this.#options.clear();
     this.root.replaceChildren();
   }
 
-  /** Return the choices: humans [{id, driver}], avs [{id, planner}]. */
+  /** Return the choices: humans [{id, driver}], avs [{id, planner, options}]. */
   get choices() {
     /** @param {string} id */
     const value = (id) => this.#rows.get(id)?.select.value ?? '';
     return {
       humans: this.#humans.map((id) => ({ id, driver: value(id) })),
-      avs: this.#avs.map((id) => ({ id, planner: value(id) })),
+      avs: this.#avs.map((id) => {
+        const options = this.#options.get(id)?.values;
+        return { id, planner: value(id), ...(options ? { options } : {}) };
+      }),
     };
   }
 

@@ -110,8 +110,7 @@ export function createTiming(root, store) {
     }
   };
   store.on('status', update);
-  new MutationObserver(update).observe(
-    /** @type {HTMLElement} */ (root.parentElement), { attributeFilter: ['hidden'] });
+  new MutationObserver(update).observe(root, { attributeFilter: ['hidden'] });
   update();
 }
 
