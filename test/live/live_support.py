@@ -120,6 +120,12 @@ class Launcher:
         """Return whether a line with this regular expression has come."""
         return any(re.search(pattern, line) for line in list(self.lines))
 
+    @property
+    def complaints(self) -> list[str]:
+        """Return the lines that report a fault: a machine that is too busy is none of ours."""
+        return [line for line in list(self.lines) if re.search('Traceback|ERROR|WARN', line)
+                and 'slower than real time' not in line]
+
     def wait_for(self, pattern: str) -> None:
         """Wait for a line with this regular expression."""
         wait_until(lambda: self.says(pattern) or self._process.poll() is not None,
