@@ -60,5 +60,5 @@ def _with_person(seat: SeatEntry, demand: SeatDemand) -> SeatEntry:
         return replace(seat, here=False, ready=False)
     if demand.person is None or demand.person.id != seat.person.id:
         return seat
-    return replace(seat, person=demand.person,
-                   ready=seat.ready if demand.ready is None else demand.ready)
+    ready = seat.ready if demand.ready is None else demand.ready
+    return replace(seat, person=demand.person, ready=seat.here and ready)

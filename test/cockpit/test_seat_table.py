@@ -126,6 +126,10 @@ def test_an_order_in_vain_is_not_repeated() -> None:
     assert 'hv0' in orders
     orders.answered(_driven('p2'))
     assert 'hv0' not in orders
+    # Somebody else had the seat, and has left it: the order does not name them.
+    orders.note(demand, _seats('game'), 0.0)
+    orders.answered(_driven(here=False))
+    assert 'hv0' not in orders
 
 
 def test_release_gives_back(table: SeatTable) -> None:
