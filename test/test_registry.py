@@ -86,8 +86,8 @@ def test_entry_points_come_after_the_built_in_names(
 @pytest.mark.parametrize(('options', 'message'), [
     ({'dt_s': 1.0}, '"dt_s" is unknown; allowed are: lateral_error, heading_error'),
     ({'gain': 1.0}, '"gain" is unknown; allowed are: lateral_error'),
-    ({'slip': 'much'}, '"slip" is \'much\'; give float or None'),
-    ({'feed_forward': 1.0}, '"feed_forward" is 1.0; give bool or None'),
+    ({'slip': 'much'}, '"slip" is \'much\'; give a number or null'),
+    ({'feed_forward': 1.0}, '"feed_forward" is 1.0; give true or false or null'),
     ({'slip': 1.5}, '"slip" is 1.5; give a number from 0 to 1')],
     ids=['supplied', 'unknown', 'text', 'number for a switch', 'out of bounds'])
 def test_wrong_options_are_refused_with_their_place(

@@ -61,8 +61,8 @@ def test_unusable_names_are_refused(name: str, message: str) -> None:
 
 @pytest.mark.parametrize(('options', 'message'), [
     ({'speed': 3.0}, '"speed" is unknown; allowed are: v0, time_headway'),
-    ({'v0': 'fast'}, "\"v0\" is 'fast'; give float or None"),
-    ({'s0': True}, '"s0" is True; give float'),
+    ({'v0': 'fast'}, "\"v0\" is 'fast'; give a number or null"),
+    ({'s0': True}, '"s0" is True; give a number'),
     ({'a': float('nan')}, '"a" is nan'),
     ({'a': -1.0}, '"a" is -1.0; give a positive number'),
 ])
