@@ -22,9 +22,9 @@ PACKAGES = {'commonroad_idm_planner': 'commonroad-idm-planner',
             'commonroad_rp': 'commonroad-reactive-planner'}
 # Prefix of FILE.py:load in the name of a planner or driver: a trained policy drives.
 POLICY = 'policy:'
-# Kinds of values, after "give", as `schema.declaration` has them.
-_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text',
-          types.NoneType: 'null'}
+# Kinds of values, as text after "give".
+VALUE_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text',
+               types.NoneType: 'null'}
 
 
 class ModelRegistry:
@@ -268,4 +268,4 @@ def _checked(value: Any, hint: Any, key: str, where: str, allowed: str) -> Any:
 def _name(hint: Any) -> str:
     if get_origin(hint) is Literal:
         return ' or '.join(repr(value) for value in get_args(hint))
-    return _WORDS.get(hint, getattr(hint, '__name__', str(hint)))
+    return VALUE_WORDS.get(hint, getattr(hint, '__name__', str(hint)))

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from crgame_ros.driver.seat_state import after, GAME_DRIVER
+from crgame_ros.driver.seat_state import after, home_of
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import SeatDemand, SeatEntry
@@ -87,7 +87,8 @@ def _is_in_vain(demand: SeatDemand, entry: SeatEntry) -> bool:
 
 def _after(demand: SeatDemand, entry: SeatEntry) -> SeatEntry | None:
     try:
-        return after(entry, demand, COCKPIT if entry.driver == COCKPIT else GAME_DRIVER)
+        # Whether an AV is its planner's or the game's makes no difference here.
+        return after(entry, demand, home_of(entry.driver))
     except InputError:
         return None
 

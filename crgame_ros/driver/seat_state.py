@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from crgame_ros.driver.source import COCKPIT, parse_source
+from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
 from crgame_ros.game.seat_documents import ORDER, SeatDemand, SeatEntry
 
@@ -19,7 +19,7 @@ RETURNING = (GAME_DRIVER, PLANNER)
 
 def home_of(driver: str) -> str:
     """Return the source of a human's seat that the game gives to a driver source."""
-    return COCKPIT if parse_source(driver).kind == COCKPIT else GAME_DRIVER
+    return COCKPIT if driver.strip() == COCKPIT else GAME_DRIVER
 
 
 def after(seat: SeatEntry, demand: SeatDemand, home: str) -> SeatEntry:

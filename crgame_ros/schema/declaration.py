@@ -19,6 +19,7 @@ from typing import (
     Union,
 )
 
+from crgame_ros.registry import VALUE_WORDS
 from crgame_ros.schema.marks import (
     Advice,
     Called,
@@ -204,17 +205,16 @@ def _wanted(hint: Any, marks: tuple[Any, ...]) -> str:
     if origin is Literal:
         return 'one of ' + ', '.join(map(str, get_args(hint)))
     if hint is float or hint is int:
-        noun = 'a number' if hint is float else 'a whole number'
-        return f'{noun}{mark_of(marks, Within) or ""}'
+        return f'{VALUE_WORDS[hint]}{mark_of(marks, Within) or ""}'
     if is_dataclass(hint):
         needed = [key.name for key in keys_of(hint) if key.required]
         return '{' + ', '.join(f'{name}:' for name in needed) + '}' if needed else 'a mapping'
     if origin is tuple:
         return _wanted_list(get_args(hint), marks)
-    return {bool: 'true or false', str: 'a text', Any: 'any value'}.get(
+    return {**VALUE_WORDS, Any: 'any value'}.get(
         hint, 'a mapping' if (origin or hint) in (dict, Mapping) else
         'a file name' if getattr(hint, '__name__', '') == 'Path' else
-        'None' if hint is types.NoneType else getattr(hint, '__name__', str(hint)))
+        getattr(hint, '__name__', str(hint)))
 
 
 def _wanted_list(items: tuple[Any, ...], marks: tuple[Any, ...]) -> str:

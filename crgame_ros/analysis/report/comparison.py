@@ -99,12 +99,11 @@ def _latency(run: Run) -> str:
 
 
 def _plots(runs: Sequence[Run]) -> Iterator[Plot]:
-    units = {name: MEASURES[name].symbol for name in CHIEF}
     yield _plot(runs, 'speed', 'Speed', 'm/s', lambda run, i: run.log.vehicle_states[
         :, i, StateColumn.SPEED], None)
     for name, words, bounds in (('ttc', 'Time to collision', (0.0, 10.0)),
                                 ('min_distance', 'Distance', None)):
-        yield _plot(runs, name.replace('_', '-'), words, units[name],
+        yield _plot(runs, name.replace('_', '-'), words, MEASURES[name].symbol,
                     lambda run, i, name=name: run.course[name][i], bounds)  # type: ignore[misc]
 
 

@@ -109,6 +109,8 @@ class SummaryMeasure(NamedTuple):
         return np.where(missing & (self.test != 'known'), self.empty, passed.astype(float))
 
 
+# Definitions of means that leave AVs out.
+_OF_WHOM = {'ttc': 'least TTC of the AVs that approached a leader; greater ones count as 20'}
 # An empty gap means that no other was near, so nothing was critical.
 MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('failed', 'cells that failed', '', -1,
@@ -137,7 +139,8 @@ MEASURES = {measure.name: measure for measure in (
     SummaryMeasure('comfort', 'nuPlan: comfort', 'score_comfort', 1),
     # All AVs count in its mean; in that of the least TTC only those that approached a leader.
     SummaryMeasure('inverse_ttc', 'greatest 1/TTC', 'max_inverse_ttc', -1, least=0.001),
-    *(SummaryMeasure(f'worst_{name}', each.extreme, f'worst_{name}', -each.worst, most=each.most)
+    *(SummaryMeasure(f'worst_{name}', each.extreme, f'worst_{name}', -each.worst,
+                     what=_OF_WHOM.get(name, ''), most=each.most)
       for name, each in CHIEF.items()),
     SummaryMeasure('time_gap', 'median time gap', 'time_gap_median_s', 1),
     SummaryMeasure('time_gap_below_1s', 'time with a time gap below 1 s', 'time_gap_below_1s',

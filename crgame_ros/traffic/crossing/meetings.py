@@ -166,13 +166,7 @@ def meet(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable, way
                     continue
                 if used == len(found.other):
                     found = _grown(found)
-                _compare(conflicts, rules, arrivals, mine, theirs, pair, at.desired, found, used)
-                found.gentle[used] = _can_let_go(
-                    found.into[used], agents.speed[slot],
-                    owner >= 0 and agents.blocker[slot] == at.slots[owner])
-                found.courteous[used] = owner >= 0 and _can_let_go(
-                    _into(conflicts, arrivals, theirs, pair), arrivals.speed[theirs],
-                    agents.blocker[at.slots[owner]] == slot)
+                _compare(conflicts, rules, agents, arrivals, mine, theirs, pair, at, found, used)
                 used += 1
         found.begin[i + 1] = used
     return found
@@ -270,14 +264,15 @@ def _can_let_go(into: float, speed: float, begun: bool) -> bool:
 
 
 @compiled
-def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals, mine: int,
-             theirs: int, pair: int, desired: FloatArray, found: Meetings, n: int) -> None:
+def _compare(conflicts: ConflictTable, rules: CrossingRules, agents: AgentTable,
+             arrivals: Arrivals, mine: int, theirs: int, pair: int, at: Situation,
+             found: Meetings, n: int) -> None:
     """Write the meeting of two arrivals, with the conflict's extent for both, into row n."""
     owner, conflict = arrivals.owner[theirs], arrivals.conflict[mine]
     into, out = (_into(conflicts, arrivals, theirs, pair), _out(conflicts, arrivals, theirs, pair))
     speed, here = arrivals.speed[theirs], _into(conflicts, arrivals, mine, pair)
     clear, leave, slower = out, _out(conflicts, arrivals, mine, pair), 0.0
-    i = arrivals.owner[mine]
+    i, desired = arrivals.owner[mine], at.desired
     # Where a lane ends beside another, and in a dense roundabout, agents leave the whole conflict
     # free: a roundabout that is full would block its exits.
     ring = abs(conflicts.priority[conflict]) > 1
@@ -314,4 +309,8 @@ def _compare(conflicts: ConflictTable, rules: CrossingRules, arrivals: Arrivals,
     found.apart[n] = there > late + rules.gap_after or gone + ahead < early
     found.inside[n] = out > 0.0 and _has_entered(arrivals, theirs, mine, into)
     found.committed[n] = into < speed**2 / (2.0 * rules.deceleration)
+    found.courteous[n] = owner >= 0 and _can_let_go(
+        into, speed, agents.blocker[at.slots[owner]] == at.slots[i])
+    found.gentle[n] = _can_let_go(
+        here, arrivals.speed[mine], owner >= 0 and agents.blocker[at.slots[i]] == at.slots[owner])
     found.tapers[n] = conflicts.tapers[conflict]
