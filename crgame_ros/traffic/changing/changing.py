@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import math
 from typing import Any, NamedTuple
 
-from crgame_ros.traffic.changing.courtesy import CourtesyRules, relief_at_change
+from crgame_ros.traffic.changing.courtesy import (
+    CourtesyRules,
+    fading,
+    note_leaders,
+    relief_at_change,
+)
 from crgame_ros.traffic.changing.lane_change_intents import (
     Destinations,
     lane_change_intents,
@@ -231,7 +236,7 @@ class LaneChanges:
         self._to = Destinations(routes.next, routes.change, routes.remaining, routes.cost,
                                 routes.drops, np.isfinite(conflicts.table.entry), NARROW)
         self._followers, self._drivers = followers, drivers
-        self._cooperative = cooperative
+        self._cooperative, self._fading = cooperative, fading(time_step_s)
         self._calm = max(1, round(CALM / time_step_s))
         self._content = round(CONTENT / time_step_s)
         self._thoughts = max(1, round(THOUGHT / time_step_s))
@@ -239,6 +244,17 @@ class LaneChanges:
         self._gaps = GapAcceptance()
         self._courtesy = CourtesyRules()
         self._patience = max(1, round(self._courtesy.patience / time_step_s))
+
+    def note_leaders(self, agents: Agents, slots: IntArray, gap: FloatArray,
+                     leader: IntArray) -> None:
+        """
+        Note the leaders of agents (A), and let shortened gaps open gradually.
+
+        :param gap, leader: (A) as in `Ahead`.
+        """
+        wanted = self._followers.for_agents(slots).desired_gap(agents.speed[slots])
+        note_leaders(agents.table, slots, gap, leader, np.asarray(wanted, float), self._fading,
+                     self._cooperative)
 
     def finish(self, k: int, agents: Agents) -> None:
         """End the changes that are complete, and those that make no progress."""
