@@ -3,7 +3,6 @@
 """The exceptions of the package: each message says what is wrong, where, and what to do."""
 
 import reprlib
-from typing import Any
 
 # Messages are shown in a terminal, a log or a small window [characters].
 LONGEST = 480
@@ -43,7 +42,7 @@ class InputError(CrgameError):
         super().__init__(f'{text}; {remedy}' if remedy else text)
 
 
-def short(value: Any) -> str:
+def short(value: object) -> str:
     """Return a value as text for a message, shortened if it is long."""
     return _SHORT.repr(value)
 

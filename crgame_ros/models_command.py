@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import importlib
 import inspect
 import textwrap
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import InputError
 
@@ -42,7 +42,7 @@ def registry_of(kind: str) -> 'ModelRegistry':
     return found
 
 
-def purpose_of(kind: type[Any]) -> str:
+def purpose_of(kind: type[object]) -> str:
     """Return the first sentence of a class's docstring."""
     return inspect.cleandoc(kind.__doc__ or '').split('\n')[0]
 

@@ -25,6 +25,8 @@ POLICY = 'policy:'
 # Kinds of values, as text after "give".
 VALUE_WORDS = {float: 'a number', int: 'a whole number', bool: 'true or false', str: 'a text',
                types.NoneType: 'null'}
+# Hints of a value of any kind.
+ANY_VALUE = (object, object)
 
 
 class ModelRegistry:
@@ -59,8 +61,8 @@ class ModelRegistry:
         others = {point.name for point in entry_points(group=self.entry_point_group)}
         return (*self.built_in, *sorted(others - self.built_in.keys()))
 
-    def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
-               **given: Any) -> Any:
+    def create(self, name: str, options: Mapping[str, object] | None = None, where: str = '',
+               **given: object) -> Any:
         """
         Create an object of a named class.
 
@@ -105,7 +107,7 @@ class ModelRegistry:
             raise InputError(f'does not define {missing}', label, self._remedy)
         return found
 
-    def resolve(self, name: str, where: str, label: str) -> Any:
+    def resolve(self, name: str, where: str, label: str) -> object:
         """
         Return the object that a name stands for, of any kind.
 
@@ -113,7 +115,7 @@ class ModelRegistry:
         :param label: description of the object in messages.
         :raises InputError: if there is none of that name.
         """
-        found: Any
+        found: object
         if name in self.built_in:
             found = _from_module(self.built_in[name], label)
         elif ':' in name:
@@ -134,7 +136,7 @@ class ModelRegistry:
         """Return the description of an object in messages, with the place that names it."""
         return f'{where}: {self.kind} {name}' if where else f'{self.kind} {name}'
 
-    def _from_file(self, path: Path, attribute: str, label: str) -> Any:
+    def _from_file(self, path: Path, attribute: str, label: str) -> object:
         if not path.is_file():
             raise InputError(f'there is no file {path}', label, 'check the path')
         try:
@@ -188,7 +190,7 @@ def _is_beside(module: types.ModuleType, folder: Path) -> bool:
     return folder in (path.parent, path.parent.parent if path.name == '__init__.py' else None)
 
 
-def _from_module(target: str, label: str) -> Any:
+def _from_module(target: str, label: str) -> object:
     module_name, _, attribute = target.partition(':')
     try:
         module = importlib.import_module(module_name)
@@ -212,7 +214,7 @@ def planner_packages_install() -> str:
             f'{share_directory() / "requirements-planners.txt"}')
 
 
-def _attribute(module: types.ModuleType, attribute: str, label: str) -> Any:
+def _attribute(module: types.ModuleType, attribute: str, label: str) -> object:
     found = getattr(module, attribute, None) if attribute else None
     if found is None:
         raise InputError(f'{module.__name__} has no class "{attribute}"', label,
@@ -220,8 +222,8 @@ def _attribute(module: types.ModuleType, attribute: str, label: str) -> Any:
     return found
 
 
-def _checked_options(found: type[Any], options: Mapping[str, Any], given: Mapping[str, Any],
-                     where: str, label: str) -> dict[str, Any]:
+def _checked_options(found: type[object], options: Mapping[str, object],
+                     given: Mapping[str, object], where: str, label: str) -> dict[str, object]:
     signature = inspect.signature(found).parameters
     named = {key: parameter for key, parameter in signature.items()
              if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)}
@@ -237,17 +239,17 @@ def _checked_options(found: type[Any], options: Mapping[str, Any], given: Mappin
     for key, value in options.items():
         if key not in parameters:
             raise InputError(f'"{key}" is unknown', where, f'allowed are: {allowed}')
-        checked[key] = _checked(value, hints.get(key, Any), key, where, allowed)
+        checked[key] = _checked(value, hints.get(key, object), key, where, allowed)
     for key, parameter in parameters.items():
         if parameter.default is parameter.empty and key not in checked:
             raise InputError(f'"{key}" is missing', where, f'allowed are: {allowed}')
     return checked
 
 
-def _checked(value: Any, hint: Any, key: str, where: str, allowed: str) -> Any:
+def _checked(value: object, hint: object, key: str, where: str, allowed: str) -> object:
     choices = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
     for choice in choices:
-        if choice is Any or (choice is types.NoneType and value is None):
+        if choice in ANY_VALUE or (choice is types.NoneType and value is None):
             return value
         if get_origin(choice) is Literal:
             if value in get_args(choice):

@@ -11,7 +11,7 @@ from pathlib import Path
 import re
 import subprocess
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import numbered
@@ -74,7 +74,7 @@ def replay(values: argparse.Namespace) -> int:
     for name in values.planner:
         planner_class(name)
     drive = _live if values.live else _offline
-    found: list[dict[str, Any]] = [
+    found: list[dict[str, object]] = [
         {'planner': 'recorded', 'criticality': measure_log(recorded).as_dict()}]
     folder, runs = drive(values, bag, recorded)
     # A run's last line, to be told after the table.
@@ -169,14 +169,14 @@ def _make_folder(out: Path | None, run: Path) -> Path:
     return folder
 
 
-def _file_name(planner: str, among: Sequence[str] | Mapping[str, Any]) -> str:
+def _file_name(planner: str, among: Sequence[str] | Mapping[str, object]) -> str:
     """Return the name of a planner's file, distinct from those of planners in other folders."""
     name = re.sub(r'\W+', '_', Path(planner).name)
     same = [each for each in among if re.sub(r'\W+', '_', Path(each).name) == name]
     return name if len(same) == 1 else f'{name}_{same.index(planner) + 1}'
 
 
-def _table(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _table(found: Sequence[Mapping[str, object]]) -> Iterator[str]:
     """Yield the lines of the comparison, in columns."""
     from crgame_ros.analysis.measure_command import HEAD, replay_rows
     rows = [HEAD, *replay_rows(found)]

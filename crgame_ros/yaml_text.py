@@ -96,7 +96,7 @@ def read_text(path: Path, what: str, remedy: str = 'mend the file',
 
 
 def parse_yaml(text: str, where: str, remedy: str = 'mend the file',
-               max_characters: int = MAX_BYTES) -> Any:
+               max_characters: int = MAX_BYTES) -> object:
     """
     Read YAML text safely.
 

@@ -14,7 +14,7 @@ from crgame_ros.timing.metrics import slowness
 NO_PLANS = 3
 
 
-def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, Any],
+def tell_outcome(say: Callable[[str], object], outcome: Mapping[str, object],
                  criticality: Criticality | None, name: str = '',
                  scores: Sequence[VehicleScores] = ()) -> int:
     """
@@ -57,7 +57,7 @@ def outcome_line(outcome: Mapping[str, Any], criticality: Criticality | None = N
     return ', '.join(parts)
 
 
-def undriven(outcome: Mapping[str, Any]) -> list[str]:
+def undriven(outcome: Mapping[str, object]) -> list[str]:
     """Return one line for each AV that drove none of its planner's plans, with the reason."""
     return [f'{av}: no plan of its planner was driven: {found.trouble}'
             for av, found in plans_of_report(outcome).items()

@@ -3,7 +3,7 @@
 """The measures of `crgame measure`: how critical a run was, and how people drove."""
 
 from collections.abc import Callable, Collection
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.driver import measure_behaviour
 from crgame_ros.analysis.behaviour.task_events import detection_scores, DetectionScore, task_events
@@ -28,7 +28,7 @@ class RunMeasures(NamedTuple):
     behaviour: tuple[DriverBehaviour, ...]
     detection: tuple[DetectionScore, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the dictionary that `crgame measure --json` writes."""
         return {**self.criticality.as_dict(),
                 'behaviour': {each.vehicle_id: each.as_dict() for each in self.behaviour},

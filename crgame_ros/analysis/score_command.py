@@ -201,7 +201,7 @@ def _commonroad(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield 'feasibility', _feasibility(found['feasibility'])
 
 
-def _feasibility(found: dict[str, Any]) -> str:
+def _feasibility(found: dict[str, object]) -> str:
     if found['feasible'] is None:
         return f'unknown: {found["reason"]}'
     if found['feasible']:
@@ -210,7 +210,7 @@ def _feasibility(found: dict[str, Any]) -> str:
             f'{found["transitions"]} transitions: {found["reason"]}')
 
 
-def _goal(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
+def _goal(found: dict[str, object]) -> Iterator[tuple[str, str]]:
     if found['reached_s'] is not None:
         yield 'goal', f'reached after {found["reached_s"]:.1f} s'
     elif found['last_distance_m'] is not None:

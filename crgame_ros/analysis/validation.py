@@ -239,7 +239,7 @@ def _yaml(path: Path, _progress: Progress | None) -> FileVerdict:
     return FileVerdict(file_kind.title.lower(), tuple(faults[:_SHOWN]), remarks)
 
 
-def _yaml_kind(values: Any, path: Path) -> tuple[FileKind, tuple[InputError, ...]]:
+def _yaml_kind(values: object, path: Path) -> tuple[FileKind, tuple[InputError, ...]]:
     """Choose the kind of file that declares most of the keys and has the fewest faults."""
     shares = {name: len(kind.keys() & values.keys()) if isinstance(values, dict) else 0
               for name, kind in FILE_KINDS.items()}

@@ -10,7 +10,6 @@ import json
 import math
 import secrets
 from types import MappingProxyType
-from typing import Any
 
 from crgame_ros.analysis.criticality.criticality import EXPOSURES
 from crgame_ros.analysis.criticality.rows import MEASURED
@@ -112,7 +111,7 @@ class Hub:
         self.send_rights(client, accepted)
         return accepted
 
-    def set_document(self, kind: str, content: Mapping[str, Any]) -> None:
+    def set_document(self, kind: str, content: Mapping[str, object]) -> None:
         """
         Remember a document and send it to all clients, if it has changed.
 
@@ -128,7 +127,7 @@ class Hub:
         for client in tuple(self._clients.values()):
             client.put_document(kind, text)
 
-    def send_event(self, kind: str, content: Mapping[str, Any],
+    def send_event(self, kind: str, content: Mapping[str, object],
                    only: Client | None = None) -> None:
         """
         Send an event, which is not remembered.
@@ -209,13 +208,13 @@ class Hub:
                 client.drop('says nothing')
 
 
-def _rights(client: Client) -> dict[str, Any]:
+def _rights(client: Client) -> dict[str, object]:
     rights, granted = client.rights, client.granted
     return {'role': rights.role, 'directs': rights.directs, 'drives': rights.drives,
             'seat': rights.seat, 'may_direct': granted.directs, 'may_drive': granted.drives}
 
 
-def _encode(kind: str, content: Mapping[str, Any]) -> bytes:
+def _encode(kind: str, content: Mapping[str, object]) -> bytes:
     message = {'type': kind, **content}
     try:
         text = json.dumps(message, allow_nan=False, separators=(',', ':'))
@@ -225,7 +224,7 @@ def _encode(kind: str, content: Mapping[str, Any]) -> bytes:
     return without_paths(text).encode()
 
 
-def _finite(value: Any) -> Any:
+def _finite(value: object) -> object:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

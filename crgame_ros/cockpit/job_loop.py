@@ -32,7 +32,7 @@ _NICE = 10
 # that the guard allows, would take 33 s and 1.4 GB (docs/measurements.md).
 MOST_CPU_S = 20.0
 
-Job = Callable[..., dict[str, Any]]
+Job = Callable[..., dict[str, object]]
 
 
 class JobOutcome(IntEnum):

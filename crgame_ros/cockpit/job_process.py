@@ -9,7 +9,6 @@ import logging
 import os
 from pathlib import Path
 import sys
-from typing import Any
 
 from crgame_ros.cockpit.job_loop import HEADER, JobOutcome
 from crgame_ros.errors import CrgameError, InputError
@@ -46,7 +45,7 @@ class JobProcess:
             await self._running()
 
     async def run(self, job: str, *, unwanted: Callable[[], bool] = lambda: False,
-                  **arguments: Any) -> bytes:
+                  **arguments: object) -> bytes:
         """
         Run a job.
 
@@ -77,7 +76,7 @@ class JobProcess:
         if process.stdin is not None:
             process.stdin.close()
 
-    async def _run(self, job: dict[str, Any], unwanted: Callable[[], bool]) -> bytes:
+    async def _run(self, job: dict[str, object], unwanted: Callable[[], bool]) -> bytes:
         done = False
         try:
             async with asyncio.timeout(self._timeout_s):
@@ -97,7 +96,7 @@ class JobProcess:
             raise InputError(answer.decode('utf-8', 'replace'))
         return answer
 
-    async def _wanted(self, job: dict[str, Any],
+    async def _wanted(self, job: dict[str, object],
                       unwanted: Callable[[], bool]) -> tuple[JobOutcome, bytes]:
         """Return the answer of a job, as long as a client waits for it."""
         exchange = asyncio.create_task(self._exchange(json.dumps(job).encode() + b'\n'))

@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 import re
 import secrets
-from typing import Any, Literal
+from typing import Literal
 
 from crgame_ros.cockpit.job_process import JobProcess
 from crgame_ros.cockpit.page_messages import clean_text
@@ -98,7 +98,7 @@ class Library:
         # The game that was started last: a reset reads its file again.
         self._loaded = ''
 
-    async def listing(self) -> dict[str, Any]:
+    async def listing(self) -> dict[str, object]:
         """Return the answer of /api/scenarios, read anew from the folders."""
         folders = await asyncio.to_thread(self._list)
         self._entries = {entry.id: entry for _, entries in folders for entry in entries}

@@ -169,7 +169,7 @@ def _choice(body: bytes) -> Choice:
                    if 'options' in entry})
 
 
-def _by_vehicle(entries: Any, what: str) -> dict[str, str]:
+def _by_vehicle(entries: object, what: str) -> dict[str, str]:
     if not isinstance(entries, list) or len(entries) > MAX_VEHICLES:
         raise InputError('is no list of vehicles', 'choice', 'load the page again')
     if not all(isinstance(entry, dict) for entry in entries):
@@ -177,13 +177,13 @@ def _by_vehicle(entries: Any, what: str) -> dict[str, str]:
     return {_text(entry.get('id')): _text(entry.get(what)) for entry in entries}
 
 
-def _options(value: Any) -> dict[str, str]:
+def _options(value: object) -> dict[str, str]:
     if not isinstance(value, dict) or len(value) > MAX_OPTIONS:
         raise InputError('holds something other than options', 'choice', 'load the page again')
     return {_text(key): _text(given) for key, given in value.items()}
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     if not isinstance(value, str) or len(value) > MAX_TEXT:
         raise InputError('misses a text', 'choice', 'load the page again')
     return value

@@ -73,12 +73,12 @@ class MessageFrames:
         scheduler = self._game.scheduler
         return Place(self._game.epoch, n, scheduler.k(n), n * scheduler.dt_s)
 
-    def place_of(self, message: Any) -> Place | None:
+    def place_of(self, message: object) -> Place | None:
         """Return the place of a stamped message; None if it is of an earlier run."""
         n = self._game.scheduler.step_of_stamp(stamp_of(message))
         return None if n < 0 else self.place(n)
 
-    def states(self, message: Any) -> FloatArray:
+    def states(self, message: object) -> FloatArray:
         """Return the vehicles' states, (V, 8), and keep them for scans."""
         states = self._world.vehicle_states(message)
         self.mounts.add_states(self._game.scheduler.step_of_stamp(stamp_of(message)), states)
@@ -92,13 +92,13 @@ class MessageFrames:
         """
         return Frame('state', frames.encode_state(*place, state_rows(states, commands)))
 
-    def objects(self, place: Place, message: Any) -> Frame:
+    def objects(self, place: Place, message: object) -> Frame:
         """Return the frame of `/traffic/objects`."""
         objects = self._world.object_states(message)
         return Frame('objects', frames.encode_objects(
             *place, np.concatenate((objects.poses, objects.velocities), axis=1)))
 
-    def plan(self, place: Place, av: str, message: Any) -> Frame:
+    def plan(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of an AV's plan."""
         where = f'/{av}/plan'
         series = from_joint_trajectory(_short(message, where), where)
@@ -125,7 +125,7 @@ class MessageFrames:
         seen = sorted((column, *(self.columns[layout.ids[number]] for number in here)))
         return Frame(f'seen:{column}', frames.encode_seen(*place, column, seen))
 
-    def prediction(self, place: Place, av: str, message: Any) -> Frame:
+    def prediction(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of a request's predictions of the objects that are present."""
         where = f'/{av}/plan_request'
         series = from_joint_trajectory(_short(message, where), where)
@@ -138,12 +138,12 @@ class MessageFrames:
         return Frame(f'prediction:{column}', frames.encode_prediction(
             *place, column, columns, futures[present]))
 
-    def estimate(self, place: Place, av: str, message: Any) -> Frame:
+    def estimate(self, place: Place, av: str, message: object) -> Frame:
         """Return the frame of an AV's pose estimate."""
         column = self.columns[av]
         return Frame(f'estimate:{column}', estimate_frame(place, column, message))
 
-    def scan(self, place: Place, av: str, message: Any) -> Frame | None:
+    def scan(self, place: Place, av: str, message: object) -> Frame | None:
         """Return the frame of a scan; None if the AV lacks the sensor or its pose is unknown."""
         scan = scan_frame(place, message, self.mounts, self.columns)
         if scan is None or scan.av != av:
@@ -167,7 +167,7 @@ class MessageFrames:
         return Frame('criticality', frames.encode_criticality(
             *self.place(int(rows[0, 1])), most_critical_rows(rows)))
 
-    def occupancy(self, place: Place, message: Any) -> Frame:
+    def occupancy(self, place: Place, message: object) -> Frame:
         """Return the frame of the map of permanent obstacles, valid from a place on."""
         return Frame('occupancy', occupancy_frame(place, message))
 

@@ -28,7 +28,7 @@ from crgame_ros.yaml_text import parse_yaml
 UPLOAD = 'upload'
 
 
-def check(path: Path) -> dict[str, Any]:
+def check(path: Path) -> dict[str, object]:
     """
     Check an uploaded file.
 
@@ -38,7 +38,7 @@ def check(path: Path) -> dict[str, Any]:
     return {'title': _scenario(path, UPLOAD).benchmark_id}
 
 
-def preview(path: Path, kind: str) -> dict[str, Any]:
+def preview(path: Path, kind: str) -> dict[str, object]:
     """
     Return the preview of a game or scenario.
 
@@ -63,7 +63,7 @@ def preview(path: Path, kind: str) -> dict[str, Any]:
         'notices': list(setup.notices)}
 
 
-def planner_options(planner: str) -> dict[str, Any]:
+def planner_options(planner: str) -> dict[str, object]:
     """
     Return the options that a planner declares.
 
@@ -75,7 +75,7 @@ def planner_options(planner: str) -> dict[str, Any]:
 
 def compose(path: Path, kind: str, drivers: Mapping[str, str], planners: Mapping[str, str],
             options: Mapping[str, Mapping[str, str]], allowed_drivers: list[str],
-            allowed_planners: list[str]) -> dict[str, Any]:
+            allowed_planners: list[str]) -> dict[str, object]:
     """
     Return the text of the chosen game.
 
@@ -137,7 +137,7 @@ def _setup(path: Path, kind: str) -> Setup:
     return build_setup(game, _scenario(path, UPLOAD if kind == UPLOAD else path.name))
 
 
-def _typed(value: Any) -> str:
+def _typed(value: object) -> str:
     """Return the text that gives an option's value when it is typed."""
     if isinstance(value, str):
         with suppress(InputError):
@@ -158,7 +158,7 @@ def _choice(chosen: Mapping[str, str], vehicle: str, own: str, allowed: list[str
     return value
 
 
-def _refuse_strangers(chosen: Mapping[str, Any],
+def _refuse_strangers(chosen: Mapping[str, object],
                       specs: list[HumanSpec] | list[AvSpec]) -> None:
     if not chosen.keys() <= {spec.id for spec in specs}:
         raise InputError('names a vehicle that the game does not have', 'choice',

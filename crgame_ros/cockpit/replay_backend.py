@@ -126,7 +126,7 @@ class Replay:
         """Return the run and its recorded CRITICALITY frames; None if none were recorded."""
         return self.index.run, recorded_criticality(self._reader, self.index.run)
 
-    def info(self) -> dict[str, Any]:
+    def info(self) -> dict[str, object]:
         """Return the description of the run: its times, its marks and its documents over time."""
         scheduler = self.index.run.game.scheduler
         first, last = self.index.first_n, self.index.last_n
@@ -144,7 +144,7 @@ class Replay:
             'notices': list(self._reader.notices), 'scene': self.scene}
 
 
-def _event(mark: Mark, dt_s: float, index: RunIndex) -> dict[str, Any]:
+def _event(mark: Mark, dt_s: float, index: RunIndex) -> dict[str, object]:
     # The state of a violation can be missing at the end; it is then shown at the nearest step.
     n = min(max(mark.n, index.first_n), index.last_n)
     return {'t': n * dt_s, 'until_t': min(max(mark.last_n, n), index.last_n) * dt_s, 'n': n,
@@ -204,7 +204,7 @@ class ReplayBackend:
         self._runs.move_to_end(epoch)
         return self._runs[epoch]
 
-    def info(self, epoch: int | None = None) -> dict[str, Any]:
+    def info(self, epoch: int | None = None) -> dict[str, object]:
         """
         Return the description of a run; wait until it has been read.
 
@@ -222,7 +222,7 @@ class ReplayBackend:
         """
         return self._thread.submit(self._chunk, number, epoch).result()
 
-    def _info(self, epoch: int | None) -> dict[str, Any]:
+    def _info(self, epoch: int | None) -> dict[str, object]:
         replay = self._run(self.epoch if epoch is None else epoch)
         return {**replay.info(), 'epochs': list(self.epochs), 'recording': self.path.name}
 
@@ -277,7 +277,7 @@ class ReplayBackend:
                 self._measured[epoch] = data
         return web.Response(body=self._measured[epoch], content_type='application/octet-stream')
 
-    async def _read(self, what: Callable[..., Any], *arguments: Any,
+    async def _read(self, what: Callable[..., object], *arguments: object,
                     thread: ThreadPoolExecutor | None | Literal['own'] = 'own') -> Any:
         try:
             return await asyncio.get_running_loop().run_in_executor(

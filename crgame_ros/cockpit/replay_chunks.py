@@ -66,7 +66,7 @@ class ChunkBuilder:
         self._plans = {f'/{av}/plan' for av in avs}
         self._scans = {f'/{av}/scan' for av in self._frames.mounts.avs}
         # Functions that make frames of each topic's messages, in the order of carrying over.
-        self._makers: dict[str, Callable[[Place, Any], list[Frame | None]]] = {
+        self._makers: dict[str, Callable[[Place, object], list[Frame | None]]] = {
             OBJECT_STATES_TOPIC: _single(self._frames.objects)}
         for av in avs:
             self._makers[f'/{av}/plan_request'] = partial(self._planner_view, av)
@@ -126,7 +126,7 @@ class ChunkBuilder:
         for frame in newest.values():
             yield _Entry(low, _BEFORE, -1, frame)
 
-    def _states_of(self, content: Any) -> FloatArray | None:
+    def _states_of(self, content: object) -> FloatArray | None:
         """Return the states of the vehicles; None if the message is malformed."""
         try:
             return self._frames.states(content)
@@ -207,13 +207,13 @@ class ChunkBuilder:
             return []
         return [frame.data for frame in made if frame is not None]
 
-    def _planner_view(self, av: str, place: Place, content: Any) -> list[Frame | None]:
+    def _planner_view(self, av: str, place: Place, content: object) -> list[Frame | None]:
         """Return the frames of a request to an AV's planner."""
         return [self._frames.prediction(place, av, content),
                 self._frames.seen(place, av, content)]
 
 
 def _single(make: Callable[..., Frame | None],
-            *av: str) -> Callable[[Place, Any], list[Frame | None]]:
+            *av: str) -> Callable[[Place, object], list[Frame | None]]:
     """Return a function that makes at most one frame of a message, optionally for a given AV."""
     return lambda place, content: [make(place, *av, content)]

@@ -5,7 +5,6 @@
 from collections.abc import Iterable
 import math
 import struct
-from typing import Any
 
 from crgame_ros.cockpit import frames
 from crgame_ros.cockpit.message_frames import state_rows
@@ -45,7 +44,7 @@ class Outline:
         """Return whether the state of a step is a sample."""
         return n % self.stride == 0
 
-    def add_state(self, n: int, content: Any) -> None:
+    def add_state(self, n: int, content: object) -> None:
         """
         Add a decoded message of `/vehicles/state`.
 

@@ -5,7 +5,6 @@
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 from crgame_ros.cockpit.run_status import RunStatus
 from crgame_ros.errors import InputError
@@ -75,7 +74,7 @@ _FRAME_SKIP = '/timing/frame_skip'
 _STATUS_PARTS = ('timing', 'planners', 'drivability', 'seats_lost')
 
 # (n, content): the content holds from step n until the next entry.
-Track = list[tuple[int, Any]]
+Track = list[tuple[int, object]]
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ class TrackCollector:
                 track.pop(0)
         return RunTracks(self._tracks, self._marks.marks())
 
-    def _put(self, kind: str, n: int, content: Any) -> None:
+    def _put(self, kind: str, n: int, content: object) -> None:
         track = self._tracks.setdefault(kind, [])
         if track and track[-1][1] == content:
             return
@@ -165,7 +164,7 @@ class TrackCollector:
             track.pop()
         track.append((n, deepcopy(content)))
 
-    def _add_status(self, status: Any, n: int) -> None:
+    def _add_status(self, status: object, n: int) -> None:
         taken = read_status(status)
         self._status.add(taken, n * self._scheduler.dt_s)
         content = self._status.document()

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.recording.run_folder import FINISHED_MARK, run_folder
 
@@ -19,7 +18,7 @@ def run_id(folder: Path) -> str:
     return hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
 
 
-def files_document(session: Path, epoch: int) -> dict[str, Any]:
+def files_document(session: Path, epoch: int) -> dict[str, object]:
     """
     Return the files document.
 
@@ -35,9 +34,9 @@ def files_document(session: Path, epoch: int) -> dict[str, Any]:
             'complete': complete, 'contacts': _contacts(folder) if complete else []}
 
 
-def _contacts(folder: Path) -> list[dict[str, Any]]:
+def _contacts(folder: Path) -> list[dict[str, object]]:
     """Return the contacts in the timing reports of a run."""
-    found: list[dict[str, Any]] = []
+    found: list[dict[str, object]] = []
     for path in sorted(folder.glob('timing*.json')):
         try:
             found.extend(json.loads(path.read_text()).get('contacts') or [])

@@ -47,11 +47,11 @@ class RunStatus:
 
     def __init__(self) -> None:
         self.real_time_factor = 1.0
-        self.recording: dict[str, Any] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
-                                          'text': 'nothing is recorded'}
+        self.recording: dict[str, object] = {'state': 'none', 'messages': 0, 'megabytes': 0.0,
+                                             'text': 'nothing is recorded'}
         self.seats_lost: dict[str, bool] = {}
         # Devices at the machine of the game, by seat.
-        self.devices: dict[str, dict[str, Any]] = {}
+        self.devices: dict[str, dict[str, object]] = {}
         # Counts changes of the verdicts, so that a collision is heard when it is seen.
         self.verdicts = 0
         self._vehicles: tuple[str, ...] = ()
@@ -71,10 +71,10 @@ class RunStatus:
         self.stays = False
         self.awaited: list[str] = []
         self.countdown_s = 0
-        self.timing: dict[str, Any] | None = None
-        self.planners: dict[str, dict[str, Any]] = {}
+        self.timing: dict[str, object] | None = None
+        self.planners: dict[str, dict[str, object]] = {}
         self.drivability: dict[str, dict[str, Any]] = {}
-        self.criticality: dict[str, dict[str, Any]] = {}
+        self.criticality: dict[str, dict[str, object]] = {}
         self.seats_lost = {}
         self.devices = {}
         self.contacts: list[dict[str, Any]] = []
@@ -172,7 +172,7 @@ class RunStatus:
                 'drivability': self.drivability, 'criticality': self.criticality,
                 'seats_lost': {} if over else self.seats_lost}
 
-    def alarms_document(self) -> dict[str, Any]:
+    def alarms_document(self) -> dict[str, object]:
         """Return the alarms document."""
         return {'active': [
             {'id': alarm.id, 'kind': alarm.kind, 'subject': alarm.subject, 'text': alarm.text,
@@ -186,7 +186,7 @@ class RunStatus:
         elif alarm.id not in self._alarms or self._alarms[alarm.id].text != text:
             self._alarms[alarm.id] = alarm
 
-    def _planner(self, vehicle: str) -> dict[str, Any]:
+    def _planner(self, vehicle: str) -> dict[str, object]:
         return self.planners.setdefault(vehicle, {
             'running': True, 'stale': False, 'latency_ms': None, 'age_ms': None, 'accepted': 0,
             'refused': 0, 'of_others': 0, 'plan_time_ms': None, 'fallbacks': 0, 'planner': '',
@@ -277,7 +277,7 @@ def _tracking(values: Mapping[str, str]) -> dict[str, float | None] | None:
     return {name: _number(values.get(name)) for name in TRACKING}
 
 
-def _criticality(level: int, values: Mapping[str, str]) -> dict[str, Any]:
+def _criticality(level: int, values: Mapping[str, str]) -> dict[str, object]:
     """Read a vehicle's criticality: the worst values so far and their limits."""
     worst = {name[len(_WORST):-len(_OF)]: other for name, other in values.items()
              if name.startswith(_WORST) and name.endswith(_OF)}

@@ -327,7 +327,7 @@ def _bounds(network: LaneletNetwork, game: GameDocument) -> list[float]:
     return flat(np.array([together.min(axis=0), together.max(axis=0)]))
 
 
-def _finite(value: Any) -> Any:
+def _finite(value: object) -> Any:
     """Replace NaN and infinities, which JSON does not have, by null."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None

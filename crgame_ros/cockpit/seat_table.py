@@ -6,7 +6,6 @@ from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 import math
 from pathlib import PurePath
-from typing import Any
 
 from crgame_ros.cockpit.held_seat import HeldSeat
 from crgame_ros.driver.source import COCKPIT
@@ -208,7 +207,7 @@ class SeatTable:
         return seat
 
     def document(self, names: Mapping[str, str], lost: Mapping[str, bool],
-                 now_s: float = 0.0) -> dict[str, Any]:
+                 now_s: float = 0.0) -> dict[str, object]:
         """
         Return the seats for the page.
 
@@ -219,9 +218,9 @@ class SeatTable:
         return {'seats': {name: self._entry(name, names, lost, now_s) for name in self.seats}}
 
     def _entry(self, name: str, names: Mapping[str, str], lost: Mapping[str, bool],
-               now_s: float) -> dict[str, Any]:
+               now_s: float) -> dict[str, object]:
         entry, held = self.seats[name], self.held.get(name)
-        content: dict[str, Any] = {
+        content: dict[str, object] = {
             'source': entry.source, 'driver': short_source(entry.driver),
             'holder': None, 'holder_name': None, 'requests': [], 'others': [], 'kept': None,
             'offer': None, 'ready': entry.here and entry.ready,

@@ -130,7 +130,7 @@ class PlanMotion:
         return np.asarray(sampled)
 
 
-def _cubic(share: Any, first: Any, second: Any, start: Any, end: Any) -> Any:
+def _cubic(share: Any, first: object, second: Any, start: Any, end: object) -> Any:
     """Return the cubic Hermite polynomial between two values with given slopes, and its slope."""
     rest, step = 1.0 - share, second - first
     return (first + share * share * (3.0 - 2.0 * share) * step

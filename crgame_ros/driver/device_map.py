@@ -96,7 +96,7 @@ class Code(Special):
             raise InputError(f'"{key}" is {given!r:.80}', where, f'give {self}')
         return int(code)
 
-    def json_schema(self) -> dict[str, Any]:
+    def json_schema(self) -> dict[str, object]:
         """Return the schema: all names of the kind."""
         return {'enum': sorted(name for name in ecodes.ecodes if name.startswith(self._prefix))}
 
@@ -462,7 +462,7 @@ def parse_device_map(text: str, where: str) -> DeviceMap:
     return _device_map(parse_yaml(text, where, REMEDY), where)
 
 
-def _device_map(values: Any, where: str) -> DeviceMap:
+def _device_map(values: object, where: str) -> DeviceMap:
     file = read(DeviceFile, values, where)
     evdev, joy = file.controls() or (None, None)
     keys = None if file.keys is None else KeyBindings(

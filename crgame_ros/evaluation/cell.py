@@ -45,11 +45,11 @@ class Condition:
     planner: str
     perception: str
     traffic: str
-    values: Mapping[str, Any]
+    values: Mapping[str, object]
     inputs: str
-    planner_choice: Mapping[str, Any] | None
-    perception_values: Any
-    traffic_values: Any
+    planner_choice: Mapping[str, object] | None
+    perception_values: object
+    traffic_values: object
     duration_s: float | None
     latency_steps: int
     commonroad_scores: bool
@@ -111,7 +111,7 @@ class Cell(NamedTuple):
         return f',"seed":{self.seed},{self.condition.around_seed[1]}'
 
     @property
-    def factors(self) -> dict[str, Any]:
+    def factors(self) -> dict[str, object]:
         """Return the values of the columns that identify it."""
         return {name: getattr(self if name == 'seed' else self.condition, name)
                 for name in FACTORS}

@@ -73,7 +73,7 @@ class CellBatches:
         # Cells that their batch had no time for, and batches whose workers ended.
         self._left: deque[Cell] = deque()
         self._again: deque[Batch] = deque()
-        self._out: dict[Any, Batch] = {}
+        self._out: dict[object, Batch] = {}
         # Contents of the batches in computation, and the number of these batches for each.
         self._contents: dict[str, Any] = {}
         self._uses: Counter[str] = Counter()
@@ -82,7 +82,7 @@ class CellBatches:
         self._cell_s = math.inf
         self._ended = as_completed(loop=client.loop)
 
-    def results(self) -> Iterator[list[tuple[Cell, dict[str, Any]]]]:
+    def results(self) -> Iterator[list[tuple[Cell, dict[str, object]]]]:
         """
         Compute the cells.
 
@@ -145,7 +145,7 @@ class CellBatches:
     def _next_cell(self) -> Cell | None:
         return self._left.popleft() if self._left else next(self._cells, None)
 
-    def _content(self, digest: str) -> Any:
+    def _content(self, digest: str) -> object:
         if digest not in self._contents:
             self._contents[digest] = self._client.submit(
                 packed_content, self._store.packed(digest), key=f'content-{digest}')
@@ -183,7 +183,7 @@ class CellBatches:
             raise error
         raise CrgameError(f'a worker cannot compute ({type(error).__name__}: {error})')
 
-    def _ended_without(self, batch: Batch, reason: str) -> list[tuple[Cell, dict[str, Any]]]:
+    def _ended_without(self, batch: Batch, reason: str) -> list[tuple[Cell, dict[str, object]]]:
         """Send each cell again, alone, because one of them may be the cause; or give it up."""
         if batch.rounds < _ROUNDS:
             self._again.extend(Batch((cell,), batch.rounds + 1) for cell in batch.cells)

@@ -41,7 +41,7 @@ class GridPlanner:
     """
 
     label: str
-    choice: dict[str, Any] | None
+    choice: dict[str, object] | None
     digest: str
 
 
@@ -63,8 +63,8 @@ class CellGrid:
 
     scenes: tuple[CellScene, ...]
     planners: tuple[GridPlanner, ...]
-    perception: dict[str, Any]
-    traffic: dict[str, Any]
+    perception: dict[str, object]
+    traffic: dict[str, object]
     seeds: tuple[int, ...]
     duration_s: float | None
     latency_steps: int
@@ -92,7 +92,7 @@ class CellGrid:
     def _code(self, scene: CellScene, planner: GridPlanner) -> tuple[str, ...]:
         return (planner.digest,) if planner.choice is not None else scene.digests
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return asdict(self)
 
@@ -176,7 +176,8 @@ def _longer_name(path: Path, paths: Sequence[Path]) -> str:
     return str(whole)
 
 
-def _planner(name: str, label: str, options: dict[str, Any], store: ContentStore) -> GridPlanner:
+def _planner(name: str, label: str, options: dict[str, object],
+             store: ContentStore) -> GridPlanner:
     if name == OWN:
         return GridPlanner(label, None, '')
     if name == EXTERNAL:

@@ -110,7 +110,7 @@ class CellProcess:
                 _read(self._process.stdout, _STARTS_S)
         return self._process
 
-    def _dead(self, process: 'subprocess.Popen[bytes]') -> dict[str, Any]:
+    def _dead(self, process: 'subprocess.Popen[bytes]') -> dict[str, object]:
         try:
             code = process.wait(_ENDS_S)
         except subprocess.TimeoutExpired:
@@ -128,7 +128,7 @@ class CellProcess:
         return _failed('died', f'its process ended with {how}', said)
 
 
-def _failed(status: str, reason: str, trace: str = '') -> dict[str, Any]:
+def _failed(status: str, reason: str, trace: str = '') -> dict[str, object]:
     return {'cell': {'status': status, 'reason': reason, 'traceback': trace}, 'vehicles': []}
 
 
@@ -212,7 +212,7 @@ if __name__ == '__main__':
     main()
 
 
-def dask_setup(_worker: Any) -> None:
+def dask_setup(_worker: object) -> None:
     """Ignore Ctrl-C in the worker: the command handles it, and ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -258,7 +258,7 @@ def compute(batch: str, contents: Mapping[str, Mapping[str, bytes]],
     store = ContentStore(Path(worker.local_directory) / 'crgame-contents')
     for digest, packed in contents.items():
         store.unpack(digest, packed)
-    kept: dict[Any, CellProcess] = vars(_OF_THREAD).setdefault('processes', {})
+    kept: dict[object, CellProcess] = vars(_OF_THREAD).setdefault('processes', {})
     place = (store.folder, limits.memory_bytes)
     if place not in kept:
         for other in kept.values():

@@ -63,7 +63,7 @@ def _adapted(game: Game, loaded: LoadedScenario, cell: Cell, contents: Path) -> 
     choice: dict[str, Any] = {'planner': OWN, 'options': None} \
         if given.planner_choice is None else _resolved(given.planner_choice, contents)
 
-    def spec(kind: type[Any], values: Any, name: str) -> Any:
+    def spec(kind: type[object], values: object, name: str) -> Any:
         return values if values is None or values == OWN else read(
             kind, _resolved(values, contents), name, contents)
     return adapt_game(
@@ -97,7 +97,7 @@ def measured(cell: Cell, result: OfflineResult) -> Run:
     return run
 
 
-def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
+def compute_cell(cell: Cell, contents: Path) -> dict[str, object]:
     """
     Run and measure a cell.
 
@@ -119,9 +119,9 @@ def compute_cell(cell: Cell, contents: Path) -> dict[str, Any]:
                                            'plan_max_s': max(durations_s)})}}
 
 
-def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, Any]:
+def _failure(planners: Mapping[str, PlannerRecord]) -> dict[str, object]:
     """Return failures of planners; the cell fails if one of them never sent a plan that counts."""
-    told: dict[str, Any] = {}
+    told: dict[str, object] = {}
     for vehicle, record in planners.items():
         plans, statistics = record.statistics.plans, record.statistics
         # Without numbers, so that a summary can count them over all cells.

@@ -54,7 +54,7 @@ class CellScene:
     scenario: str
     game: str
     human: str
-    values: dict[str, Any]
+    values: dict[str, object]
     inputs: str
     digests: tuple[str, ...]
     participant: str = ''
@@ -140,7 +140,7 @@ def _scene(game: Game, loaded: LoadedScenario, store: ContentStore, *, game_name
 
 
 def values_of_game(game: Game, store: ContentStore,
-                   loaded: LoadedScenario | None = None) -> dict[str, Any]:
+                   loaded: LoadedScenario | None = None) -> dict[str, object]:
     """
     Copy the files of a game into a store.
 
@@ -153,11 +153,11 @@ def values_of_game(game: Game, store: ContentStore,
     scenario = Content('scenario.xml', {'scenario.xml': guard.encode(loaded.xml_text)})
     store.put(scenario)
     values['scenario'] = scenario.reference
-    found: dict[str, Any] = with_contents(values, store)
+    found: dict[str, object] = with_contents(values, store)
     return found
 
 
-def with_contents(value: Any, store: ContentStore, key: str = '') -> Any:
+def with_contents(value: object, store: ContentStore, key: str = '') -> Any:
     """
     Copy the files that values name into a store.
 

@@ -177,7 +177,7 @@ def _plan(values: argparse.Namespace) -> 'tuple[EvaluationPlan, Path]':
 
 def _given(values: argparse.Namespace) -> dict[str, Any]:
     """Return the values of a plan that the command line gives."""
-    given: dict[str, Any] = {
+    given: dict[str, object] = {
         name: getattr(values, name) for name in ('games', 'scenarios', 'humans')
         if getattr(values, name)}
     if values.games:

@@ -69,7 +69,7 @@ class EvaluationTally:
 
 
 # Called with the progress; with a cell and its row when one has ended.
-Told = Callable[[EvaluationTally, Cell | None, dict[str, Any] | None], object]
+Told = Callable[[EvaluationTally, Cell | None, dict[str, object] | None], object]
 
 
 def evaluate(plan: EvaluationPlan, folder: Path, computing: Computing | None = None,

@@ -77,13 +77,13 @@ class EvaluationFolder:
         """
         return CellGrid.from_dict(self._note()['grid'])
 
-    def plan_values(self) -> dict[str, Any]:
+    def plan_values(self) -> dict[str, object]:
         """
         Read the plan's values.
 
         :raises InputError: if the folder holds no evaluation.
         """
-        values: dict[str, Any] = self._note()['plan']
+        values: dict[str, object] = self._note()['plan']
         return values
 
     @property
@@ -94,7 +94,7 @@ class EvaluationFolder:
     def _note(self) -> dict[str, Any]:
         path = self.path / GRID_FILE
         try:
-            note: dict[str, Any] = json.loads(path.read_bytes())
+            note: dict[str, object] = json.loads(path.read_bytes())
             if note['format'] != FORMAT:
                 raise InputError(f'is of format {note["format"]}, not {FORMAT}', str(path),
                                  'use the version that wrote it')
@@ -107,7 +107,7 @@ class EvaluationFolder:
         return note
 
 
-def _resource(table: TableDeclaration) -> dict[str, Any]:
+def _resource(table: TableDeclaration) -> dict[str, object]:
     schema = table_schema(table)
     schema.pop('foreignKeys', None)
     return {'name': table.name, 'type': 'table', 'path': f'{table.name}/*.parquet',

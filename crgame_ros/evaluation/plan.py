@@ -35,7 +35,7 @@ class PlannerChoice:
 
     planner: Annotated[str, Named(), Advice('name a planner')]
     label: str = ''
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -70,9 +70,9 @@ class EvaluationPlan:
     humans: Annotated[tuple[str, ...], Listed(noun='run')] = ()
     planners: Annotated[tuple[PlannerChoice, ...], Listed(noun='planner')] = (
         PlannerChoice(OWN),)
-    seeds: Any = 1
-    perception: dict[str, Any] = field(default_factory=dict)
-    traffic: dict[str, Any] = field(default_factory=dict)
+    seeds: object = 1
+    perception: dict[str, object] = field(default_factory=dict)
+    traffic: dict[str, object] = field(default_factory=dict)
     duration: Annotated[float, Within(0.0, 86400.0)] | None = None
     latency: Annotated[int, Within(0, 1_000_000)] = 0
     commonroad_scores: bool = False
@@ -109,7 +109,8 @@ class EvaluationPlan:
         return _choices(self.traffic, TrafficSpec, 'traffic', self.base)
 
 
-def _choices(given: Mapping[str, Any], kind: type[Any], what: str, base: Path) -> dict[str, Any]:
+def _choices(given: Mapping[str, object], kind: type[object], what: str,
+             base: Path) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for label, value in (given or {OWN: OWN}).items():
         where = f'{what}: {label}'
@@ -132,7 +133,7 @@ def load_plan(path: Path) -> EvaluationPlan:
     return parse_plan(read_yaml(path, 'plan'), str(path), path.parent)
 
 
-def parse_plan(values: Any, where: str, base: Path) -> EvaluationPlan:
+def parse_plan(values: object, where: str, base: Path) -> EvaluationPlan:
     """
     Check the content of a plan's file.
 

@@ -5,7 +5,7 @@
 from collections.abc import Callable
 import sys
 import time
-from typing import Any, TextIO
+from typing import TextIO
 
 from crgame_ros.evaluation.cell import Cell
 from crgame_ros.evaluation.evaluation import EvaluationTally
@@ -34,7 +34,7 @@ class EvaluationProgress:
         self._failures = 0
 
     def __call__(self, tally: EvaluationTally, cell: Cell | None,
-                 row: dict[str, Any] | None) -> None:
+                 row: dict[str, object] | None) -> None:
         """Update the display; a cell and its row are given when one has ended."""
         now_s = self._clock()
         if self._begin_s is None:
@@ -52,7 +52,7 @@ class EvaluationProgress:
             self._told_s = now_s
             self._write(_line(tally, now_s - self._begin_s, self._bar), last)
 
-    def _fail(self, cell: Cell, row: dict[str, Any]) -> None:
+    def _fail(self, cell: Cell, row: dict[str, object]) -> None:
         self._failures += 1
         if self._failures <= TOLD_FAILURES:
             self._print(f'{row["status"]}: {cell.label} ({cell.key[:8]}): {row["reason"]}')

@@ -43,7 +43,7 @@ Period = Annotated[int, Interval(ge=1, lt=_LARGEST)]
 Amount = Annotated[float, Interval(ge=0.0, lt=math.inf)]
 
 
-def document_entry(event: EventSpec) -> dict[str, Any]:
+def document_entry(event: EventSpec) -> dict[str, object]:
     """Return an event's entry of `/scenario/game`: name, label, kind, when and its parameters."""
     entry = write(event)
     parameters = entry.pop(event.kind)
@@ -53,7 +53,7 @@ def document_entry(event: EventSpec) -> dict[str, Any]:
 class EventEntries(Declared):
     """A mark for events, each written as its `document_entry`."""
 
-    def read(self, given: Any, where: str) -> Any:
+    def read(self, given: object, where: str) -> object:
         """Read the entries."""
         if not isinstance(given, list) or not all(isinstance(entry, dict) for entry in given):
             raise InputError('is no list of events', where)
@@ -63,7 +63,7 @@ class EventEntries(Declared):
                                         if key not in _COMMON}}
             for entry in given], where)
 
-    def write(self, value: Any) -> Any:
+    def write(self, value: Any) -> object:
         """Return the entries."""
         return [document_entry(event) for event in value]
 

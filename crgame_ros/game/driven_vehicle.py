@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass, field
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from annotated_types import Predicate
 from crgame_ros.game.game import AvSpec, ModelSpec, TrackerSpec
@@ -60,7 +60,7 @@ class DrivenAv(DrivenVehicle):
     """
 
     planner: str
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
     planning_problem: int = 0
     transform: Annotated[RigidTransform, Row()] = RigidTransform()
     execution: Literal['perfect', 'tracked'] = AvSpec.execution

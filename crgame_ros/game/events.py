@@ -3,7 +3,7 @@
 """The events of a game, triggered by an experimenter or a condition (FS, external triggers)."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.game.traffic_spec import ReactionTime, Share, SpeedFactor
@@ -116,7 +116,7 @@ class PlannerSwap:
 
     av: str
     planner: Annotated[str, Named(), Wording(r'[\s\S]+', 'give the name of a planner')]
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class TrafficChange:
     agent: str
     speed_factor: SpeedFactor | None = None
     desired_speed: Annotated[float, Within(0.0, 100.0)] | None = None
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
     politeness: Share | None = None
     lane_changes: bool | None = None
     reaction_time: ReactionTime | None = None

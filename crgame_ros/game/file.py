@@ -3,7 +3,6 @@
 """Reads game files: YAML to a checked `Game`, or one clear error."""
 
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.game.game import Game
 from crgame_ros.schema.reading import read
@@ -20,7 +19,7 @@ def load_game(path: Path) -> Game:
     return parse_game(values, str(path), path.parent)
 
 
-def parse_game(values: Any, where: str, base: Path) -> Game:
+def parse_game(values: object, where: str, base: Path) -> Game:
     """
     Check the content of a game file.
 

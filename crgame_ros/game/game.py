@@ -5,7 +5,7 @@
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError
 from crgame_ros.game.events import EventList
@@ -83,7 +83,7 @@ class ModelSpec:
     FORM: ClassVar[Form] = Form('name a model', short='name', rest='options')
 
     name: Annotated[str, Named(), Advice('name a model')]
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ class AvSpec:
 
     id: Annotated[str, Numbered('av'), Wording('av[0-9]{1,3}', 'use av0, av1, …')]  # noqa: A003
     planner: Annotated[str, Named()] = DEFAULT_PLANNER
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
     planning_problem: int | None = None
     vehicle: Annotated[str, Named()] = AUTO
     spawn: Annotated[Literal['problem', 'lanelet'], Meaning('auto', 'problem')] = 'problem'

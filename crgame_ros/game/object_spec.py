@@ -66,7 +66,7 @@ def _parse(reader: Any, path: str) -> tuple[TrajectoryRow, ...]:
     if header not in (_COLUMNS, _COLUMNS[:3]):
         raise InputError(f'its first line is {short(",".join(header))}', path,
                          'begin with t,x,y or t,x,y,yaw')
-    rows: list[list[Any]] = []
+    rows: list[list[object]] = []
     places = []
     for row in reader:
         if any(cell.strip() for cell in row):
@@ -84,7 +84,7 @@ def _as_number(text: str) -> float | str:
         return text
 
 
-def checked_trajectory(rows: Any, where: str,
+def checked_trajectory(rows: object, where: str,
                        places: Sequence[str] = ()) -> tuple[TrajectoryRow, ...]:
     """
     Check the rows of a trajectory; without yaws, use the direction of motion.
@@ -224,13 +224,13 @@ _DRIVEN = OnlyWith(('path', 'lanelet'))
 class Rows(Special):
     """The rows of a trajectory, or the name of a CSV file that holds them."""
 
-    def read(self, given: Any, where: str, key: str, base: Path) -> tuple[TrajectoryRow, ...]:
+    def read(self, given: object, where: str, key: str, base: Path) -> tuple[TrajectoryRow, ...]:
         """Read and check the rows."""
         if isinstance(given, str):
             return read_trajectory(given, base, where)
         return checked_trajectory(given, f'{where}: {key}')
 
-    def json_schema(self) -> dict[str, Any]:
+    def json_schema(self) -> dict[str, object]:
         """Return the JSON Schema of both forms."""
         row = {'type': 'array', 'items': {'type': 'number'}, 'minItems': 3, 'maxItems': 4}
         return {'anyOf': [{'type': 'string'}, {'type': 'array', 'items': row, 'minItems': 2,

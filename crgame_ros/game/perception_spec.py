@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass, field
 import math
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Listed, Named, Numbered, Parts, Within, Wording
@@ -105,7 +105,7 @@ class SensorSpec:
     yaw_noise: Annotated[float, Within(0.0, math.pi)] = 0.01
     velocity_noise: Noise = 0.2
     min_rays: Annotated[int, Within(1, 10000)] = 1
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
 
     def mount(self, rear_to_center: float, length: float) -> tuple[float, float, float]:
         """

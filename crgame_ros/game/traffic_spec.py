@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.schema.declaration import Form
 from crgame_ros.schema.marks import Named, Within
@@ -54,7 +54,7 @@ class TrafficSpec:
     flow: Annotated[float, Within(0.0, 3600.0)] = 0.0
     capacity: Agents | None = None
     model: Annotated[str, Named()] = 'acc'
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, object] = field(default_factory=dict)
     lane_changes: bool = True
     cooperative: bool = True
     swerve: bool = True

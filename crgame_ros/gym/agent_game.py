@@ -54,7 +54,7 @@ class Experiment:
 def make_experiment(
     seats: Sequence[str], game: Game | Path | str | None = None,
     scenario: Path | str | None = None, action: ActionKind = 'acceleration',
-    observation: Mapping[str, Any] | None = None, reward: Mapping[str, float] | None = None,
+    observation: Mapping[str, object] | None = None, reward: Mapping[str, float] | None = None,
     ends: Sequence[str] = ENDS, duration: float | None = None, ticks: int = 1,
     drivers: Mapping[str, str] | None = None, planners: Mapping[str, str] | None = None,
     vary: Mapping[str, float] | None = None, worlds: int | None = None,
@@ -93,7 +93,7 @@ class AgentOutcome(NamedTuple):
     reward: float
     terminated: bool
     truncated: bool
-    info: dict[str, Any]
+    info: dict[str, object]
 
 
 class AgentGame:
@@ -141,7 +141,7 @@ class AgentGame:
         return [self._outcome(seat, off) for seat, off in zip(
             self.seats, self.game.off_road(), strict=True)]
 
-    def info(self) -> dict[str, Any]:
+    def info(self) -> dict[str, object]:
         """Return information on the start of the episode."""
         return {'time_s': self.game.time_s, 'seed': self.game.setup.game.seed}
 

@@ -63,7 +63,7 @@ class DrivingEnv(gymnasium.Env[Seen, NDArray[np.float32]]):
         return self.agent.observed(0), self.agent.info()
 
     def step(self, action: NDArray[np.float32]
-             ) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+             ) -> tuple[Seen, float, bool, bool, dict[str, object]]:
         """
         Drive until the next decision.
 

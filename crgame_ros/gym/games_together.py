@@ -59,7 +59,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         self._painter: ScenePainter | None = None
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None,
-              options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+              options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, object]]:
         """
         Begin an episode in every game.
 
@@ -71,7 +71,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
             seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
         else:
             seeds = seed
-        infos: dict[str, Any] = {}
+        infos: dict[str, object] = {}
         for index, own in enumerate(seeds):
             if own is not None:
                 self._randoms[index] = seeding.np_random(own)[0]
@@ -80,12 +80,12 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
         return self._seen(), infos
 
     def step(self, actions: NDArray[np.float32]) -> tuple[  # type: ignore[override]
-            Seen, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+            Seen, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, object]]:
         """Drive every game until its next decision; a game that is over is reset instead."""
         begun = self._over.copy()
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), dtype=bool)
-        infos: dict[str, Any] = {}
+        infos: dict[str, object] = {}
         for index, game in enumerate(self._games):
             if begun[index]:
                 infos = self._begin(index, infos)
@@ -105,7 +105,7 @@ class GamesTogether(VectorEnv[Seen, NDArray[np.float32], Array]):
             self._painter = ScenePainter(self._games[0].game.setup)
         return tuple(self._painter.paint(game.game) for game in self._games)
 
-    def _begin(self, index: int, infos: dict[str, Any]) -> dict[str, Any]:
+    def _begin(self, index: int, infos: dict[str, object]) -> dict[str, object]:
         game = self._games[index]
         game.begin(int(self._randoms[index].integers(SEEDS)))
         return self._add_info(infos, game.info(), index)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import sys
 import threading
 import time
-from typing import Any, Literal
+from typing import Literal
 
 from crgame_ros.cockpit import frames
 from crgame_ros.cockpit.access import Access
@@ -68,7 +68,7 @@ class EnvironmentBackend:
     def left(self, client: Client) -> None:
         """Do nothing."""
 
-    async def load_game(self, path: Any, client: Any = None, *,
+    async def load_game(self, path: object, client: object = None, *,
                         takes_seat: bool = False) -> str:
         """
         Refuse to load a game, because the environment defines it.

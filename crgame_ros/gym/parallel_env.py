@@ -68,7 +68,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
         return self.action_spaces[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None
-              ) -> tuple[dict[str, Seen], dict[str, dict[str, Any]]]:
+              ) -> tuple[dict[str, Seen], dict[str, dict[str, object]]]:
         """Begin an episode; equal seeds and equal actions give equal episodes."""
         if seed is not None:
             self._random = np.random.Generator(np.random.PCG64(seed))
@@ -78,7 +78,7 @@ class ParallelDrivingEnv(ParallelEnv[str, Seen, NDArray[np.float32]]):
 
     def step(self, actions: dict[str, NDArray[np.float32]]) -> tuple[
             dict[str, Seen], dict[str, float], dict[str, bool], dict[str, bool],
-            dict[str, dict[str, Any]]]:
+            dict[str, dict[str, object]]]:
         """
         Drive until the next decision.
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 import re
-from typing import Any
 
 from crgame_ros.cockpit.framing_origin import read_origin
 from crgame_ros.errors import InputError
@@ -104,7 +103,7 @@ class RunRequest:
     countdown_s: float = 3.0
     start_paused: bool = False
     framed_by: str = ''
-    options: tuple[tuple[str, Any], ...] = ()
+    options: tuple[tuple[str, object], ...] = ()
     open_topics: bool = False
     own_orders: bool = False
 
@@ -237,7 +236,7 @@ def read_drivers(values: Sequence[str]) -> tuple[str | None, tuple[tuple[str, st
     return first, tuple(named.items())
 
 
-def read_options(values: Sequence[str]) -> tuple[tuple[str, Any], ...]:
+def read_options(values: Sequence[str]) -> tuple[tuple[str, object], ...]:
     """
     Read the values of `--option`.
 
@@ -246,7 +245,7 @@ def read_options(values: Sequence[str]) -> tuple[tuple[str, Any], ...]:
     """
     # --help works without any package.
     from crgame_ros.yaml_text import parse_yaml
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for text in values:
         key, equals, value = text.partition('=')
         if not key or not equals:

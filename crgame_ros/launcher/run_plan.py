@@ -10,7 +10,6 @@ from errno import ENOTDIR
 import os
 from pathlib import Path
 import shutil
-from typing import Any
 
 from crgame_ros.cockpit.access import check_address
 from crgame_ros.cockpit.exposure import check_certificate
@@ -274,7 +273,7 @@ def _check_swaps(setup: Setup) -> None:
 
 
 def with_planners(setup: Setup, planners: tuple[str, ...],
-                  options: Mapping[str, Any] | None = None) -> Setup:
+                  options: Mapping[str, object] | None = None) -> Setup:
     """
     Return the setup with its resolved AVs in the game, with the requested planners.
 

@@ -3,7 +3,6 @@
 """Reading the states of all vehicles and objects from live or recorded messages."""
 
 from collections.abc import Iterable
-from typing import Any
 
 from crgame_ros.game.objects import ObjectDescription, ObjectStates
 from crgame_ros.messages.joint_messages import JointReader
@@ -47,7 +46,7 @@ class WorldMessages:
         self._objects = JointReader(joints_of(OBJECT_STATES_TOPIC, self.objects),
                                     OBJECT_STATES_TOPIC)
 
-    def vehicle_joints(self, message: Any) -> FloatArray:
+    def vehicle_joints(self, message: object) -> FloatArray:
         """
         Return (3, V, 4) positions, velocities and accelerations of the vehicles' joints.
 
@@ -55,7 +54,7 @@ class WorldMessages:
         """
         return self._vehicles.read(message).reshape(3, -1, len(VEHICLE_JOINTS))
 
-    def vehicle_states(self, message: Any) -> FloatArray:
+    def vehicle_states(self, message: object) -> FloatArray:
         """
         Return (V, 8) states, columns as in `StateColumn`.
 
@@ -63,7 +62,7 @@ class WorldMessages:
         """
         return vehicles_from_joints(*self.vehicle_joints(message))
 
-    def object_states(self, message: Any) -> ObjectStates:
+    def object_states(self, message: object) -> ObjectStates:
         """
         Return the objects' states.
 

@@ -5,7 +5,7 @@
 from dataclasses import dataclass, field, fields
 import math
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.schema.declaration import Form
@@ -94,7 +94,7 @@ class MapEntry:
     free_thresh: Annotated[float, Within(0.0, 1.0)]
     mode: Literal['trinary', 'scale'] = 'trinary'
     tile_cells: Annotated[int, Within(1, MAX_TILE_CELLS)] | None = None
-    others: dict[str, Any] = field(default_factory=dict)
+    others: dict[str, object] = field(default_factory=dict)
 
     def check(self) -> None:
         """Refuse thresholds in the wrong order, and a rotated map."""

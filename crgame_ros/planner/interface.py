@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, TYPE_CHECKING
+from typing import ClassVar, TYPE_CHECKING
 
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.messages.plan import Plan, PlanRequest
@@ -88,4 +88,4 @@ class Planner(ABC):
         """
 
 
-PlannerOptions = Mapping[str, Any]
+PlannerOptions = Mapping[str, object]

@@ -4,7 +4,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 from crgame_ros.game.events import EventSpec, PlannerSwap, SpeedLimit
 from crgame_ros.messages.plan import Plan, PlanRequest
@@ -36,7 +35,7 @@ class PlannerManager:
     :raises InputError: if a planner cannot be created.
     """
 
-    def __init__(self, context: PlannerContext, name: str, options: Mapping[str, Any],
+    def __init__(self, context: PlannerContext, name: str, options: Mapping[str, object],
                  events: Sequence[EventSpec] = (), clock: Clock | None = None) -> None:
         self._events = {event.name: event.action for event in events
                         if isinstance(event.action, SpeedLimit)
@@ -58,7 +57,7 @@ class PlannerManager:
         for adapter in self._adapters.values():
             adapter.setup(context)
 
-    def _made(self, name: str, options: Mapping[str, Any],
+    def _made(self, name: str, options: Mapping[str, object],
               clock: Clock | None) -> PlannerAdapter:
         adapter = PlannerAdapter(create_planner(name, options), clock)
         adapter.statistics = self.statistics

@@ -49,15 +49,15 @@ class PlannerRegistry(ModelRegistry):
         finally:
             self._given = earlier
 
-    def resolve(self, name: str, where: str, label: str) -> Any:
+    def resolve(self, name: str, where: str, label: str) -> object:
         """Find the class for a name; for an object that the caller has given, its class."""
         if name not in self._given:
             return super().resolve(name, where, label)
         given = self._given[name]
         return given if inspect.isclass(given) else type(given)
 
-    def create(self, name: str, options: Mapping[str, Any] | None = None, where: str = '',
-               **given: Any) -> Any:
+    def create(self, name: str, options: Mapping[str, object] | None = None, where: str = '',
+               **given: object) -> Any:
         """
         Create a planner, also of `policy:FILE.py:load`, or return the caller's own object.
 
@@ -114,7 +114,7 @@ def planner_names() -> tuple[str, ...]:
     return PLANNERS.names()
 
 
-def create_planner(name: str, options: Mapping[str, Any] | None = None) -> Planner:
+def create_planner(name: str, options: Mapping[str, object] | None = None) -> Planner:
     """
     Create a planner.
 

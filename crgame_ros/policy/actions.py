@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from crgame_ros.errors import PlanningError
 from crgame_ros.geometry.angles import wrap_pi_array
@@ -63,7 +63,7 @@ def action_bounds(kind: ActionKind) -> tuple[NDArray[np.float32], NDArray[np.flo
     return np.full(2, -1.0, np.float32), np.full(2, 1.0, np.float32)
 
 
-def checked_action(kind: ActionKind, action: Any) -> Array:
+def checked_action(kind: ActionKind, action: object) -> Array:
     """
     Return an action clipped to its bounds.
 

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.policy.actions import ACTION_KINDS, ActionKind
@@ -31,9 +30,9 @@ class Policy:
     :param begin: is called before each run, for policies with internal state.
     """
 
-    act: Callable[[Mapping[str, NDArray[np.float32]]], Any]
+    act: Callable[[Mapping[str, NDArray[np.float32]]], object]
     action: ActionKind = 'acceleration'
-    observation: Mapping[str, Any] = field(default_factory=dict)
+    observation: Mapping[str, object] = field(default_factory=dict)
     ticks: int = 1
     begin: Callable[[], object] = lambda: None
 
@@ -86,7 +85,7 @@ def load_policy(name: str, where: str = '') -> Policy:
     return policy
 
 
-def _called(path: Path, function: str, label: str) -> Any:
+def _called(path: Path, function: str, label: str) -> object:
     """Run a file as a module of its own, and return the result of its function."""
     try:
         module = module_of_file(path, f'crgame_ros_policy_{path.stem}')

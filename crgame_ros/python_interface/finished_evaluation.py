@@ -5,7 +5,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.errors import InputError
 from crgame_ros.evaluation import evaluation
@@ -43,7 +42,7 @@ class FinishedEvaluation:
         return pq.read_table(self.folder / name)
 
 
-def evaluate(plan: EvaluationPlan | Mapping[str, Any] | FileName, folder: FileName, *,
+def evaluate(plan: EvaluationPlan | Mapping[str, object] | FileName, folder: FileName, *,
              computing: Computing | None = None) -> FinishedEvaluation:
     """
     Compute the cells of a plan, as `crgame evaluate` does; finished cells are kept.

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 import warnings
 
 from crgame_ros.analysis.criticality.thresholds import Thresholds, USUAL
@@ -36,7 +36,7 @@ class Run(MeasuredRun):
     """
 
     @property
-    def violations(self) -> list[dict[str, Any]] | None:
+    def violations(self) -> list[dict[str, object]] | None:
         """Return the violations as in `timing.json`; None if unknown."""
         return None if self.outcome is None else self.outcome['drivability']['list']
 

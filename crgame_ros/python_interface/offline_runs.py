@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 import time
-from typing import Any
 
 from crgame_ros.driver.source import parse_source
 from crgame_ros.errors import InputError
@@ -32,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def run_summary(result: OfflineResult, wall_s: float) -> dict[str, Any]:
+def run_summary(result: OfflineResult, wall_s: float) -> dict[str, object]:
     """
     Return the summary of a run in JSON form.
 
@@ -89,7 +88,7 @@ class OfflineRun(Run):
         """Return notices about the game, one line each."""
         return self.result.setup.notices
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """Return the summary of the run, as `crgame offline` does."""
         return run_summary(self.result, self.wall_s)
 
@@ -115,7 +114,7 @@ class OfflineRun(Run):
 
 def run(game: Game | FileName | None = None, *,
         planner: PlannerLike | Sequence[PlannerLike] | None = None,
-        options: Mapping[str, Any] | None = None, driver: str | None = None,
+        options: Mapping[str, object] | None = None, driver: str | None = None,
         seed: int | None = None, duration_s: float | None = None, rate_hz: float | None = None,
         latency_steps: int = 0, triggers: Mapping[str, float] | None = None,
         problems: Sequence[int] = ()) -> OfflineRun:
@@ -184,6 +183,6 @@ def _seeded(game: Game | None, seed: int) -> Game:
     return replace(game, seed=seed)
 
 
-def _with_options(setup: Setup, options: Mapping[str, Any]) -> Setup:
+def _with_options(setup: Setup, options: Mapping[str, object]) -> Setup:
     avs = tuple(replace(av, spec=replace(av.spec, options=dict(options))) for av in setup.avs)
     return replace(setup, avs=avs, game=replace(setup.game, avs=tuple(av.spec for av in avs)))

@@ -5,7 +5,7 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.recording.conversion import convert_log, read_last_run
@@ -36,7 +36,7 @@ class FinishedRecording(NamedTuple):
     bag: Path
     suffix: str
     log: RunTrajectories
-    timing: dict[str, Any] | None
+    timing: dict[str, object] | None
 
 
 def finish_run(folder: Path, say: Callable[[str], object], progress: bool = True,
@@ -98,7 +98,7 @@ def _derive(bag: Path, suffix: str, say: Callable[[str], object],
         return EMPTY, None
     # A run that cannot become a scenario still has its timing report.
     log = logs[0] if logs else None
-    reports: list[dict[str, Any]] = []
+    reports: list[dict[str, object]] = []
     timing = Progress(tell, f'reading the timing of {bag}')
     code |= _attempt(lambda: reports.append(write_timing_report(
         bag, folder / f'timing{suffix}.json', log=log, progress=timing)), say)

@@ -47,7 +47,7 @@ class TopicQos:
                 raise InputError(f'no such quality of service: {value!r}', 'QoS',
                                  f'use one of {", ".join(known)}')
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the nested form of `offered_qos_profiles`."""
         return {
             'history': 'keep_last', 'depth': self.depth, 'reliability': self.reliability,
@@ -136,7 +136,7 @@ def write_metadata(folder: Path, metadata: BagMetadata) -> Path:
     return path
 
 
-def _to_dict(metadata: BagMetadata) -> dict[str, Any]:
+def _to_dict(metadata: BagMetadata) -> dict[str, object]:
     filled = [file for file in metadata.files if file.message_count]
     # `ros2 bag play` waits for this time; earlier than the first message, it would never end.
     start_ns = min((file.start_ns for file in filled), default=0)

@@ -85,7 +85,7 @@ class PlanOutcome:
             plan_time_ms=spread_of([1e3 * each for each in statistics.durations_s]),
             worst_tracking_errors=tracking)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return its entry in `timing.json`."""
         return asdict(self)
 

@@ -181,7 +181,7 @@ class BagReader:
             return self.decode(message)
         return None
 
-    def _deserialize(self, topic: str, type_name: str, data: bytes) -> Any:
+    def _deserialize(self, topic: str, type_name: str, data: bytes) -> object:
         try:
             if type_name not in self._types.fielddefs:
                 self._learn(topic, type_name)

@@ -113,7 +113,7 @@ _WORST = 'worst_'
 
 
 def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | None = None,
-                  progress: Callable[[float], object] | None = None) -> dict[str, Any]:
+                  progress: Callable[[float], object] | None = None) -> dict[str, object]:
     """
     Compute a recorded run's report; `docs/recordings.md` and `docs/timing.md` define the keys.
 
@@ -165,7 +165,7 @@ def timing_report(bag: Path, epoch: int | None = None, log: RunTrajectories | No
 
 def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
                         log: RunTrajectories | None = None,
-                        progress: Callable[[float], object] | None = None) -> dict[str, Any]:
+                        progress: Callable[[float], object] | None = None) -> dict[str, object]:
     """
     Write `timing.json`, completely or not at all.
 
@@ -180,7 +180,8 @@ def write_timing_report(bag: Path, path: Path, epoch: int | None = None,
 
 
 def _contacts(reader: BagReader, run: Epoch, verdicts: Sequence[VehicleDrivability],
-              fired: Sequence[FiredEvent]) -> tuple[list[dict[str, Any]] | None, tuple[str, ...]]:
+              fired: Sequence[FiredEvent]
+              ) -> tuple[list[dict[str, object]] | None, tuple[str, ...]]:
     """Return the entries of the contacts, or None and the reason if they are not known."""
     try:
         return [item.as_dict() for item in recorded_contacts(
@@ -201,7 +202,7 @@ class _Collector:
         self._plans = {f'/{av}/plan': av for av in self.avs}
         self._verdicts = {f'/{vehicle}/drivability': vehicle for vehicle in vehicles}
         self.topics = (_DIAGNOSTICS, EVENTS.topic, *self._requests, *self._plans, *self._verdicts)
-        self.violations: list[dict[str, Any]] = []
+        self.violations: list[dict[str, object]] = []
         self.verdicts: list[VehicleDrivability] = []
         self.fired: tuple[FiredEvent, ...] = ()
         self._lasting: dict[str, set[str]] = defaultdict(set)

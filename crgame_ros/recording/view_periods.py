@@ -101,7 +101,7 @@ class ViewPeriods:
         return {seat: list(_periods(told)) for seat, told in sorted(self._told.items())}
 
 
-def _periods(told: list[_Told]) -> Iterable[dict[str, Any]]:
+def _periods(told: list[_Told]) -> Iterable[dict[str, object]]:
     first = 0
     for last in range(1, len(told) + 1):
         if last < len(told) and told[last].choice == told[first].choice:

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.analysis.counterfactual import Alternative
 from crgame_ros.analysis.pictures.critical_moments import critical_moments, Touch
@@ -151,7 +150,7 @@ class EvaluationPart:
     """
 
     judgements: tuple[Judgement, ...]
-    numbers: dict[str, Any]
+    numbers: dict[str, object]
     files: tuple[Path, ...]
 
 

@@ -9,7 +9,7 @@ import json
 import os
 from pathlib import Path
 import time
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from crgame_ros.analysis.pictures.timing_figure import TimedRun
 from crgame_ros.analysis.pictures.timing_table import TIMING_ROWS, TimingTable
@@ -165,7 +165,7 @@ class Synchronization:
         """Return table I for both loops."""
         return TimingTable((self.proposed, self.naive))
 
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> list[dict[str, object]]:
         """Return table I with the paper's values, as JSON-compatible rows."""
         ours, naive = self.table.summaries
         return [{'metric': row.name, 'unit': row.unit,

@@ -45,15 +45,15 @@ def qos_profile(qos: Qos) -> QoSProfile:
 class PolledGroup(CallbackGroup):
     """A callback group outside every executor: the owner reads its subscriptions itself."""
 
-    def can_execute(self, entity: Any) -> bool:
+    def can_execute(self, entity: object) -> bool:
         """Return False, so that no executor waits for or runs the entity."""
         return False
 
-    def beginning_execution(self, entity: Any) -> bool:
+    def beginning_execution(self, entity: object) -> bool:
         """Return False, which refuses execution."""
         return False
 
-    def ending_execution(self, entity: Any) -> None:
+    def ending_execution(self, entity: object) -> None:
         """Do nothing, as there is nothing to release."""
 
 
@@ -75,7 +75,7 @@ class PolledSubscription:
         skipped before they are converted. None accepts every message.
     """
 
-    def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], Any],
+    def __init__(self, subscription: Subscription, name: str, read: Callable[[bytes], object],
                  refuse: Callable[[str, str], None] | None, sent: bool = False) -> None:
         self.subscription = subscription
         self.publisher = b''
@@ -152,7 +152,7 @@ class Endpoints:
             message_type(topic.type_name), relative(topic.name_for(vehicle_id)),
             qos_profile(topic.qos))
 
-    def subscription(self, name: str, callback: Callable[[Any], None],
+    def subscription(self, name: str, callback: Callable[[object], None],
                      vehicle_id: str = '') -> Subscription:
         """Create a subscription whose callback an executor runs."""
         topic = self._contract.topic(name)
@@ -204,7 +204,7 @@ class Endpoints:
         """Destroy a subscription."""
         self._node.destroy_subscription(slot.subscription)
 
-    def service(self, name: str, callback: Callable[[Any, Any], Any],
+    def service(self, name: str, callback: Callable[[object, object], object],
                 vehicle_id: str = '', group: CallbackGroup | None = None) -> Service:
         """Create a service, whose queue holds a burst of calls until they are answered."""
         row = self._contract.services[name]
@@ -224,7 +224,7 @@ def relative(name: str) -> str:
     return name.removeprefix('/')
 
 
-def _unused(message: Any) -> None:
+def _unused(message: object) -> None:
     raise RuntimeError('a polled subscription was run by an executor')
 
 

@@ -24,7 +24,7 @@ REPORT_S = 1.0
 LONGEST_REASON = 300
 
 
-def message_type(type_name: str) -> Any:
+def message_type(type_name: str) -> object:
     """Import a message or service type from its name package/msg/Type."""
     package, kind, name = type_name.split('/')
     return getattr(importlib.import_module(f'{package}.{kind}'), name)
@@ -64,7 +64,7 @@ class MessageValidator:
         self._decode(data)
         return data
 
-    def _decode(self, data: bytes) -> Any:
+    def _decode(self, data: bytes) -> object:
         self.bound(data)
         try:
             return deserialize_message(data, self._type)
@@ -73,7 +73,7 @@ class MessageValidator:
             raise InputError(f'is no {self._topic.type_name} ({type(error).__name__})',
                              self.name) from error
 
-    def read(self, data: bytes) -> Any:
+    def read(self, data: bytes) -> object:
         """
         Decode a serialised message.
 
@@ -162,7 +162,7 @@ def _check_odometry(message: Any, _topic: Topic) -> None:
                    False)
 
 
-CHECKS: Mapping[str, Callable[[Any, Topic], None]] = {
+CHECKS: Mapping[str, Callable[[object, Topic], None]] = {
     'trajectory_msgs/msg/JointTrajectory': _check_trajectory,
     'sensor_msgs/msg/Joy': _check_joy,
     'sensor_msgs/msg/LaserScan': _check_scan,

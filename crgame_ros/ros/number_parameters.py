@@ -3,7 +3,6 @@
 """Number parameters, which accept whole numbers too."""
 
 import math
-from typing import Any
 
 from crgame_ros.errors import InputError
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
@@ -40,7 +39,7 @@ def declare_number(node: Node, name: str, default: float, description: str,
     return float(value)
 
 
-def _reason(value: Any, bounds: tuple[float, float]) -> str | None:
+def _reason(value: object, bounds: tuple[float, float]) -> str | None:
     """Return why a value cannot be used, None if it can."""
     if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
         return f'{str(value)[:40]!r} is no number'

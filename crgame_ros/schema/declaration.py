@@ -19,7 +19,7 @@ from typing import (
     Union,
 )
 
-from crgame_ros.registry import VALUE_WORDS
+from crgame_ros.registry import ANY_VALUE, VALUE_WORDS
 from crgame_ros.schema.marks import (
     Advice,
     Called,
@@ -86,9 +86,9 @@ class Key:
 
     name: str
     field: str
-    hint: Any
-    marks: tuple[Any, ...]
-    default: Any
+    hint: object
+    marks: tuple[object, ...]
+    default: object
 
     @property
     def required(self) -> bool:
@@ -100,7 +100,7 @@ class Key:
         return mark_of(self.marks, kind)
 
 
-def mark_of(marks: tuple[Any, ...], kind: type[T]) -> T | None:
+def mark_of(marks: tuple[object, ...], kind: type[T]) -> T | None:
     """Return the mark of a kind among others; None without one."""
     for mark in marks:
         if isinstance(mark, kind):
@@ -108,7 +108,7 @@ def mark_of(marks: tuple[Any, ...], kind: type[T]) -> T | None:
     return None
 
 
-def form_of(kind: type[Any]) -> Form:
+def form_of(kind: type[object]) -> Form:
     """Return the form of a dataclass in a file."""
     form: Form = getattr(kind, 'FORM', _PLAIN)
     return form
@@ -116,10 +116,10 @@ def form_of(kind: type[Any]) -> Form:
 
 _PLAIN = Form()
 # Cache of `keys_of`.
-_KEYS: dict[Any, tuple[Key, ...]] = {}
+_KEYS: dict[object, tuple[Key, ...]] = {}
 
 
-def keys_of(kind: Any) -> tuple[Key, ...]:
+def keys_of(kind: object) -> tuple[Key, ...]:
     """Return the fields of a dataclass in their order."""
     if kind not in _KEYS:
         _KEYS[kind] = _keys(kind)
@@ -141,7 +141,7 @@ def _keys(kind: Any) -> tuple[Key, ...]:
     return tuple(keys)
 
 
-def known_keys(kind: type[Any]) -> tuple[str, ...]:
+def known_keys(kind: type[object]) -> tuple[str, ...]:
     """Return all keys that a mapping may have, except those for its `rest`."""
     form = form_of(kind)
     names: list[str] = []
@@ -154,16 +154,16 @@ def known_keys(kind: type[Any]) -> tuple[str, ...]:
     return (*names, *(key for key, _ in form.moved))
 
 
-def sentences_of(kind: type[Any]) -> dict[str, str]:
+def sentences_of(kind: type[object]) -> dict[str, str]:
     """Return the description of each field from the docstring of a class, in one line each."""
     text = inspect.cleandoc(kind.__doc__ or '')
     return {name: ' '.join(words.split()).rstrip('.') for name, words in _PARAM.findall(text)}
 
 
 @functools.cache
-def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
+def split(hint: Any) -> tuple[object, tuple[object, ...]]:
     """Return a type without marks, and its marks, including those of the one type beside None."""
-    marks: tuple[Any, ...] = ()
+    marks: tuple[object, ...] = ()
     if get_origin(hint) is Annotated:
         hint, marks = hint.__origin__, hint.__metadata__
     choices = choices_of(hint)
@@ -174,18 +174,18 @@ def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
     return hint, marks
 
 
-def choices_of(hint: Any) -> tuple[Any, ...]:
+def choices_of(hint: object) -> tuple[object, ...]:
     """Return the members of a union; another type alone."""
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 
-def is_composite(hint: Any) -> bool:
+def is_composite(hint: object) -> bool:
     """Return whether a value has named parts: a mapping, or a list of lists or mappings."""
     plain, _ = split(hint)
     return any(is_dataclass(choice) or get_origin(choice) is tuple for choice in choices_of(plain))
 
 
-def wanted(hint: Any, marks: tuple[Any, ...] = ()) -> str:
+def wanted(hint: object, marks: tuple[object, ...] = ()) -> str:
     """Return the kind of value that is required, as text after "give"."""
     hint, own = split(hint)
     marks = (*marks, *own)
@@ -200,7 +200,7 @@ def wanted(hint: Any, marks: tuple[Any, ...] = ()) -> str:
     return ', or '.join([text, *others])
 
 
-def _wanted(hint: Any, marks: tuple[Any, ...]) -> str:
+def _wanted(hint: Any, marks: tuple[object, ...]) -> str:
     origin = get_origin(hint)
     if origin is Literal:
         return 'one of ' + ', '.join(map(str, get_args(hint)))
@@ -211,13 +211,13 @@ def _wanted(hint: Any, marks: tuple[Any, ...]) -> str:
         return '{' + ', '.join(f'{name}:' for name in needed) + '}' if needed else 'a mapping'
     if origin is tuple:
         return _wanted_list(get_args(hint), marks)
-    return {**VALUE_WORDS, Any: 'any value'}.get(
+    return 'any value' if hint in ANY_VALUE else VALUE_WORDS.get(
         hint, 'a mapping' if (origin or hint) in (dict, Mapping) else
         'a file name' if getattr(hint, '__name__', '') == 'Path' else
         getattr(hint, '__name__', str(hint)))
 
 
-def _wanted_list(items: tuple[Any, ...], marks: tuple[Any, ...]) -> str:
+def _wanted_list(items: tuple[object, ...], marks: tuple[object, ...]) -> str:
     if items[-1] is Ellipsis:
         return f'a list of {_plural(items[0], marks)}'
     parts = mark_of(marks, Parts)
@@ -225,12 +225,12 @@ def _wanted_list(items: tuple[Any, ...], marks: tuple[Any, ...]) -> str:
     return f'[{shown}], {_plural(items[0], marks)}'
 
 
-def _plural(hint: Any, marks: tuple[Any, ...]) -> str:
+def _plural(hint: object, marks: tuple[object, ...]) -> str:
     return re.sub(r'^a (whole number|number|text|mapping|list)', r'\1s',
                   wanted(hint, marks)).removeprefix('one of ')
 
 
-def advice(hint: Any, marks: tuple[Any, ...]) -> str:
+def advice(hint: object, marks: tuple[object, ...]) -> str:
     """Return the remedy for a wrong value."""
     given = mark_of(marks, Advice)
     if given is not None:

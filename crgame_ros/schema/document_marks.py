@@ -24,13 +24,13 @@ class Bounded:
 
     most: int
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
         """Return the schema of the marked type, for pydantic."""
         schema = handler(source)
         if schema['type'] in ('list', 'tuple'):
             schema['fail_fast'] = True
 
-        def check(given: Any) -> Any:
+        def check(given: object) -> object:
             if isinstance(given, list | tuple | dict) and len(given) > self.most:
                 raise ValueError(f'should have {self.most} entries at most')
             return given
@@ -41,7 +41,7 @@ class Bounded:
 class Exact:
     """A mark for the type of a value that must have it: no text is a number, no flag either."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
         """Return the schema of the marked type, for pydantic."""
         return handler(source) | {'strict': True}
 
@@ -52,7 +52,7 @@ class Otherwise:
 
     known: str
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> Any:
         """Return the schema of the marked type, for pydantic."""
         return {'type': 'function-before', 'schema': handler(source), 'function': {
             'type': 'no-info', 'function': lambda given:
@@ -65,9 +65,9 @@ class Derived:
 
     names: tuple[str, ...]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
         """Return the schema of the marked class, for pydantic."""
-        def write_all(value: Any, write_fields: Any) -> Any:
+        def write_all(value: object, write_fields: Any) -> object:
             return write_fields(value) | {name: getattr(value, name) for name in self.names}
         return handler(source) | {
             'serialization': {'type': 'function-wrap', 'function': write_all}}
@@ -76,11 +76,11 @@ class Derived:
 class Row:
     """A mark for a class that is written as the list of its finite numbers."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> object:
         """Return the schema of the marked class, for pydantic."""
         names = tuple(source.__annotations__)
 
-        def made(given: Any, _: Any) -> Any:
+        def made(given: object, _: object) -> object:
             if not isinstance(given, list) or len(given) != len(names) or not all(
                     isinstance(number, int | float) and math.isfinite(number)
                     for number in given):
@@ -99,14 +99,14 @@ class Declared:
 
     kind: Any = None
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> object:
         """Return the schema of the marked type, for pydantic."""
         mark = self if self.kind is not None else replace(self, kind=source)
         return _plain_schema(
             lambda given, info: mark.read(given, f'{info.context}: {info.field_name}'),
             mark.write)
 
-    def read(self, given: Any, where: str) -> Any:
+    def read(self, given: object, where: str) -> object:
         """
         Read a value.
 
@@ -114,12 +114,13 @@ class Declared:
         """
         return read(self.kind, given, where)
 
-    def write(self, value: Any) -> Any:
+    def write(self, value: object) -> object:
         """Return the JSON value from which `read` makes an equal one."""
         return write(value)
 
 
-def _plain_schema(read_value: Callable[[Any, Any], Any], write_value: Callable[[Any], Any]) -> Any:
+def _plain_schema(read_value: Callable[[object, Any], object],
+                  write_value: Callable[[Any], object]) -> object:
     """Return the schema of a value that two functions read and write."""
     return {'type': 'function-plain', 'function': {'type': 'with-info', 'function': read_value},
             'serialization': {'type': 'function-plain', 'function': write_value}}

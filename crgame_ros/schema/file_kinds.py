@@ -11,6 +11,7 @@ from pathlib import Path
 import types
 from typing import Any, get_args, get_origin, Literal, NamedTuple
 
+from crgame_ros.registry import ANY_VALUE
 from crgame_ros.schema.declaration import (
     choices_of,
     form_of,
@@ -39,7 +40,7 @@ Schema = dict[str, Any]
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
 
 
-def json_schema(kind: type[Any], title: str) -> Schema:
+def json_schema(kind: type[object], title: str) -> Schema:
     """
     Return the JSON Schema of the file from which `read` reads a dataclass.
 
@@ -58,7 +59,7 @@ class _Describer:
     def __init__(self) -> None:
         self.definitions: dict[str, Schema] = {}
 
-    def describe(self, hint: Any, marks: tuple[Any, ...] = ()) -> Schema:
+    def describe(self, hint: object, marks: tuple[object, ...] = ()) -> Schema:
         hint, own = split(hint)
         marks = (*marks, *own)
         special = mark_of(marks, Special)
@@ -70,7 +71,7 @@ class _Describer:
         options += [{'const': mark.written} for mark in marks if isinstance(mark, Meaning)]
         return options[0] if len(options) == 1 else {'anyOf': options}
 
-    def _one(self, hint: Any, marks: tuple[Any, ...]) -> Schema:
+    def _one(self, hint: object, marks: tuple[object, ...]) -> Schema:
         plain = get_origin(hint) or hint
         if is_dataclass(hint):
             name = getattr(hint, '__name__', '')
@@ -90,9 +91,9 @@ class _Describer:
                                          {'minLength': 1} if plain is Path else {})
         if plain is bool:
             return {'type': 'boolean'}
-        return {} if hint is Any else {'type': 'object'}
+        return {} if hint in ANY_VALUE else {'type': 'object'}
 
-    def _list(self, items: tuple[Any, ...], marks: tuple[Any, ...]) -> Schema:
+    def _list(self, items: tuple[object, ...], marks: tuple[object, ...]) -> Schema:
         bounds = tuple(mark for mark in marks if isinstance(mark, Within))
         if items[-1] is Ellipsis:
             listed = mark_of(marks, Listed) or Listed()
@@ -195,9 +196,9 @@ class FileKind(NamedTuple):
     title: str
 
     @property
-    def declared(self) -> type[Any]:
+    def declared(self) -> type[object]:
         """Return the class that declares it."""
-        kind: type[Any] = getattr(importlib.import_module(self.module), self.name)
+        kind: type[object] = getattr(importlib.import_module(self.module), self.name)
         return kind
 
     def schema(self) -> dict[str, Any]:

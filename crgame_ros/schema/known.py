@@ -10,7 +10,7 @@ from crgame_ros.schema.declaration import Form, form_of, keys_of, known_keys
 from crgame_ros.schema.marks import OnlyWith
 
 
-def moved(form: Form, given: Mapping[Any, Any]) -> dict[Any, Any]:
+def moved(form: Form, given: Mapping[object, Any]) -> dict[object, object]:
     """Return the values with moved keys in the sections to which they belong."""
     values = dict(given)
     for key, section in form.moved:
@@ -19,7 +19,7 @@ def moved(form: Form, given: Mapping[Any, Any]) -> dict[Any, Any]:
     return values
 
 
-def known_beside(kind: type[Any], values: Mapping[Any, Any],
+def known_beside(kind: type[object], values: Mapping[object, object],
                  where: str) -> tuple[tuple[str, ...], str]:
     """
     Return the keys that are known together with those given.
@@ -50,13 +50,13 @@ def known_beside(kind: type[Any], values: Mapping[Any, Any],
     return keys_beside(kind, given[0]), f' for {form.by} {by} with "{given[0]}"'
 
 
-def keys_beside(kind: type[Any], place: str) -> tuple[str, ...]:
+def keys_beside(kind: type[object], place: str) -> tuple[str, ...]:
     """Return the keys that are known together with one of the exclusive keys."""
     return tuple(key.name for key in keys_of(kind)
                  if (beside := key.mark(OnlyWith)) is None or place in beside.keys)
 
 
-def refuse_unknown(name: Any, known: Sequence[str], where: str, beside: str = '') -> NoReturn:
+def refuse_unknown(name: object, known: Sequence[str], where: str, beside: str = '') -> NoReturn:
     """
     Refuse a key.
 

@@ -37,7 +37,7 @@ class Within:
             return False
         return self.low <= value <= self.high and not (self.above and value == self.low)
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(self, source: object, handler: Any) -> object:
         """Return the schema of the marked number, for pydantic; in JSON null is infinity."""
         def check(number: float) -> float:
             if not self.holds(number):
@@ -84,8 +84,8 @@ class Wording:
 class Meaning:
     """Another value that a user may write, and its meaning."""
 
-    written: Any
-    meant: Any
+    written: object
+    meant: object
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +156,7 @@ class Keyed:
     :param noun: noun for the value, for messages.
     """
 
-    kinds: dict[str, Any]
+    kinds: dict[str, object]
     noun: str
 
 
@@ -171,7 +171,7 @@ class Folder:
 class Special:
     """The base of marks for values that need their own reader."""
 
-    def read(self, given: Any, where: str, key: str, base: Path) -> Any:
+    def read(self, given: object, where: str, key: str, base: Path) -> object:
         """
         Read a value.
 
@@ -179,7 +179,7 @@ class Special:
         """
         raise NotImplementedError
 
-    def json_schema(self) -> dict[str, Any]:
+    def json_schema(self) -> dict[str, object]:
         """Return the JSON Schema of the value."""
         raise NotImplementedError
 

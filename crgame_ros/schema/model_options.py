@@ -3,7 +3,7 @@
 """The options of exchangeable models, as their constructors and docstrings declare them."""
 
 import inspect
-from typing import Any, get_type_hints, NamedTuple
+from typing import get_type_hints, NamedTuple
 
 from crgame_ros.registry import ModelRegistry
 from crgame_ros.schema.declaration import sentences_of, wanted
@@ -32,7 +32,7 @@ def options_of(registry: ModelRegistry, name: str) -> list[Option]:
     """
     kind = registry.find(name)
     hints, sentences = get_type_hints(kind.__init__), sentences_of(kind)
-    return [Option(key, wanted(hints.get(key, Any)), _written(parameter, registry.left_out),
+    return [Option(key, wanted(hints.get(key, object)), _written(parameter, registry.left_out),
                    sentences.get(key, ''))
             for key, parameter in inspect.signature(kind).parameters.items()
             if key not in registry.given

@@ -12,6 +12,7 @@ import types
 from typing import Any, get_args, get_origin, Literal, NoReturn, TypeVar, Union
 
 from crgame_ros.errors import InputError, short
+from crgame_ros.registry import ANY_VALUE
 from crgame_ros.schema.declaration import (
     advice,
     choices_of,
@@ -46,7 +47,7 @@ _HERE = Path()
 _EXPONENT = re.compile(r'[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+')
 
 
-def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
+def read(kind: type[T], values: object, where: str, base: Path = _HERE) -> T:
     """
     Build a dataclass from values of YAML or JSON, and check every key and value.
 
@@ -67,7 +68,8 @@ def read(kind: type[T], values: Any, where: str, base: Path = _HERE) -> T:
         raise InputError(first.what, first.where, remedy) from error
 
 
-def faults_of(kind: type[Any], values: Any, where: str, base: Path) -> tuple[InputError, ...]:
+def faults_of(kind: type[object], values: object, where: str,
+              base: Path) -> tuple[InputError, ...]:
     """Return all faults that `read` would refuse, one error each."""
     try:
         _Reader(base).value(kind, (), values, '', where)
@@ -110,7 +112,7 @@ class _Reader:
     def __init__(self, base: Path) -> None:
         self._base = base
 
-    def value(self, hint: Any, marks: tuple[Any, ...], given: Any, key: str, where: str,
+    def value(self, hint: object, marks: tuple[object, ...], given: object, key: str, where: str,
               index: int | None = None) -> Any:
         hint, own = split(hint)
         marks = (*marks, *own)
@@ -136,8 +138,8 @@ class _Reader:
             return self._list(hint, marks, given, key, where)
         return self._plain(hint, marks, given, key, where)
 
-    def mapping(self, kind: Any, marks: tuple[Any, ...], given: Any, where: str,
-                index: int | None = None) -> Any:
+    def mapping(self, kind: Any, marks: tuple[Any, ...], given: object, where: str,
+                index: int | None = None) -> object:
         form = form_of(kind)
         if form.short is not None and isinstance(given, str):
             given = {form.short: given}
@@ -153,7 +155,7 @@ class _Reader:
                     with wrong:
                         refuse_unknown(name, known, where, beside)
         # A key that is unknown in this combination needs no further error.
-        checked: dict[str, Any] = {}
+        checked: dict[str, object] = {}
         for key in () if wrong.found and form.by else keys_of(kind):
             with wrong:
                 checked |= self._field(key, form, values, known, where, index)
@@ -167,8 +169,8 @@ class _Reader:
                 raise InputError(error.what, _inside(where, error.where), error.remedy) from error
         return made
 
-    def _field(self, key: Key, form: Form, values: Mapping[Any, Any], known: tuple[str, ...],
-               where: str, index: int | None) -> dict[str, Any]:
+    def _field(self, key: Key, form: Form, values: Mapping[object, object], known: tuple[str, ...],
+               where: str, index: int | None) -> dict[str, object]:
         """Read a field; return nothing if it is missing and its default applies."""
         if key.mark(Folder):
             return {key.field: self._base}
@@ -195,7 +197,7 @@ class _Reader:
             raise InputError(f'"{key.name}" is missing', where, advice(key.hint, key.marks))
         return {}
 
-    def _keyed(self, keyed: Keyed, values: Mapping[Any, Any], where: str) -> Any:
+    def _keyed(self, keyed: Keyed, values: Mapping[object, object], where: str) -> object:
         given = [name for name in keyed.kinds if name in values]
         if len(given) != 1:
             found = f'{len(given)} {keyed.noun}s ({", ".join(given)})' if given \
@@ -204,7 +206,7 @@ class _Reader:
                              'give exactly one of ' + ', '.join(keyed.kinds))
         return self.value(keyed.kinds[given[0]], (), values[given[0]], given[0], where)
 
-    def _kind(self, kinds: Sequence[Any], given: Mapping[Any, Any], where: str) -> Any:
+    def _kind(self, kinds: Sequence[object], given: Mapping[object, object], where: str) -> object:
         """Return the kind whose first key is given."""
         fitting = [kind for kind in kinds if keys_of(kind)[0].name in given]
         if len(fitting) != 1:
@@ -213,8 +215,8 @@ class _Reader:
                              'give ' + ' or '.join(map(wanted, kinds)))
         return fitting[0]
 
-    def _one_of(self, choices: tuple[Any, ...], marks: tuple[Any, ...], given: Any, key: str,
-                where: str) -> Any:
+    def _one_of(self, choices: tuple[object, ...], marks: tuple[object, ...], given: object,
+                key: str, where: str) -> object:
         for choice in choices:
             try:
                 return self.value(choice, marks, given, key, where)
@@ -222,8 +224,8 @@ class _Reader:
                 continue
         _refuse(given, key, where, advice(Union[choices], marks))  # noqa: UP007
 
-    def _list(self, hint: Any, marks: tuple[Any, ...], given: Any, key: str,
-              where: str) -> tuple[Any, ...]:
+    def _list(self, hint: object, marks: tuple[object, ...], given: object, key: str,
+              where: str) -> tuple[object, ...]:
         items = get_args(hint)
         if not isinstance(given, list | tuple):
             entries = mark_of(marks, Listed)
@@ -242,8 +244,8 @@ class _Reader:
                 for item, part in zip(items, given, strict=False)]
         return (*read, *(0.0,) * missing)
 
-    def _part(self, item: Any, marks: tuple[Any, ...], given: Any, whole: tuple[Any, Any],
-              key: str, where: str) -> Any:
+    def _part(self, item: object, marks: tuple[object, ...], given: object,
+              whole: tuple[object, Any], key: str, where: str) -> object:
         """Read a plain value in a list; errors advise on the list, with its type and marks."""
         try:
             return self.value(item, marks, given, key, where)
@@ -252,8 +254,8 @@ class _Reader:
             raise InputError(f'{what} {short(given)}', where,
                              advice(*whole) + _as_yaml(given)) from error
 
-    def _entries(self, hint: Any, marks: tuple[Any, ...], given: Sequence[Any], key: str,
-                 where: str) -> tuple[Any, ...]:
+    def _entries(self, hint: object, marks: tuple[object, ...], given: Sequence[object], key: str,
+                 where: str) -> tuple[object, ...]:
         item, entries = get_args(hint)[0], mark_of(marks, Listed) or Listed()
         if len(given) < entries.least or len(given) > (entries.most or sys.maxsize):
             allowed = f'{entries.least} or more' if entries.most is None else \
@@ -267,7 +269,7 @@ class _Reader:
         own = None if entries.own is None else next(
             name for name in keys_of(split(item)[0]) if name.name == entries.own)
         wrong = _Wrong()
-        read: list[Any] = []
+        read: list[object] = []
         seen = set()
         for index, part in enumerate(given):
             place = f'{_inside(where, key)}[{index}]'
@@ -284,7 +286,7 @@ class _Reader:
         wrong.report()
         return tuple(read)
 
-    def _label(self, own: Key | None, entry: Any) -> str:
+    def _label(self, own: Key | None, entry: object) -> str:
         """Return an entry's label: the value of its own key after its index, if that is valid."""
         if own is None or not isinstance(entry, Mapping) or own.name not in entry:
             return ''
@@ -293,10 +295,10 @@ class _Reader:
         except InputError:
             return ''
 
-    def _plain(self, hint: Any, marks: tuple[Any, ...], given: Any, key: str,
-               where: str) -> Any:
+    def _plain(self, hint: object, marks: tuple[object, ...], given: object, key: str,
+               where: str) -> object:
         plain = get_origin(hint) or hint
-        if hint is Any:
+        if hint in ANY_VALUE:
             return given
         if plain is Literal:
             if isinstance(given, str) and given in get_args(hint):
@@ -325,12 +327,12 @@ def _inside(where: str, key: str) -> str:
     return f'{where}: {key}' if where and key else key or where
 
 
-def _refuse(given: Any, key: str, where: str, remedy: str) -> NoReturn:
+def _refuse(given: object, key: str, where: str, remedy: str) -> NoReturn:
     what = f'"{key}" is {short(given)}' if key else f'is {short(given)}'
     raise InputError(what, where, remedy + _as_yaml(given))
 
 
-def _as_yaml(given: Any) -> str:
+def _as_yaml(given: object) -> str:
     """Return the correct YAML spelling of a number that YAML read as text."""
     number = isinstance(given, str) and _EXPONENT.fullmatch(given)
     return ' (YAML: 1.0e-3, not 1e-3)' if number else ''

@@ -13,7 +13,7 @@ from crgame_ros.schema.marks import Folder, Keyed, LeftOut, Named, OnlyWith
 _HERE = Path()
 
 
-def write(value: Any, base: Path = _HERE) -> Any:
+def write(value: object, base: Path = _HERE) -> Any:
     """
     Return the YAML values from which `read` builds an equal value, from any folder.
 
@@ -30,9 +30,9 @@ def write(value: Any, base: Path = _HERE) -> Any:
     return str(value.resolve()) if isinstance(value, Path) else value
 
 
-def _mapping(value: Any, base: Path) -> dict[str, Any]:
+def _mapping(value: object, base: Path) -> dict[str, object]:
     form = form_of(type(value))
-    entries: dict[str, Any] = {}
+    entries: dict[str, object] = {}
     for key in keys_of(type(value)):
         item = getattr(value, key.field)
         if _is_left_out(key, item, form, value):
@@ -50,7 +50,7 @@ def _mapping(value: Any, base: Path) -> dict[str, Any]:
     return {name: entries[name] for name in (*form.first, *entries) if name in entries}
 
 
-def _is_left_out(key: Key, item: Any, form: Form, value: Any) -> bool:
+def _is_left_out(key: Key, item: Any, form: Form, value: object) -> bool:
     if key.mark(Folder) or key.mark(LeftOut) and item == key.default:
         return True
     beside = key.mark(OnlyWith)

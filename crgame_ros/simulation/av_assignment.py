@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 import math
-from typing import Any, Final
+from typing import Final
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.errors import InputError
@@ -125,7 +125,7 @@ def _placed(problem: PlanningProblem, time_s: float) -> shapely.Polygon:
 
 
 def adapt_game(game: Game, loaded: LoadedScenario, *, seed: int, planner: str = OWN,
-               options: Mapping[str, Any] | None = None,
+               options: Mapping[str, object] | None = None,
                perception: PerceptionSpec | str | None = OWN,
                traffic: TrafficSpec | str | None = OWN) -> Game:
     """

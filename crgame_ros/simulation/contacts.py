@@ -4,7 +4,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.drivability.contact import could_avoid, Course, Kind, kind_of, Side, touched_side
 from crgame_ros.drivability.monitor import VehicleDrivability
@@ -60,7 +60,7 @@ class Contact:
             able += f' ({self.other_role.value}: does not react)'
         return able
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return its JSON form (`docs/planners.md`)."""
         return {'vehicle': self.vehicle_id, 'with': self.other_id, 'n': self.n,
                 'side': self.side, 'kind': self.kind, 'speed': round(self.speed, 2),

@@ -45,7 +45,7 @@ class Participants:
                                 'code': tuple(content['code'])})
 
 
-def _code(value: Any) -> set[str]:
+def _code(value: object) -> set[str]:
     """Collect all class names anywhere in a game."""
     if isinstance(value, str):
         return {value} if ':' in value else set()

@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 import re
 import tempfile
-from typing import Any
 
 from crgame_ros.driver.source import COCKPIT
 from crgame_ros.errors import InputError
@@ -63,7 +62,7 @@ def _replace(new: Path, old: Path) -> None:
     new.rename(old)
 
 
-def _difference(before: Any, now: Any, where: str = '') -> str:
+def _difference(before: object, now: object, where: str = '') -> str:
     """Return the first difference of two games: the name of a file, or the key of a value."""
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for key in (*now, *before):

@@ -5,7 +5,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from crgame_ros.errors import InputError, short
 from crgame_ros.schema.marks import Special
@@ -24,7 +24,7 @@ class LocalText:
     by_language: tuple[tuple[str, str], ...] = ()
 
     @classmethod
-    def from_value(cls, given: Any, where: str = '') -> 'LocalText':
+    def from_value(cls, given: object, where: str = '') -> 'LocalText':
         """
         Read a value of a file: a text, or texts by language.
 
@@ -57,14 +57,14 @@ class LocalText:
 class _LocalTextMark(Special):
     """A text, or texts by language."""
 
-    def read(self, given: Any, where: str, key: str, _base: Path) -> LocalText:
+    def read(self, given: object, where: str, key: str, _base: Path) -> LocalText:
         """Read it."""
         if isinstance(given, LocalText):
             return given
         place = f'{where}: {key}' if where and key else where or key
         return LocalText.from_value(given, place)
 
-    def json_schema(self) -> dict[str, Any]:
+    def json_schema(self) -> dict[str, object]:
         """Return its JSON Schema."""
         return {'anyOf': [{'type': 'string'}, {
             'type': 'object', 'additionalProperties': {'type': 'string'}, 'minProperties': 1}]}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 import time
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 from crgame_ros.errors import InputError
 from crgame_ros.study.file import Page, StudyFile
@@ -128,7 +128,7 @@ class ParticipantSession:
         """Return the questions of an item; empty without any."""
         return questions_of(self.study, item)
 
-    def finish(self, answers: Mapping[str, Any] | None = None, **told: Any) -> SessionItem:
+    def finish(self, answers: Mapping[str, object] | None = None, **told: object) -> SessionItem:
         """
         Record that the next item is finished: it is not asked again.
 
@@ -147,7 +147,7 @@ class ParticipantSession:
         self._add(SessionEvent.FINISHED, item=item.id, answers=taken, **told)
         return item
 
-    def practised(self, good: bool, **told: Any) -> bool:
+    def practised(self, good: bool, **told: object) -> bool:
         """
         Record a practice drive.
 
@@ -206,11 +206,11 @@ class ParticipantSession:
             if after.trial == what.number and after.id in done and self.questions(after):
                 self._add(SessionEvent.REPEATED, item=after.id, reason=reason)
 
-    def note(self, text: str, **told: Any) -> None:
+    def note(self, text: str, **told: object) -> None:
         """Record a note of the experimenter."""
         self._add(SessionEvent.NOTE, text=text, **told)
 
-    def mark(self, name: str, **told: Any) -> None:
+    def mark(self, name: str, **told: object) -> None:
         """Record a marker of the experimenter or of a secondary task."""
         self._add(SessionEvent.MARKER, name=name, **told)
 
@@ -224,5 +224,5 @@ class ParticipantSession:
             raise InputError('is over', f'session of {self.participant}', 'nothing is left to do')
         return item
 
-    def _add(self, entry: SessionEvent, **values: Any) -> None:
+    def _add(self, entry: SessionEvent, **values: object) -> None:
         self.journal.add({'entry': entry.value, 'at': self._clock_s(), **values})

@@ -93,7 +93,7 @@ class ChoiceQuestion:
 
     FORM: ClassVar[Form] = Form(_SEE)
 
-    choices: dict[str, Any]
+    choices: dict[str, object]
     several: bool = False
 
     def check(self) -> None:
@@ -108,7 +108,7 @@ class ChoiceQuestion:
         """Return the displayed texts, by the answer's name."""
         return {str(name): LocalText.from_value(text) for name, text in self.choices.items()}
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is invalid, empty if it is valid."""
         known = set(map(str, self.choices))
         if self.several:
@@ -161,7 +161,7 @@ class TextQuestion:
 
     longest: Annotated[int, Within(1, MOST_CHARACTERS)] = 10_000
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is invalid, empty if it is valid."""
         fits = isinstance(answer, str) and len(answer) <= self.longest
         return '' if fits else f'give {self.longest} characters at most'
@@ -191,7 +191,7 @@ class Question:
     ask: Annotated[Text, Advice('say what is asked')] = LocalText()
     required: bool = True
 
-    def refusal(self, answer: Any) -> str:
+    def refusal(self, answer: object) -> str:
         """Return why an answer is refused, empty if it is accepted; None means no answer."""
         if answer is None:
             return 'give an answer' if self.required else ''
@@ -224,5 +224,5 @@ def check_answers(questions: tuple[Question, ...], answers: Mapping[str, Any],
     return taken
 
 
-def _finite(value: Any) -> bool:
+def _finite(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

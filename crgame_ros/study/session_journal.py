@@ -57,7 +57,7 @@ _TYPES: dict[str, type] = {
 _LARGEST = 1e11
 
 
-def read_entry(line: str | bytes) -> dict[str, Any]:
+def read_entry(line: str | bytes) -> dict[str, object]:
     """
     Read a line of a journal.
 
@@ -80,7 +80,7 @@ def read_entry(line: str | bytes) -> dict[str, Any]:
     return entry
 
 
-def _fits(value: Any, kind: type | None) -> bool:
+def _fits(value: object, kind: type | None) -> bool:
     if kind in (int, float):
         return (isinstance(value, int | kind) and not isinstance(value, bool)
                 and 0 <= value <= _LARGEST)
@@ -122,7 +122,7 @@ class SessionJournal:
                  trace: TracebackType | None) -> None:
         self.close()
 
-    def add(self, entry: dict[str, Any]) -> None:
+    def add(self, entry: dict[str, object]) -> None:
         """
         Add an entry.
 

@@ -88,7 +88,7 @@ def _written_game(settings: TrialSettings) -> Game:
     return Game(scenario, humans=humans)
 
 
-def _spec(kind: type[Any], name: str | None, nothing: str, what: str) -> Any:
+def _spec(kind: type[object], name: str | None, nothing: str, what: str) -> Any:
     if name in (None, OWN):
         return OWN
     if name == nothing:

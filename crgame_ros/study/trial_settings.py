@@ -5,7 +5,7 @@
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 import random
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from crgame_ros.game.events import EventList
 from crgame_ros.game.task_spec import TaskList, TaskSpec
@@ -48,7 +48,7 @@ class TrialSettings:
     scenario: Path | None = None
     seat: str | None = None
     planner: Annotated[str, Named(), Wording(r'[\s\S]+', 'name a planner')] | None = None
-    options: dict[str, Any] | None = None
+    options: dict[str, object] | None = None
     perception: Annotated[str, Named()] | None = None
     traffic: Annotated[str, Named()] | None = None
     seed: Annotated[int, Within(0, 2**63 - 1)] | Literal['each'] | None = None

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 import heapq
-from typing import Any
 
 from crgame_ros.timing.cycle_rows import CycleTable
 from crgame_ros.timing.late_step import (
@@ -75,7 +74,7 @@ class LateStep:
         return (f'{_MS * self.late_s:.1f} ms late at {self.at_s:.2f} s (n = {self.n}){during}: '
                 f'{self.why}{moved}')
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return an entry of `timing.json`."""
         return {'n': self.n, 'at_s': self.at_s, 'late_ms': _MS * self.late_s,
                 'cause': self.main_cause,
@@ -139,7 +138,7 @@ class LateSteps:
         if len(self._worst) > WORST:
             heapq.heappop(self._worst)
 
-    def as_dict(self) -> dict[str, Any] | None:
+    def as_dict(self) -> dict[str, object] | None:
         """Return `late_steps` of `timing.json`; None where the cycles have no causes."""
         if not self._told:
             return None

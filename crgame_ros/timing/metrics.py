@@ -152,7 +152,7 @@ class TimingSummary:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the keys of `timing.json`: those of table I first, in its order."""
-        values: dict[str, Any] = dict(vars(self))
+        values: dict[str, object] = dict(vars(self))
         values['real_time_ratio'] = dict(vars(self.real_time_ratio))
         return values
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import functools
 import json
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from crgame_ros.errors import InputError
 from crgame_ros.schema.declaration import Form
@@ -79,7 +79,7 @@ def table_text(path: str) -> str:
     return json.dumps(write(load_steering_ratio(path)))
 
 
-def _from_text(text: str) -> Any:
+def _from_text(text: str) -> object:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:

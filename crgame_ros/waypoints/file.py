@@ -131,8 +131,8 @@ def _id(text: str, where: str) -> int:
     return int(text)
 
 
-def _links(cells: Mapping[str, str], where: str) -> dict[str, Any]:
-    links: dict[str, Any] = {
+def _links(cells: Mapping[str, str], where: str) -> dict[str, object]:
+    links: dict[str, object] = {
         name: tuple(_id(item, where) for item in cells.get(name, '').split()) for name in _LISTS}
     for name in _SINGLE:
         text = cells.get(name, '')

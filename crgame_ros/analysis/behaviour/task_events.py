@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 import math
 from statistics import mean, median, stdev
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.behaviour.driver_controls import DriverControls
 from crgame_ros.analysis.behaviour.reactions import reaction_to
@@ -158,7 +158,7 @@ class DetectionScore(NamedTuple):
     response_sd_s: float
     response_median_s: float
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary; undefined values are None."""
         return {key: None if isinstance(value, float) and math.isnan(value) else value
                 for key, value in self._asdict().items()}

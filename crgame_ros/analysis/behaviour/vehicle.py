@@ -4,7 +4,6 @@
 
 from dataclasses import dataclass
 import math
-from typing import Any
 
 from crgame_ros.analysis.behaviour.gaps_accepted import AcceptedGap, Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
@@ -75,13 +74,13 @@ class DriverBehaviour:
     tlc_s: FloatArray
     tlc_linear_s: FloatArray
 
-    def as_dict(self, series: bool = False) -> dict[str, Any]:
+    def as_dict(self, series: bool = False) -> dict[str, object]:
         """
         Return the fields as a JSON-compatible dictionary; None where a value is not finite.
 
         :param series: whether to include the time series.
         """
-        found: dict[str, Any] = {
+        found: dict[str, object] = {
             'human': self.human, 'driven_s': self.driven_s,
             'measures': {name: {'value': _finite(value), 'unit': MEASURES[name].unit}
                          for name, value in self.values.items()},
@@ -101,8 +100,8 @@ class DriverBehaviour:
         return found
 
 
-def _lane_change(change: LaneChangeGap) -> dict[str, Any]:
-    found: dict[str, Any] = {'time_s': _finite(change.time_s), 'side': change.side}
+def _lane_change(change: LaneChangeGap) -> dict[str, object]:
+    found: dict[str, object] = {'time_s': _finite(change.time_s), 'side': change.side}
     for name in ('leader', 'follower'):
         neighbour: Neighbour | None = getattr(change.gap, name)
         found |= {name: getattr(change, name),
@@ -112,7 +111,7 @@ def _lane_change(change: LaneChangeGap) -> dict[str, Any]:
     return found
 
 
-def _take_over_values(take_over: TakeOver) -> dict[str, Any]:
+def _take_over_values(take_over: TakeOver) -> dict[str, object]:
     request = take_over.request
     return {'request': None if request is None else request.by,
             'request_s': None if request is None else request.time_s,

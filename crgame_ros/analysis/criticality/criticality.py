@@ -10,7 +10,7 @@ The same code observes offline runs and measures recordings. All definitions are
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.criticality.car_following_measures import (
     Corner,
@@ -301,7 +301,7 @@ class Criticality:
                                         if number in (each.first, each.second)])
             for number, vehicle in enumerate(self._found))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the results as a JSON-compatible dictionary: SI units, times since the start."""
         return {
             'thresholds': self.thresholds._asdict(),

@@ -32,7 +32,7 @@ HUMAN_DASHES = ('-', (0, (6, 1, 1, 1)), (0, (6, 1, 1, 1, 1, 1)))
 AV_DASHES = ((0, (4, 1.2)), (0, (1.2, 1.2)), (0, (4, 1.2, 1.2, 1.2)))
 HUMAN_MARKERS, AV_MARKERS = ('o', 'v', 'P'), ('s', '^', 'D')
 
-_SETTINGS: dict[Any, Any] = {
+_SETTINGS: dict[Any, object] = {
     'font.family': 'STIXGeneral', 'mathtext.fontset': 'stix', 'font.size': 8.0,
     'axes.titlesize': 8.0, 'axes.labelsize': 8.0, 'xtick.labelsize': 7.0, 'ytick.labelsize': 7.0,
     'legend.fontsize': 7.0, 'axes.linewidth': 0.6, 'axes.labelpad': 1.5,

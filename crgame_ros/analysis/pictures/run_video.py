@@ -114,7 +114,7 @@ class _GifWriter(PillowWriter):
         super().__init__(fps=fps)
         self._taken: list[Image.Image] = []
 
-    def grab_frame(self, **savefig_kwargs: Any) -> None:
+    def grab_frame(self, **savefig_kwargs: object) -> None:
         """Add the current picture."""
         canvas = self.fig.canvas
         assert isinstance(canvas, FigureCanvasAgg)

@@ -5,7 +5,6 @@
 import base64
 from collections.abc import Sequence
 import json
-from typing import Any
 
 from crgame_ros.analysis.report.section import Plot, PlotLine
 import numpy as np
@@ -62,7 +61,7 @@ def columns_for(lines: int) -> int:
     return max(FEWEST_COLUMNS, min(MOST_COLUMNS, ALL_POINTS // max(_A_COLUMN * lines, 1)))
 
 
-def encoded(plot: Plot, columns: int) -> dict[str, Any]:
+def encoded(plot: Plot, columns: int) -> dict[str, object]:
     """Return a plot in the page's format, with its lines thinned to so many columns."""
     return {
         'unit': plot.unit, 'plane': plot.plane,
@@ -73,7 +72,7 @@ def encoded(plot: Plot, columns: int) -> dict[str, Any]:
         'lines': [_line(line, columns, plot.plane) for line in plot.lines]}
 
 
-def _line(line: PlotLine, columns: int, plane: bool) -> dict[str, Any]:
+def _line(line: PlotLine, columns: int, plane: bool) -> dict[str, object]:
     xs, ys = line.xs, np.where(np.isfinite(line.ys), line.ys, np.nan)
     if plane:
         most = min(len(xs), _A_COLUMN * columns)

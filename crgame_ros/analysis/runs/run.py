@@ -68,7 +68,7 @@ class Run:
 
     def __init__(self, name: str, *, bag: Path | None = None, epoch: int | None = None,
                  log: RunTrajectories | None = None, record: RunRecord | None = None,
-                 timing: Mapping[str, Any] | None = None, result: OfflineResult | None = None,
+                 timing: Mapping[str, object] | None = None, result: OfflineResult | None = None,
                  scoring: Scoring = 'all', progress: RunProgress = _silent) -> None:
         """
         Keep what is known; the rest follows from the recording, or from an offline run's result.

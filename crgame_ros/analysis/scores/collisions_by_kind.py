@@ -4,7 +4,6 @@
 
 from dataclasses import dataclass
 import math
-from typing import Any
 
 from crgame_ros.analysis.scores.lanes_driven import LanesDriven
 from crgame_ros.analysis.scores.scored_drive import ScoredDrive, Track, TrackKind
@@ -41,7 +40,7 @@ class JudgedCollision:
     kind: Kind
     at_fault: bool
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {'with': self.other_id, 'group': self.other_kind, 'time_s': self.time_s,
                 'kind': self.kind, 'at_fault': self.at_fault}

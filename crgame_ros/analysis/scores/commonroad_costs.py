@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 import math
 import re
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from commonroad.common.solution import CostFunction, VehicleType
 from commonroad.planning.planning_problem import PlanningProblem
@@ -58,7 +58,7 @@ class TrajectoryCost:
     parts: dict[str, float]
     reason: str = ''
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         if self.total is None:
             return {'total': None, 'reason': self.reason}

@@ -4,7 +4,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from commonroad.geometry.shape import ShapeGroup
 from commonroad.planning.planning_problem import PlanningProblem
@@ -30,7 +29,7 @@ class GoalRecord:
     last_distance: float | None
     least_distance: float | None
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {'reached_s': self.reached_s, 'last_distance_m': self.last_distance,
                 'least_distance_m': self.least_distance}
@@ -52,5 +51,5 @@ def find_goal(problem: PlanningProblem, states: Sequence[KSState], dt_s: float) 
                       None if away is None else float(away.min()))
 
 
-def _area(position: Any) -> shapely.Geometry:
+def _area(position: object) -> shapely.Geometry:
     return group_outline(position if isinstance(position, ShapeGroup) else ShapeGroup([position]))

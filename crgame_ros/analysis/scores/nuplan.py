@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from commonroad.planning.planning_problem import PlanningProblem
 from crgame_ros.analysis.scores.collisions_by_kind import (
@@ -136,7 +136,7 @@ class DriveComfort(NamedTuple):
         return tuple(name for name, bound in BOUNDS.items()
                      if self.lowest[name] < bound.lowest or self.highest[name] > bound.highest)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {name: {'lowest': self.lowest[name], 'highest': self.highest[name],
                        'unit': bound.unit, 'comfortable': name not in self.exceeded}
@@ -304,7 +304,7 @@ class NuplanScore:
         mean = sum(WEIGHTS[name] * value for name, value in self.weighted.items())
         return math.prod(self.multipliers.values()) * mean / sum(WEIGHTS.values())
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {
             'score': self.score, 'multipliers': self.multipliers,

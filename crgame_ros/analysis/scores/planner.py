@@ -3,7 +3,6 @@
 """The scores of all driven vehicles of a run, or of the solutions of a scenario."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from commonroad.scenario.scenario import ScenarioID
 from crgame_ros.analysis.scores.commonroad_costs import checker_version
@@ -30,7 +29,7 @@ class PlannerScores:
     vehicles: tuple[VehicleScores, ...]
     remarks: tuple[str, ...] = REMARKS
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the scores as a JSON-compatible dictionary: SI units, times since the start."""
         return {'scenario': str(self.scenario_id), 'checker': checker_version(),
                 'vehicles': [each.as_dict() for each in self.vehicles],

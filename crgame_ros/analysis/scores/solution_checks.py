@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from commonroad.common.solution import PlanningProblemSolution, Solution
 from commonroad.planning.planning_problem import PlanningProblem, PlanningProblemSet
@@ -36,7 +35,7 @@ class SolutionChecks:
         """Return whether all checks passed."""
         return not self.failed
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {'valid': self.is_valid, 'failed': self.failed, 'passed': list(self.passed)}
 

@@ -4,7 +4,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from commonroad.common.solution import CostFunction, PlanningProblemSolution, Solution
 from commonroad.scenario.scenario import ScenarioID
@@ -42,7 +41,7 @@ class SolutionScores:
     checks: SolutionChecks
     feasibility: TrajectoryFeasibility
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {
             'planning_problem': self.solved.planning_problem_id,

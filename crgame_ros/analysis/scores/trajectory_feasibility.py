@@ -5,7 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from commonroad.common.solution import PlanningProblemSolution, TrajectoryType, VehicleModel
 from commonroad.planning.planning_problem import PlanningProblem
@@ -62,7 +62,7 @@ class TrajectoryFeasibility:
     excess_friction: float = 0.0
     step_s: float = 0.0
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {
             'feasible': self.feasible, 'first_step': self.first_step, 'reason': self.reason,

@@ -3,7 +3,7 @@
 """The scores of one vehicle: nuPlan's and CommonRoad's, with its goal and its plans."""
 
 from dataclasses import dataclass
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.analysis.scores.goal_record import GoalRecord
 from crgame_ros.analysis.scores.measures import MEASURES
@@ -38,7 +38,7 @@ class VehicleScores:
     plans: PlanOutcome | None
     remarks: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the fields as a JSON-compatible dictionary."""
         return {
             'vehicle': self.vehicle_id, 'role': self.role, 'planner': self.planner,

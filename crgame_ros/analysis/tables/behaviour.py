@@ -4,7 +4,6 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 import math
-from typing import Any
 
 from crgame_ros.analysis.behaviour.gaps_accepted import Neighbour
 from crgame_ros.analysis.behaviour.measures import MEASURES
@@ -25,7 +24,7 @@ def _column(name: str, empty: str) -> Column:
                   measure.variant, empty)
 
 
-def _vehicles(run: Run) -> Mapping[str, Sequence[Any]]:
+def _vehicles(run: Run) -> Mapping[str, Sequence[object]]:
     found = run.usual_behaviour
     return {'driven_s': [each.driven_s for each in found],
             **{f'drive_{name}': [_known(each.values.get(name, math.nan)) for each in found]
@@ -86,7 +85,7 @@ def write_behaviour(run: Run, writers: Mapping[str, TableRows]) -> None:
                                      for column in table.columns})
 
 
-def _reactions(run: Run) -> Iterable[Mapping[str, Any]]:
+def _reactions(run: Run) -> Iterable[Mapping[str, object]]:
     for driver in run.usual_behaviour:
         for each in driver.reactions:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'event': each.event,
@@ -96,7 +95,7 @@ def _reactions(run: Run) -> Iterable[Mapping[str, Any]]:
                    'reaction_steering': _known(each.reaction.steering_s)}
 
 
-def _lane_changes(run: Run) -> Iterable[Mapping[str, Any]]:
+def _lane_changes(run: Run) -> Iterable[Mapping[str, object]]:
     for driver in run.usual_behaviour:
         for number, change in enumerate(driver.lane_changes):
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'number': number,
@@ -105,12 +104,12 @@ def _lane_changes(run: Run) -> Iterable[Mapping[str, Any]]:
                    **_neighbour('follower', change.follower, change.gap.follower)}
 
 
-def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, Any]:
+def _neighbour(who: str, name: str | None, gap: Neighbour | None) -> dict[str, object]:
     return {who: name, f'gap_to_{who}': None if gap is None else gap.gap,
             f'gap_accepted_{who}': None if gap is None else gap.time_gap_s}
 
 
-def _take_over_rows(run: Run) -> Iterable[Mapping[str, Any]]:
+def _take_over_rows(run: Run) -> Iterable[Mapping[str, object]]:
     for driver in run.usual_behaviour:
         for each in driver.take_overs:
             yield {'run': run.id, 'vehicle': driver.vehicle_id, 'seat_s': each.seat_s,

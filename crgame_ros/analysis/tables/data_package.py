@@ -46,9 +46,9 @@ def data_package(tables: Sequence[WrittenTable], file_format: Format, name: str)
         'resources': [_resource(table, file_format) for table in tables]}
 
 
-def table_schema(declaration: TableDeclaration) -> dict[str, Any]:
+def table_schema(declaration: TableDeclaration) -> dict[str, object]:
     """Return the Table Schema of a table."""
-    schema: dict[str, Any] = {
+    schema: dict[str, object] = {
         '$schema': PROFILE.format('tableschema'),
         'fields': [_field(column, column.name in declaration.key)
                    for column in declaration.columns],
@@ -59,10 +59,10 @@ def table_schema(declaration: TableDeclaration) -> dict[str, Any]:
     return schema
 
 
-def _resource(table: WrittenTable, file_format: Format) -> dict[str, Any]:
+def _resource(table: WrittenTable, file_format: Format) -> dict[str, object]:
     with table.path.open('rb') as stream:
         digest = hashlib.file_digest(stream, 'sha256').hexdigest()
-    resource: dict[str, Any] = {
+    resource: dict[str, object] = {
         'name': table.declaration.name, 'type': 'table', 'path': table.name,
         'format': file_format, 'mediatype': _MEDIA_TYPES[file_format],
         'description': f'One row is {table.declaration.row}.', 'rows': table.rows,
@@ -77,9 +77,9 @@ def _resource(table: WrittenTable, file_format: Format) -> dict[str, Any]:
     return resource
 
 
-def _field(column: Column, key: bool) -> dict[str, Any]:
-    field: dict[str, Any] = {'name': column.name, 'type': column.kind, **column.notes}
-    constraints: dict[str, Any] = {'required': True} if key else {}
+def _field(column: Column, key: bool) -> dict[str, object]:
+    field: dict[str, object] = {'name': column.name, 'type': column.kind, **column.notes}
+    constraints: dict[str, object] = {'required': True} if key else {}
     if column.values:
         constraints['enum'] = list(column.values)
     if constraints:

@@ -21,7 +21,7 @@ class TablePart:
     """
 
     columns: tuple[Column, ...]
-    values: Callable[[Run], Mapping[str, Sequence[Any]]]
+    values: Callable[[Run], Mapping[str, Sequence[object]]]
 
 
 def declare(name: str, row: str, key: tuple[str, ...],

@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator
 import math
-from typing import Any
 
 from crgame_ros.analysis.runs.run import PlanTally, Run
 from crgame_ros.analysis.tables.column import (
@@ -66,7 +65,7 @@ PLANS = TableDeclaration(
           for name, when, _ in DEVIATIONS)))
 
 
-def plan_rows(run: Run) -> Iterator[dict[str, Any]]:
+def plan_rows(run: Run) -> Iterator[dict[str, object]]:
     """
     Yield the rows of a run, in pieces, and count the plans of each AV.
 
@@ -75,7 +74,7 @@ def plan_rows(run: Run) -> Iterator[dict[str, Any]]:
     avs = {av.id: av for av in run.game.avs}
     plans = run.plans
     run.tallies = {av: PlanTally() for av in avs} if plans is not None else {}
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[str, object]] = []
     for plan in plans() if plans is not None else ():
         rows.append(_row(run, plan, avs[plan.av], run.tallies[plan.av]))
         if len(rows) == _ROWS:
@@ -85,14 +84,14 @@ def plan_rows(run: Run) -> Iterator[dict[str, Any]]:
         yield _columns(run, rows)
 
 
-def _columns(run: Run, rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _columns(run: Run, rows: list[dict[str, object]]) -> dict[str, object]:
     return {'run': run.id, **{name: [row.get(name) for row in rows]
                               for name in PLANS.schema.names if name != 'run'}}
 
 
-def _row(run: Run, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, Any]:
+def _row(run: Run, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[str, object]:
     scheduler = run.game.scheduler
-    row: dict[str, Any] = {
+    row: dict[str, object] = {
         'av': found.av, 'number': tally.answers, 'k': found.k, 'latency_s': found.latency_s,
         'time_s': None if found.k is None else float(run.seconds_at(np.array(found.k)))}
     refusal: str | None = found.fault
@@ -109,13 +108,13 @@ def _row(run: Run, found: RecordedPlan, av: DrivenAv, tally: PlanTally) -> dict[
     return row | {'passes_check': refusal is None if known else None, 'refusal': refusal}
 
 
-def _planned(run: Run, found: RecordedPlan, av: DrivenAv) -> dict[str, Any]:
+def _planned(run: Run, found: RecordedPlan, av: DrivenAv) -> dict[str, object]:
     """Return the columns that concern a plan's states."""
     assert found.plan is not None
     log, states = run.log, found.plan.states.copy()
     states[:, :3] = av.transform.to_simulation(states[:, :3])
     step_s = log.game.scheduler.time_step_s
-    row: dict[str, Any] = {'points': len(states), 'horizon_s': (len(states) - 1) * step_s}
+    row: dict[str, object] = {'points': len(states), 'horizon_s': (len(states) - 1) * step_s}
     for end, place in ENDS:
         for name, _, _, column in STATE_COLUMNS:
             row[f'{end}_{name}'] = float(states[place, column])

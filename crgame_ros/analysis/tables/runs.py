@@ -5,7 +5,6 @@
 from collections.abc import Mapping, Sequence
 import hashlib
 import json
-from typing import Any
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.tables.column import Column, INTEGER, NUMBER, RUN, TEXT
@@ -36,7 +35,7 @@ COUNTS = {'cycles': 'cycles that were recorded', 'gaps': 'cycles that were lost'
           'resets': 'drift resets', 'catch_up_steps': 'cycles more than a step late'}
 
 
-def _identity(run: Run) -> Mapping[str, Sequence[Any]]:
+def _identity(run: Run) -> Mapping[str, Sequence[object]]:
     log = run.log
     game, scheduler = log.game, log.game.scheduler
     planners = {av.id: av.planner for av in game.avs}
@@ -57,9 +56,9 @@ def _identity(run: Run) -> Mapping[str, Sequence[Any]]:
         'notices': ['\n'.join((*run.missing, *remarks))]}
 
 
-def _timing(run: Run) -> Mapping[str, Sequence[Any]]:
+def _timing(run: Run) -> Mapping[str, Sequence[object]]:
     timing = run.timing
-    found: dict[str, Sequence[Any]] = {} if timing is None else {
+    found: dict[str, Sequence[object]] = {} if timing is None else {
         **{name: [timing[key] * factor] for key, (name, _, factor, _) in TIMING.items()},
         **{f'real_time_ratio_{key}': [timing['real_time_ratio'][key]] for key in RATIOS},
         **{key: [timing[key]] for key in COUNTS}}

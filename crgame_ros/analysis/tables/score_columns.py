@@ -3,7 +3,7 @@
 """Columns of the table of vehicles with the scores of `crgame score`."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from crgame_ros.analysis.runs.run import Run
 from crgame_ros.analysis.scores.measures import MEASURES
@@ -48,7 +48,7 @@ def _declared(column: _ScoreColumn) -> Column:
         empty=f'{measure.undefined}, or {NOT_SCORED}' if measure.undefined else NOT_SCORED)
 
 
-def _scores(run: Run) -> Mapping[str, Sequence[Any]]:
+def _scores(run: Run) -> Mapping[str, Sequence[object]]:
     scores = {each.vehicle_id: each for each in run.usual_scores.vehicles}
     found = [scores.get(name) for name in run.vehicles]
     values = [{} if each is None else each.values() for each in found]

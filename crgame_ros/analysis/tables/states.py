@@ -82,7 +82,7 @@ STATES = TableDeclaration(
                CENTER, IN_LANE, OFF_ROAD)))
 
 
-def state_rows(run: Run) -> Iterator[dict[str, Any]]:
+def state_rows(run: Run) -> Iterator[dict[str, object]]:
     """
     Yield the rows of a run, in pieces: by time step, driven vehicles first.
 
@@ -114,7 +114,7 @@ class _StateRows:
                        'type': [item.type for item in items]}
         self._sizes = np.array([(item.shape.length, item.shape.width) for item in items])
 
-    def rows(self, part: slice) -> dict[str, Any]:
+    def rows(self, part: slice) -> dict[str, object]:
         """Return the columns of the steps in a part of the log."""
         log = self._run.log
         states = log.vehicle_states[part]
@@ -133,7 +133,7 @@ class _StateRows:
         ks = np.broadcast_to(log.ks[part, None], here.shape)
         who = np.broadcast_to(np.arange(here.shape[1]), here.shape)[here]
         commands = self._commands(part, here.shape[1])
-        found: dict[str, Any] = {
+        found: dict[str, object] = {
             'run': self._run.id, 'k': ks[here],
             'time_s': self._run.seconds_at(ks[here]),
             **{name: pa.DictionaryArray.from_arrays(pa.array(who), texts).cast(pa.string())
@@ -161,7 +161,7 @@ class _StateRows:
             found[known, :self._vehicles] = record.commands[places[known]]
         return found
 
-    def _lanes(self, poses: FloatArray, here: NDArray[np.bool_]) -> dict[str, Any]:
+    def _lanes(self, poses: FloatArray, here: NDArray[np.bool_]) -> dict[str, object]:
         """Return lanelet, arc length and lateral offset of all that are present."""
         avs = self._run.game.avs
         transforms = {item.id: item.transform for item in avs}
@@ -184,7 +184,7 @@ class _StateRows:
                 'lane_s': s, 'lane_offset': offset}
 
 
-def _consumed(commands: FloatArray) -> dict[str, Any]:
+def _consumed(commands: FloatArray) -> dict[str, object]:
     """Return the columns of the commands consumed (R, 5)."""
     # Putting a vehicle back is an event (`events`).
     found: dict[str, Any] = {name: column for name, column in zip(

@@ -4,7 +4,6 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 import math
-from typing import Any
 
 from crgame_ros.analysis.behaviour.task_events import detection_scores, task_events, TaskEvent
 from crgame_ros.analysis.runs.run import Run
@@ -24,7 +23,7 @@ from crgame_ros.game.events import ACTIONS
 UNKNOWN = 'the game does not know the event: a vehicle touched another object, or was put back'
 
 
-def _fired(run: Run) -> Mapping[str, Sequence[Any]]:
+def _fired(run: Run) -> Mapping[str, Sequence[object]]:
     game = run.game
     specs = {spec.name: spec for spec in game.events}
     fired = run.record.fired
@@ -123,20 +122,20 @@ def write_tasks(run: Run, writers: Mapping[str, TableRows]) -> None:
                                      for column in table.columns})
 
 
-def _common(event: TaskEvent) -> dict[str, Any]:
+def _common(event: TaskEvent) -> dict[str, object]:
     return {'task': event.name, 'vehicle': event.seat, 'number': event.value,
             'time_s': event.onset_s, 'shown_delay_ms': event.times.delay_ms,
             'picture_ms': event.times.picture_ms, 'outcome': event.outcome}
 
 
-def _responses(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
+def _responses(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
     for event in events:
         if event.what in ('stimulus', 'unrequested'):
             yield {**_common(event), 'response_time_ms': event.times.response_ms,
                    'paused_ms': event.times.paused_ms}
 
 
-def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
+def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
     for event in events:
         if event.what == 'request':
             first_s = event.response_time_s
@@ -144,7 +143,7 @@ def _requests(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
                    'first_input_s': None if math.isnan(first_s) else first_s}
 
 
-def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, Any]]:
+def _spans(events: Iterable[TaskEvent]) -> Iterable[dict[str, object]]:
     for event in events:
         if event.what == 'span':
             yield {'task': event.name, 'vehicle': event.seat, 'kind': event.kind,

@@ -37,7 +37,7 @@ COUNTS = {
     'steps_without_plan': 'simulation steps without a plan to follow'}
 
 
-def _identity(run: Run) -> Mapping[str, Sequence[Any]]:
+def _identity(run: Run) -> Mapping[str, Sequence[object]]:
     vehicles, driven = run.log.vehicles, run.driven
     return {
         'run': [run.id] * len(vehicles), 'id': [item.id for item in vehicles],
@@ -53,7 +53,7 @@ def _identity(run: Run) -> Mapping[str, Sequence[Any]]:
                              for item in driven]}
 
 
-def _drive(run: Run) -> Mapping[str, Sequence[Any]]:
+def _drive(run: Run) -> Mapping[str, Sequence[object]]:
     states = run.log.vehicle_states
     speeds, accelerations = (states[..., column] for column in (
         StateColumn.SPEED, StateColumn.ACCELERATION))
@@ -63,9 +63,9 @@ def _drive(run: Run) -> Mapping[str, Sequence[Any]]:
             'min_acceleration': accelerations.min(axis=0)}
 
 
-def _criticality(run: Run) -> Mapping[str, Sequence[Any]]:
+def _criticality(run: Run) -> Mapping[str, Sequence[object]]:
     found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
-    columns: dict[str, list[Any]] = {}
+    columns: dict[str, list[object]] = {}
     for name in MEASURES:
         worst = [None if each is None else each.worst.get(name) for each in found]
         columns[f'worst_{name}'] = [None if each is None else each.value for each in worst]
@@ -83,9 +83,9 @@ def _criticality(run: Run) -> Mapping[str, Sequence[Any]]:
     return columns
 
 
-def _following(run: Run) -> Mapping[str, Sequence[Any]]:
+def _following(run: Run) -> Mapping[str, Sequence[object]]:
     found = [run.vehicle_criticality.get(item.id) for item in run.log.vehicles]
-    columns: dict[str, list[Any]] = {column.name: [] for column in FOLLOWING_COLUMNS}
+    columns: dict[str, list[object]] = {column.name: [] for column in FOLLOWING_COLUMNS}
     for each in found:
         row: dict[str, Any] = dict.fromkeys(columns)
         if each is not None:
@@ -141,7 +141,7 @@ def _count_name(key: str) -> str:
     return f'plans_{key}' if key in ('accepted', 'refused', 'of_others', 'realigned') else key
 
 
-def _planning(run: Run) -> Mapping[str, Sequence[Any]]:
+def _planning(run: Run) -> Mapping[str, Sequence[object]]:
     ids = [item.id for item in run.log.vehicles]
     answers = run.answers
     tallies = [run.tallies.get(name) for name in ids]

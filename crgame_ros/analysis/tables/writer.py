@@ -70,7 +70,7 @@ class KeptTable(TableRows):
         return pa.Table.from_batches(self._kept, self.declaration.schema).combine_chunks()
 
 
-def _are_many(values: Any) -> bool:
+def _are_many(values: object) -> bool:
     return hasattr(values, '__len__') and not isinstance(values, str)
 
 
@@ -87,7 +87,7 @@ def _array(values: Any, kind: pa.DataType, rows: int) -> pa.Array:
     return pa.array(values, kind, from_pandas=True)
 
 
-def _plain_text(value: Any) -> Any:
+def _plain_text(value: object) -> object:
     """Return text that every reader accepts: without control characters but tabs and newlines."""
     if not isinstance(value, str) or value.isprintable():
         return value
@@ -173,7 +173,7 @@ class TableWriter(TableRows):
             self.release()
 
 
-def _spelled(column: pa.Array) -> list[Any]:
+def _spelled(column: pa.Array) -> list[object]:
     """Return a column's values as in CSV."""
     values: list[Any] = column.to_pylist()
     if column.type == NUMBER:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import json
 from pathlib import Path
 import re
-from typing import Any
 
 from crgame_ros.cockpit.page_messages import clean_text
 from crgame_ros.cockpit.run_files import RUN_FILES, run_id
@@ -78,7 +77,7 @@ class RunArchive:
     def __init__(self, session: Path, root: Path | None = None) -> None:
         self.session = session.resolve()
         self._root = None if root is None else root.resolve()
-        self._told: dict[tuple[Path, int], Mapping[str, Any]] = {}
+        self._told: dict[tuple[Path, int], Mapping[str, object]] = {}
 
     def runs(self) -> dict[str, PastRun]:
         """Return the runs that exist now by their ids, the latest first."""
@@ -105,7 +104,7 @@ class RunArchive:
         except KeyError:
             raise InputError('there is no such run', 'id', 'load the page again') from None
 
-    def listing(self) -> dict[str, Any]:
+    def listing(self) -> dict[str, object]:
         """Return the answer of /api/runs."""
         return {'runs': [self._entry(run) for run in self.runs().values()]}
 
@@ -128,7 +127,7 @@ class RunArchive:
                              'see whose files they are') from error
         return f'{run.name} is deleted'
 
-    def _entry(self, run: PastRun) -> dict[str, Any]:
+    def _entry(self, run: PastRun) -> dict[str, object]:
         files = run.files()
         return {'id': run.id, 'name': run.name, **self._facts(run),
                 'finished': run.is_finished, 'closed': run.is_closed,
@@ -136,7 +135,7 @@ class RunArchive:
                 'bytes': sum(_size(path) for path in files.values()),
                 'files': [{'name': name, 'bytes': _size(path)} for name, path in files.items()]}
 
-    def _facts(self, run: PastRun) -> Mapping[str, Any]:
+    def _facts(self, run: PastRun) -> Mapping[str, object]:
         """Return the facts that do not change once a run is over; read them once."""
         timing = run.folder / 'timing.json'
         metadata = run.bag / METADATA_FILE
@@ -172,7 +171,7 @@ def _size(path: Path) -> int:
         return 0
 
 
-def _game_facts(path: Path) -> dict[str, Any]:
+def _game_facts(path: Path) -> dict[str, object]:
     try:
         game = load_game(path)
     except InputError:
@@ -182,7 +181,7 @@ def _game_facts(path: Path) -> dict[str, Any]:
             'scenario': clean_text(game.scenario.stem, MAX_TITLE)}
 
 
-def _bag_facts(path: Path) -> dict[str, Any]:
+def _bag_facts(path: Path) -> dict[str, object]:
     """Read the start and duration of a recording, without its topics."""
     try:
         with path.open(encoding='utf-8', errors='replace') as stream:

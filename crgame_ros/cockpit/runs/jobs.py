@@ -5,7 +5,6 @@
 from collections.abc import Sequence
 import math
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.analysis.pictures.frame_svg import frame_svg
 from crgame_ros.analysis.pictures.scene_frame import FrameScene
@@ -32,7 +31,7 @@ _WORDS = {
     'speed_limit': 'Kept the speed limit', 'comfort': 'Comfort'}
 
 
-def score(path: Path) -> dict[str, Any]:
+def score(path: Path) -> dict[str, object]:
     """
     Return the score of a run by nuPlan's measures, which need only the motion of all objects.
 
@@ -48,7 +47,7 @@ def score(path: Path) -> dict[str, Any]:
         for number, each in enumerate(scores.vehicles)], 'refusal': scores.refusal}
 
 
-def picture(path: Path, out: str) -> dict[str, Any]:
+def picture(path: Path, out: str) -> dict[str, object]:
     """
     Draw the end of a run and the paths of the driven vehicles up to it.
 
@@ -67,7 +66,8 @@ def picture(path: Path, out: str) -> dict[str, Any]:
     return {}
 
 
-def compare(path: Path, others: Sequence[str], names: Sequence[str], out: str) -> dict[str, Any]:
+def compare(path: Path, others: Sequence[str], names: Sequence[str],
+            out: str) -> dict[str, object]:
     """
     Write one report of several runs.
 
@@ -82,7 +82,7 @@ def compare(path: Path, others: Sequence[str], names: Sequence[str], out: str) -
     return {}
 
 
-def _score_values(found: NuplanScore | None) -> dict[str, Any]:
+def _score_values(found: NuplanScore | None) -> dict[str, object]:
     if found is None:
         return {'score': None, 'parts': []}
     parts = [(name, value, 0.0) for name, value in found.multipliers.items()]
@@ -92,7 +92,7 @@ def _score_values(found: NuplanScore | None) -> dict[str, Any]:
          'definition': MEASURES[name].definition} for name, value, weight in parts]}
 
 
-def _motion(log: RunTrajectories, number: int) -> dict[str, Any]:
+def _motion(log: RunTrajectories, number: int) -> dict[str, object]:
     """Return the distance and the speeds of a vehicle [m, m/s]."""
     states = log.vehicle_states[:, number]
     states = states[np.isfinite(states[:, 0])]

@@ -69,7 +69,7 @@ WORK = TableDeclaration('work', 'the computing of a cell', ('cell',), (
 TABLES_OF_CELLS = (CELLS, VEHICLES_OF_CELLS, WORK)
 
 
-def outcome_of(result: OfflineResult) -> dict[str, Any]:
+def outcome_of(result: OfflineResult) -> dict[str, object]:
     """Return the values of a run in the cell's row."""
     steps = len(result.vehicle_states) - 1
     return {'status': 'ok', 'simulated_s': steps * result.setup.scheduler.dt_s,
@@ -77,7 +77,7 @@ def outcome_of(result: OfflineResult) -> dict[str, Any]:
             'stopped': result.stop is not None}
 
 
-def vehicle_rows(run: Run, result: OfflineResult) -> list[dict[str, Any]]:
+def vehicle_rows(run: Run, result: OfflineResult) -> list[dict[str, object]]:
     """Return the rows of a run's driven vehicles."""
     columns: dict[str, Sequence[Any]] = part_rows(VEHICLE_PARTS, run)
     ids = columns.pop('id')
@@ -95,6 +95,6 @@ def vehicle_rows(run: Run, result: OfflineResult) -> list[dict[str, Any]]:
     return rows
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Return a value as a JSON-compatible one."""
     return value.item() if hasattr(value, 'item') else value

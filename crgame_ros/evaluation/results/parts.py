@@ -98,7 +98,7 @@ class ResultParts:
                  trace: TracebackType | None) -> None:
         self.close()
 
-    def add(self, *cells: Mapping[str, Any]) -> None:
+    def add(self, *cells: Mapping[str, object]) -> None:
         """
         Store the rows of cells, by one write to the journal.
 
@@ -198,12 +198,12 @@ class ResultParts:
         return number
 
 
-def _lines(cells: Iterable[Mapping[str, Any]]) -> str:
+def _lines(cells: Iterable[Mapping[str, object]]) -> str:
     """Return the rows of cells as lines of a journal."""
     return ''.join(json.dumps(rows) + '\n' for rows in cells)
 
 
-def _write_lines(path: Path, cells: Iterable[Mapping[str, Any]]) -> None:
+def _write_lines(path: Path, cells: Iterable[Mapping[str, object]]) -> None:
     write_whole(_lines(cells).encode(), path)
 
 
@@ -274,7 +274,7 @@ def _journal_number(path: Path) -> int:
     return int(path.stem.rpartition('-')[2])
 
 
-def _journal_lines(path: Path) -> list[dict[str, Any]]:
+def _journal_lines(path: Path) -> list[dict[str, object]]:
     """Read the rows of a journal; return none if it was removed in the meantime."""
     try:
         lines = path.read_text(encoding='utf-8').splitlines()
@@ -288,7 +288,7 @@ def _journal_lines(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _write_rows(table: TableDeclaration, cells: Sequence[Mapping[str, Any]],
+def _write_rows(table: TableDeclaration, cells: Sequence[Mapping[str, object]],
                 sink: Path | pa.NativeFile) -> None:
     """Write the rows of cells in a table."""
     rows = [row for each in cells for row in _rows_of(table, each)]
@@ -298,14 +298,14 @@ def _write_rows(table: TableDeclaration, cells: Sequence[Mapping[str, Any]],
                         for column in table.columns})
 
 
-def _rows_of(table: TableDeclaration, cell: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _rows_of(table: TableDeclaration, cell: Mapping[str, Any]) -> list[dict[str, object]]:
     if table is VEHICLES_OF_CELLS:
-        rows: list[dict[str, Any]] = cell['vehicles']
+        rows: list[dict[str, object]] = cell['vehicles']
         return rows
     return [cell['cell'] if table is CELLS else cell['work']]
 
 
-def _write_part(folder: Path, number: int, cells: Sequence[Mapping[str, Any]]) -> None:
+def _write_part(folder: Path, number: int, cells: Sequence[Mapping[str, object]]) -> None:
     """Write rows as a part of every table."""
     def write(table: TableDeclaration, path: Path) -> None:
         _write_rows(table, cells, path)

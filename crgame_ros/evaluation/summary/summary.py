@@ -192,7 +192,7 @@ class Summary:
         """Return the command that runs a cell again and writes its report."""
         return shlex.join(('crgame', 'evaluate', str(self.folder), '--cell', key))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the summary as a JSON-compatible dictionary: SI units, None if unknown."""
         found = asdict(self)
         found['folder'] = str(self.folder)
@@ -205,11 +205,11 @@ class Summary:
         for failure in found['failures']:
             failure['cells'] = [{'labels': labels, 'cells': cells}
                                 for labels, cells in failure['cells']]
-        whole: dict[str, Any] = _known(found)
+        whole: dict[str, object] = _known(found)
         return whole
 
 
-def _known(value: Any) -> Any:
+def _known(value: object) -> Any:
     """Return a value in which those that JSON cannot represent are replaced."""
     if isinstance(value, dict):
         return {key: _known(each) for key, each in value.items()}

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 import time
-from typing import Any
 
 from crgame_ros.analysis.criticality.rows import CRITICALITY_TOPIC
 from crgame_ros.cockpit.client import Client
@@ -51,7 +50,7 @@ class AvFeed:
         self._slots: dict[tuple[str, str], PolledSubscription] = {}
         self._map = endpoints.polled('/occupancy')
         # The newest map, for the next epoch if it keeps the map, and the map's file.
-        self._map_message: Any | None = None
+        self._map_message: object | None = None
         self._map_path: object = None
         self._frames: MessageFrames | None = None
         self._avs: tuple[str, ...] = ()
@@ -146,7 +145,7 @@ class AvFeed:
             if scan is not None:
                 self._hub.send_frame(*scan, only_if=_perceives_as(av, scans=True))
 
-    def _send_map(self, message: Any) -> None:
+    def _send_map(self, message: object) -> None:
         if self._frames is not None:
             self._hub.send_frame(*self._frames.occupancy(self._frames.place(0), message))
 

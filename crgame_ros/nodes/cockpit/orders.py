@@ -97,7 +97,7 @@ class CockpitOrders:
         if not response.results[0].successful:
             raise CrgameError(response.results[0].reason)
 
-    async def _call(self, client: Client, request: Any, what: str) -> Any:
+    async def _call(self, client: Client, request: object, what: str) -> Any:
         loop = asyncio.get_running_loop()
         until_s = loop.time() + ANSWER_S
         while not client.service_is_ready():

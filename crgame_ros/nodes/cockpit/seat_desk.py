@@ -3,7 +3,6 @@
 """The seats of a live run: how people at this cockpit take, drive, offer and leave them."""
 
 import time
-from typing import Any
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.cockpit.held_seat import HeldSeat
@@ -76,7 +75,7 @@ class PeopleFeed:
             self._told_s = now_s
             self._record()
 
-    def _entry(self, client: Client) -> dict[str, Any]:
+    def _entry(self, client: Client) -> dict[str, object]:
         seat = self._table.seat_of(client.id)
         return {'client': client.id, 'name': client.name, 'role': client.rights.role,
                 'seat': None if seat is None else seat.id, 'away': seat is None or seat.away,

@@ -275,20 +275,20 @@ class SimControl:
             if parameter.name == 'real_time_factor':
                 self.real_time_factor = float(parameter.value)
 
-    def _on_start(self, _: Any, response: Any) -> Any:
+    def _on_start(self, _: Any, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.paused, self.started = False, True
         return _answer(response, True, f'waiting for the driver of {" and ".join(self.awaited)}'
                        if self.awaited else 'running')
 
-    def _on_pause(self, _: Any, response: Any) -> Any:
+    def _on_pause(self, _: object, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.paused = True
         return _answer(response, True, 'paused')
 
-    async def _on_step(self, _: Any, response: Any) -> Any:
+    async def _on_step(self, _: object, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
         if not self.paused:
@@ -302,17 +302,17 @@ class SimControl:
         return _answer(response, n is not None, f'at n = {n}' if n is not None else
                        'not done: the run goes on or is over')
 
-    def _on_reset(self, _: Any, response: Any) -> Any:
+    def _on_reset(self, _: object, response: object) -> object:
         self.reset_wanted, self.started = True, False
         return _answer(response, True, 'resetting')
 
-    def _on_stop(self, _: Any, response: Any) -> Any:
+    def _on_stop(self, _: object, response: object) -> object:
         if self.over:
             return _answer(response, False, OVER)
         self.stop_wanted = True
         return _answer(response, True, 'stopping')
 
 
-def _answer(response: Any, success: bool, text: str) -> Any:
+def _answer(response: Any, success: bool, text: str) -> object:
     response.success, response.message = success, text
     return response

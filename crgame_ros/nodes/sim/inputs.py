@@ -99,7 +99,7 @@ class SimInputs:
         if self._agents is not None and awaits is not None:
             self._agents.wanted = lambda stamp_ns, _frame: awaits(stamp_ns)
 
-    def _on_planner_run(self, av_id: str, request: Any, response: Any) -> Any:
+    def _on_planner_run(self, av_id: str, request: Any, response: Any) -> object:
         self.planner_orders[av_id] = bool(request.data)
         response.success = True
         response.message = f'{av_id}: planner {"goes" if request.data else "stops"}'

@@ -39,7 +39,7 @@ class AskedScale:
                   for question in self.scale.questions),
                 *score_columns(self.scale, self.prefix)]
 
-    def values(self, answers: Mapping[str, Any]) -> dict[str, Any]:
+    def values(self, answers: Mapping[str, Any]) -> dict[str, object]:
         """Return the values of its columns."""
         return {**{f'{self.prefix}{question.name}': plain_answer(answers.get(question.name))
                    for question in self.scale.questions},
@@ -83,7 +83,7 @@ class AskedQuestions:
         return list({asked.scale.name: asked.scale for asked in self._by_item.values()}.values())
 
 
-def plain_answer(answer: Any) -> Any:
+def plain_answer(answer: object) -> object:
     """Return an answer as a table's cell: several choices as a JSON array."""
     return json.dumps(answer, ensure_ascii=False) if isinstance(answer, list) else answer
 

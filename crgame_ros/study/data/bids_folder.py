@@ -77,7 +77,7 @@ def write_bids(data: StudyData, out: Path) -> None:
         _json(folder / f'{name}.json', _sidecar())
 
 
-def escaped(value: Any) -> str:
+def escaped(value: object) -> str:
     """Return a value as a cell: texts with escapes, missing values as n/a."""
     if value is None:
         return MISSING
@@ -112,7 +112,7 @@ def _events(record: ParticipantRecord,
                value, row['time_s']]
 
 
-def _sidecar() -> dict[str, Any]:
+def _sidecar() -> dict[str, object]:
     found: dict[str, Any] = {
         name: {'Description': what} | ({'Units': unit} if unit else {})
         for name, (unit, what) in _EVENT_COLUMNS.items()}
@@ -150,7 +150,7 @@ def _labels(records: Sequence[ParticipantRecord]) -> dict[str, str]:
     return found
 
 
-def _tsv(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+def _tsv(path: Path, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     stream = io.StringIO(newline='')
     writer = csv.writer(stream, dialect='excel-tab', lineterminator='\n')
     writer.writerow(head)
@@ -158,5 +158,5 @@ def _tsv(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None
     write_text(stream.getvalue(), path)
 
 
-def _json(path: Path, content: Mapping[str, Any]) -> None:
+def _json(path: Path, content: Mapping[str, object]) -> None:
     write_text(json.dumps(content, indent=2, ensure_ascii=False) + '\n', path)

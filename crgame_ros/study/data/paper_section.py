@@ -70,7 +70,7 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any) -> object:
     """Return values in JSON form."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}

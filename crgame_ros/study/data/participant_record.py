@@ -41,7 +41,7 @@ class TrialAttempt:
     started_at: float
     ended_at: float | None = None
     ending: Ending = 'open'
-    told: Mapping[str, Any] | None = None
+    told: Mapping[str, object] | None = None
 
     def says(self, key: str) -> Any:
         """Return a value of its last entry by key; None without one."""
@@ -154,9 +154,9 @@ class ParticipantRecord:
         return float(self.entries[0]['at'])
 
     @property
-    def software(self) -> list[dict[str, Any]]:
+    def software(self) -> list[dict[str, object]]:
         """Return the software versions that ran the session, each once, in order."""
-        found: list[dict[str, Any]] = []
+        found: list[dict[str, object]] = []
         for entry in self.entries:
             if entry['entry'] == SessionEvent.OPENED and entry.get('software') not in (
                     None, *found):

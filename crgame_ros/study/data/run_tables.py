@@ -116,7 +116,7 @@ def _is_whole(folder: Path) -> bool:
         return False
 
 
-def _summary(run: Run) -> dict[str, Any]:
+def _summary(run: Run) -> dict[str, object]:
     game = run.game
     return {
         'benchmark_id': game.benchmark_id, 'seed': game.seed, 'epoch': game.epoch,

@@ -46,7 +46,7 @@ EVENTS_OF_SESSIONS = TableDeclaration('events', 'something that happened', (
 
 
 def event_rows(record: ParticipantRecord,
-               runs: Mapping[str, RunTables]) -> list[dict[str, Any]]:
+               runs: Mapping[str, RunTables]) -> list[dict[str, object]]:
     """
     Return all events of a participant's session.
 
@@ -102,7 +102,7 @@ def _kind(kind: str, item: SessionItem | None) -> str:
 
 
 def _run_rows(attempt: TrialAttempt, run: RunTables,
-              record: ParticipantRecord) -> Iterator[dict[str, Any]]:
+              record: ParticipantRecord) -> Iterator[dict[str, object]]:
     start_s = drive_start_s(attempt)
     folder = None if attempt.folder is None else attempt.folder.relative_to(
         record.folder).as_posix()

@@ -75,7 +75,7 @@ class ParticipantsTable:
         """Return the columns of the questions to each participant at the start."""
         return list(self._fields.values())
 
-    def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, Any]:
+    def row(self, record: ParticipantRecord, trials_planned: int) -> dict[str, object]:
         """Return a participant's row."""
         runs = {Path(entry['run']).parts[:2] for entry in record.entries
                 if entry.get('run')}
@@ -126,7 +126,7 @@ ANSWERS = TableDeclaration('answers', 'a question that was put', (
                empty='it was after none')))
 
 
-def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[dict[str, Any]]:
+def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[dict[str, object]]:
     """Yield the rows of a participant: each item's last answers."""
     for answered in record.answered:
         scale = asked.find(answered.item)
@@ -143,7 +143,7 @@ def answer_rows(record: ParticipantRecord, asked: AskedQuestions) -> Iterator[di
                    'after_s': after_s.get(question)}
 
 
-def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, Any]:
+def _times(record: ParticipantRecord, answered: AnsweredItem) -> dict[str, object]:
     """Return when an item was shown, and values of the run before it."""
     run = answered.after
     folder = None if run is None else run.folder
@@ -259,7 +259,7 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
     people = ParticipantsTable(folder.study, asked)
     data = StudyData(folder, asked, TrialsTable(folder, asked), people, records)
     runs = RunTablesCache(folder.data / KEPT)
-    events: list[dict[str, Any]] = []
+    events: list[dict[str, object]] = []
     for record in records:
         measured: dict[str, RunTables] = {}
         for item, attempt in record.counted.items():
@@ -281,7 +281,7 @@ def read_study_data(folder: ConductedStudy, say: Callable[[str], object],
     return data
 
 
-def _answers(data: StudyData) -> Iterator[dict[str, Any]]:
+def _answers(data: StudyData) -> Iterator[dict[str, object]]:
     for record in data.records:
         yield from answer_rows(record, data.asked)
 

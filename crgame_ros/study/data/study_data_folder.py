@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import fcntl
 import json
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from crgame_ros.analysis.tables.column import Column, INTEGER, TableDeclaration, TEXT
 from crgame_ros.analysis.tables.data_package import (
@@ -83,14 +83,14 @@ def _add(trial: CountedTrial, name: str, writer: TableWriter) -> None:
         planned = trial.attempt.trial
         whose = {'participant': trial.record.id, 'trial': planned.number,
                  'condition': planned.condition.name}
-        columns: dict[str, Any] = {
+        columns: dict[str, object] = {
             column: pa.array([value] * len(table), writer.declaration.schema.field(column).type)
             for column, value in whose.items()}
         writer.add(columns | {column: table.column(column).combine_chunks()
                               for column in table.column_names})
 
 
-def _earlier(out: Path, made_of: list[list[Any]]) -> dict[str, int] | None:
+def _earlier(out: Path, made_of: list[list[object]]) -> dict[str, int] | None:
     """Return the row counts of existing tables of the same runs, else None."""
     try:
         package = json.loads(read_text(out / PACKAGE_FILE, 'data dictionary'))
@@ -167,7 +167,7 @@ def write_study_data(data: StudyData) -> dict[str, int]:
         data.trials, out / RUNS, data.folder.study.name).items()}
 
 
-def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str, Any]:
+def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str, object]:
     """Return the description of the tables, each with two files of equal content."""
     package = data_package(written['csv'], 'csv', study)
     other = data_package(written['parquet'], 'parquet', study)['resources']
@@ -182,7 +182,7 @@ def _package(written: dict[Format, list[WrittenTable]], study: str) -> dict[str,
     return package
 
 
-def _schema(declaration: TableDeclaration) -> dict[str, Any]:
+def _schema(declaration: TableDeclaration) -> dict[str, object]:
     schema = table_schema(declaration)
     schema.pop('foreignKeys', None)
     if declaration.key != ('participant',):
@@ -191,5 +191,5 @@ def _schema(declaration: TableDeclaration) -> dict[str, Any]:
     return schema
 
 
-def _json(content: dict[str, Any]) -> str:
+def _json(content: dict[str, object]) -> str:
     return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + '\n'

@@ -135,5 +135,5 @@ def _value(value: float | None, factor: float, digits: int) -> str:
 
 
 def _rows(data: StudyData, name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = data.tables[name].to_pylist()
+    rows: list[dict[str, object]] = data.tables[name].to_pylist()
     return rows

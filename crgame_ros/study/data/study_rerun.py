@@ -124,7 +124,7 @@ def _compared(trials: Sequence[CountedTrial], labels: Sequence[str],
               folder: Path) -> Iterator[dict[str, Any]]:
     """Yield rows that compare the recorded and the new results."""
     cells = _parts(folder, 'cells')
-    vehicles: dict[str, list[dict[str, Any]]] = {}
+    vehicles: dict[str, list[dict[str, object]]] = {}
     for row in _parts(folder, 'vehicles'):
         vehicles.setdefault(row['cell'], []).append(row)
     by_label = dict(zip(labels, trials, strict=True))
@@ -137,8 +137,8 @@ def _compared(trials: Sequence[CountedTrial], labels: Sequence[str],
             yield _row(trial, cell, recorded, now.get(recorded['id'], {}))
 
 
-def _row(trial: CountedTrial, cell: Mapping[str, Any], recorded: Mapping[str, Any],
-         now: Mapping[str, Any]) -> dict[str, Any]:
+def _row(trial: CountedTrial, cell: Mapping[str, object], recorded: Mapping[str, object],
+         now: Mapping[str, object]) -> dict[str, object]:
     known = {column.name: column for column in VEHICLES.columns}
     values = {with_unit(known[name], f'{when}_').name: row.get(name) for name in COMPARED
               for when, row in ((RECORDED, recorded), (RERUN, now))}
@@ -152,13 +152,13 @@ def _row(trial: CountedTrial, cell: Mapping[str, Any], recorded: Mapping[str, An
 
 
 def _parts(folder: Path, name: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[str, object]] = []
     for part in sorted((folder / name).glob('part-*.parquet')):
         rows += pq.read_table(part).to_pylist()
     return rows
 
 
-def _write(rows: Sequence[Mapping[str, Any]], out: Path, study: str) -> None:
+def _write(rows: Sequence[Mapping[str, object]], out: Path, study: str) -> None:
     """Write the table and its dictionary, in their own folder beside the evaluation's."""
     folder = out / COMPARISON
     prepare_folder(folder)
@@ -172,7 +172,7 @@ def _write(rows: Sequence[Mapping[str, Any]], out: Path, study: str) -> None:
     write_text(json.dumps(package, indent=1, ensure_ascii=False) + '\n', folder / PACKAGE_FILE)
 
 
-def _summarize(rows: Sequence[Mapping[str, Any]], planner: str) -> str:
+def _summarize(rows: Sequence[Mapping[str, object]], planner: str) -> str:
     mine = [row for row in rows if row['planner'] == planner]
     runs = {(row['participant'], row['trial']): row['status'] for row in mine}
     ok = sum(status == 'ok' for status in runs.values())

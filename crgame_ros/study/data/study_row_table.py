@@ -84,14 +84,14 @@ def flag_column(name: str, definition: str) -> Column:
 
 
 def table_of_rows(declaration: TableDeclaration,
-                  rows: Iterable[Mapping[str, Any]]) -> pa.Table:
+                  rows: Iterable[Mapping[str, object]]) -> pa.Table:
     """
     Build a table; NaN and empty texts count as missing.
 
     :param rows: values by column; omitted columns count as missing.
     :raises KeyError: if a column is not declared.
     """
-    columns: dict[str, list[Any]] = {column.name: [] for column in declaration.columns}
+    columns: dict[str, list[object]] = {column.name: [] for column in declaration.columns}
     for row in rows:
         if not row.keys() <= columns.keys():
             raise KeyError(f'{declaration.name}: no columns {sorted(row.keys() - columns.keys())}')
@@ -129,9 +129,9 @@ def _value(value: Any, kind: pa.DataType) -> Any:
     return int(value) if kind == INTEGER else bool(value)
 
 
-def _spelled(column: pa.ChunkedArray) -> list[Any]:
+def _spelled(column: pa.ChunkedArray) -> list[object]:
     """Return a column's values in the CSV form of `crgame export`."""
-    values: list[Any] = column.to_pylist()
+    values: list[object] = column.to_pylist()
     if column.type == NUMBER:
         return [NOT_A_NUMBER if value is None else value for value in values]
     if column.type == pa.bool_():

@@ -41,15 +41,15 @@ TASK_COLUMNS = (
            'first input', empty='there was none'))
 
 
-def task_values(scores: Sequence[Mapping[str, Any]],
-                requests: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def task_values(scores: Sequence[Mapping[str, object]],
+                requests: Sequence[Mapping[str, Any]]) -> dict[str, object]:
     """
     Return the values of the columns.
 
     :param scores: rows of the table `detection_scores` of the trial's run.
     :param requests: likewise of `take_over_requests`.
     """
-    found: dict[str, Any] = {'take_over_requests': len(requests)}
+    found: dict[str, object] = {'take_over_requests': len(requests)}
     if len(scores) == 1:
         found |= {f'detection_{name}': scores[0][name] for name in _SCORED}
     inputs = [row['first_input_s'] for row in requests if row['first_input_s'] is not None]
@@ -165,7 +165,7 @@ class TrialsTable:
             (*_FIRST, *self.factors.values(), *fixed, *_apart(answers, taken)))
 
     def row(self, record: ParticipantRecord, attempt: TrialAttempt, run: RunTables | None,
-            problem: str) -> dict[str, Any]:
+            problem: str) -> dict[str, object]:
         """
         Return the row of a trial.
 
@@ -182,7 +182,7 @@ class TrialsTable:
         row |= {'timing_flag': bool(faults), 'timing_reason': '; '.join(faults)}
         return row | self._answers(record, trial)
 
-    def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, Any]:
+    def _drive(self, record: ParticipantRecord, attempt: TrialAttempt) -> dict[str, object]:
         settings, folder = attempt.trial.condition.settings, attempt.folder
         place = settings.game or settings.scenario or ''
         row = {'attempt': attempt.attempt, 'to_repeat': attempt.item in record.to_repeat,
@@ -201,14 +201,14 @@ class TrialsTable:
                 row[name] = self._folder.relative(found[0]) if found else None
         return row
 
-    def _measured(self, attempt: TrialAttempt, run: RunTables) -> dict[str, Any]:
+    def _measured(self, attempt: TrialAttempt, run: RunTables) -> dict[str, object]:
         summary = run.summary
         humans = list(summary['humans'])
         seat = attempt.trial.condition.settings.seat
         vehicle = seat or (humans[0] if humans else None)
         told = run.table('runs').to_pylist()[0]
         vehicles = run.table('vehicles').to_pylist()
-        measures: dict[str, Any] = next((row for row in vehicles if row['id'] == vehicle), {})
+        measures: dict[str, object] = next((row for row in vehicles if row['id'] == vehicle), {})
         of_others = [row['plans_of_others'] for row in vehicles
                      if row['plans_of_others'] is not None]
         return {'run': told['run'], 'vehicle': vehicle, 'random_seed': told['seed'],
@@ -222,8 +222,8 @@ class TrialsTable:
                 **{name: told[name] for name in _RUN_COLUMNS},
                 **{column.name: measures.get(name) for name, column in self._measures.items()}}
 
-    def _answers(self, record: ParticipantRecord, trial: PlannedTrial) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+    def _answers(self, record: ParticipantRecord, trial: PlannedTrial) -> dict[str, object]:
+        found: dict[str, object] = {}
         for answered in record.answered:
             scale = self._asked.find(answered.item)
             if answered.item.trial == trial.number and scale is not None:
@@ -238,7 +238,7 @@ def utc(at_s: float) -> str:
         '+00:00', 'Z')
 
 
-def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _view(periods: Sequence[Mapping[str, Any]]) -> dict[str, object]:
     """Return the columns of the view that was shown longest, from a seat's periods."""
     if not periods:
         return {}
@@ -253,7 +253,7 @@ def _seconds(delay_ms: float | None) -> float | None:
     return None if delay_ms is None else 1e-3 * delay_ms
 
 
-def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, Any]:
+def _identity(record: ParticipantRecord, trial: PlannedTrial) -> Mapping[str, object]:
     return {'participant': record.id, 'trial': trial.number, 'place': record.place + 1,
             'block': trial.block, 'place_in_block': trial.place, 'repetition': trial.repetition,
             'condition': trial.condition.name}

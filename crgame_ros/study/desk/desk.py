@@ -5,7 +5,7 @@
 from collections.abc import Callable, Mapping
 import logging
 import time
-from typing import Any, Protocol
+from typing import Protocol
 
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.study.drive_state import DrivePhase, DriveState
@@ -120,8 +120,8 @@ class Desk:
         self.session.choose_language(language)
         self._moved()
 
-    def finish(self, item: str, answers: Mapping[str, Any] | None = None,
-               agreed: bool | None = None, **told: Any) -> None:
+    def finish(self, item: str, answers: Mapping[str, object] | None = None,
+               agreed: bool | None = None, **told: object) -> None:
         """
         Finish an item that is not driven, with the participant's answers.
 
@@ -208,7 +208,7 @@ class Desk:
         self.session.hold(held)
         self._moved()
 
-    def moment(self) -> dict[str, Any]:
+    def moment(self) -> dict[str, object]:
         """Return the run and its clock [s]; None between drives."""
         state = self.drives.state
         run = next((entry.get('run', '') for entry in reversed(self.session.journal.entries)

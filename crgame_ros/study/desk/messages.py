@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The messages of the desk's pages: untrusted JSON becomes one of these, or one clear error."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from crgame_ros.schema.document_marks import Bounded
 from crgame_ros.schema.messages import HexKey, Message, MessageId, MessageReader, Words
@@ -103,7 +103,7 @@ class Finish(Message):
     device: ShortText | None = None
     moved: Annotated[list[ShortText], Bounded(50)] = []
 
-    def told(self) -> dict[str, Any]:
+    def told(self) -> dict[str, object]:
         """Return what is recorded beside the answers."""
         without = {'type', 'item', 'answers', 'agreed'}
         return self.model_dump(exclude=without | ({'device', 'moved'} if self.device is None

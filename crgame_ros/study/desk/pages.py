@@ -7,7 +7,6 @@ from functools import cache
 import json
 import logging
 from pathlib import Path
-from typing import Any
 
 from crgame_ros.cockpit.client import Client
 from crgame_ros.errors import CrgameError, InputError
@@ -88,7 +87,7 @@ class DeskPages:
         self._experimenters: set[Client] = set()
         self._used: Client | None = None
         self._used_page = ''
-        self._told: dict[str, Any] = {}
+        self._told: dict[str, object] = {}
         self._is_due = False
         desk.watch(self._changed)
 
@@ -116,7 +115,7 @@ class DeskPages:
         return [*self._participants, *self._experimenters]
 
     @property
-    def page(self) -> dict[str, Any]:
+    def page(self) -> dict[str, object]:
         """Return the state of the participant's page: connected, delays [ms], seat."""
         return {'connected': self._used is not None, 'open': len(self._participants),
                 **self._told}
@@ -205,7 +204,7 @@ class DeskPages:
             case Hold():
                 self.desk.hold(message.held)
 
-    def _hear(self, told: dict[str, Any]) -> None:
+    def _hear(self, told: dict[str, object]) -> None:
         if told != self._told:
             self._told = told
             self._is_due = True
@@ -245,6 +244,6 @@ class DeskPages:
                       **experimenter_document(self.desk, self.page)})
 
 
-def _text(message: Mapping[str, Any]) -> bytes:
+def _text(message: Mapping[str, object]) -> bytes:
     # A page may send lone surrogates, which UTF-8 cannot encode: they stay escaped.
     return json.dumps(message, allow_nan=False).encode()

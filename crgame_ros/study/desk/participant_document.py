@@ -28,7 +28,7 @@ MOST_ENTRIES = 300
 LONGEST = 300
 
 
-def participant_document(desk: Desk) -> dict[str, Any]:
+def participant_document(desk: Desk) -> dict[str, object]:
     """
     Describe the page.
 
@@ -125,10 +125,10 @@ def practised(desk: Desk, item: SessionItem) -> int:
     return count
 
 
-def _question(question: Question, language: str) -> dict[str, Any]:
+def _question(question: Question, language: str) -> dict[str, object]:
     kind = question.kind
-    document: dict[str, Any] = {'name': question.name, 'required': question.required,
-                                'ask': question.ask.in_language(language) or question.name}
+    document: dict[str, object] = {'name': question.name, 'required': question.required,
+                                   'ask': question.ask.in_language(language) or question.name}
     if isinstance(kind, LikertQuestion):
         return document | {
             'kind': 'likert', 'points': kind.points, 'left': kind.left.in_language(language),
@@ -148,7 +148,7 @@ def _question(question: Question, language: str) -> dict[str, Any]:
     return document | {'kind': 'text', 'longest': kind.longest}
 
 
-def experimenter_document(desk: Desk, page: Mapping[str, Any]) -> dict[str, Any]:
+def experimenter_document(desk: Desk, page: Mapping[str, object]) -> dict[str, object]:
     """
     Describe the page.
 
@@ -168,7 +168,7 @@ def experimenter_document(desk: Desk, page: Mapping[str, Any]) -> dict[str, Any]
         'items': _items(desk), 'log': _log(desk)}
 
 
-def _items(desk: Desk) -> list[dict[str, Any]]:
+def _items(desk: Desk) -> list[dict[str, object]]:
     session = desk.session
     attempts: Counter[str] = Counter()
     states: dict[str, str] = {}
@@ -211,7 +211,7 @@ def kind_of(item: SessionItem) -> str:
     return f'questions {what.name}'
 
 
-def _log(desk: Desk) -> list[dict[str, Any]]:
+def _log(desk: Desk) -> list[dict[str, object]]:
     """Return the last entries of the journal, without answers, which only the file holds."""
     return [{name: value[:LONGEST] if isinstance(value, str) else value
              for name, value in entry.items()

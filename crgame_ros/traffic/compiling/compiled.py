@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Function = TypeVar('Function', bound=Callable[..., Any])
+Function = TypeVar('Function', bound=Callable[..., object])
 
 
 def vectorized(function: Callable[..., float]) -> Callable[..., NDArray[np.float64]]:
@@ -22,7 +22,7 @@ def vectorized(function: Callable[..., float]) -> Callable[..., NDArray[np.float
     return result
 
 
-def _choose_cache(function: Callable[..., Any]) -> None:
+def _choose_cache(function: Callable[..., object]) -> None:
     folder = cache_root() / f'compiled-{digest(function.__module__)}'
     vars(numba.config)['CACHE_DIR'] = str(folder)
 

@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 import math
-from typing import Any, cast
+from typing import cast
 
 from crgame_ros.game.objects import ObjectDescription
 from crgame_ros.geometry.reference_point import ahead
@@ -108,7 +108,7 @@ class AgentTable:
 
 def empty_table(count: int) -> AgentTable:
     """Return a table of absent agents: one structured array, a record per agent."""
-    kinds: dict[Any, str] = {FloatArray: 'f8', IntArray: 'i8', BoolArray: '?'}
+    kinds: dict[object, str] = {FloatArray: 'f8', IntArray: 'i8', BoolArray: '?'}
     table = np.zeros(count, dtype=[
         (name, kinds[kind], 6) if name == 'curve' else (name, kinds[kind])
         for name, kind in AgentTable.__annotations__.items()])

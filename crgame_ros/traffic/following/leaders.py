@@ -288,9 +288,9 @@ class Followers:
     Attributes: `usual`, the model of all agents at first; `max_acceleration` (A) [m/s^2]
     """
 
-    def __init__(self, name: str, options: Mapping[str, Any], count: int) -> None:
+    def __init__(self, name: str, options: Mapping[str, object], count: int) -> None:
         self._name = name
-        self._options: list[dict[str, Any]] = [dict(options)]
+        self._options: list[dict[str, object]] = [dict(options)]
         self.usual: CarFollowing = CAR_FOLLOWING.create(name, options, 'traffic')
         self._models = [self.usual]
         # The last row is for objects that are no agents.
@@ -303,7 +303,7 @@ class Followers:
             return self.usual
         return _Several(self._models, self._number[slots])
 
-    def change(self, slots: IntArray, options: Mapping[str, Any]) -> None:
+    def change(self, slots: IntArray, options: Mapping[str, object]) -> None:
         """
         Change some options of the models of agents.
 
@@ -347,5 +347,5 @@ class _Several:
         return result
 
 
-def _rows(value: Any, rows: Any) -> Any:
+def _rows(value: Any, rows: object) -> object:
     return value[rows] if np.ndim(value) else value
