@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from setuptools import find_packages, setup
 
 PACKAGE = 'crgame_ros'
-DATA_DIRECTORIES = ('launch', 'config', 'examples', 'scenarios', 'msg_defs')
+DATA_DIRECTORIES = ('launch', 'config', 'examples', 'scenarios', 'msg_defs', 'page')
 # Relative paths only: setuptools refuses absolute ones in data_files.
 ROOT = Path(__file__).resolve().parent
 NODES = tuple(sorted(path.stem for path in (ROOT / PACKAGE / 'nodes').glob('*_node.py')))

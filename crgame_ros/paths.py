@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The crgame_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The paths of the package's data files (config, scenarios, contract), and checks of files."""
+"""The paths of the data files (config, pages, scenarios, contract), and checks of files."""
 
 from collections.abc import Iterator
 import errno
@@ -78,6 +78,11 @@ def extra_install(extra: str) -> str:
 def config_directory() -> Path:
     """Find the directory of configuration files."""
     return share_directory() / 'config'
+
+
+def page_directory() -> Path:
+    """Find the directory of the pages that browsers get: one folder for each."""
+    return share_directory() / 'page'
 
 
 def scenarios_directory() -> Path:

@@ -24,8 +24,8 @@ from crgame_ros.study.desk.messages import (  # noqa: E402
 from pydantic import TypeAdapter  # noqa: E402
 
 FILES = {
-    'crgame_ros/cockpit/page/js/page_messages.d.ts': {'PageMessage': PageMessage},
-    'crgame_ros/study/desk/page/js/page_messages.d.ts': {
+    'page/cockpit/js/page_messages.d.ts': {'PageMessage': PageMessage},
+    'page/desk/js/page_messages.d.ts': {
         'ParticipantMessage': ParticipantMessage, 'ExperimenterMessage': ExperimenterMessage}}
 HEAD = """\
 // SPDX-FileCopyrightText: 2026 The crgame_ros authors

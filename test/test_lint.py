@@ -13,14 +13,14 @@ ROOT = Path(__file__).resolve().parents[1]
 HEADER = ('SPDX-FileCopyrightText: 2026 The crgame_ros authors',
           'SPDX-License-Identifier: Apache-2.0')
 COMMENTED = ('.css', '.html', '.js', '.mjs', '.py', '.sh', '.ts')
-PYTHON_FOLDERS = ('crgame_ros', 'test', 'launch', 'scripts', 'benchmarks', 'examples')
+FOLDERS = ('page', 'crgame_ros', 'test', 'launch', 'scripts', 'benchmarks', 'examples')
 # npm installs the tools that check the page there.
 FOREIGN = ROOT / 'test' / 'page' / 'node_modules'
 
 
 def _sources(*endings: str) -> list[Path]:
     """Return every file of the project with one of these endings."""
-    found = [file for folder in PYTHON_FOLDERS for file in (ROOT / folder).rglob('*.*')
+    found = [file for folder in FOLDERS for file in (ROOT / folder).rglob('*.*')
              if FOREIGN not in file.parents]
     return sorted(file for file in (*found, *ROOT.glob('*.*')) if file.suffix in endings)
 

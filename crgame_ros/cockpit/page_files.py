@@ -9,8 +9,8 @@ from pathlib import Path
 
 from crgame_ros.errors import CrgameError
 from crgame_ros.page_libraries import find_libraries, PLOTLY, THREE_SCRIPTS
+from crgame_ros.paths import page_directory
 
-PAGE = Path(__file__).resolve().parent / 'page'
 INDEX = '/'
 # The libraries by request path: '/three/three.module.js' imports the other script of three.js
 # by its relative path.
@@ -39,14 +39,15 @@ class PageFile:
         return self.content_type != 'image/png'
 
 
-def read_page(directory: Path = PAGE) -> Mapping[str, PageFile]:
+def read_page(directory: Path | None = None) -> Mapping[str, PageFile]:
     """
     Read all files of the page.
 
-    :param directory: the folder with index.html.
+    :param directory: the folder with index.html; None for that of the cockpit.
     :return: files by request path.
     :raises CrgameError: if the page is not installed.
     """
+    directory = directory or page_directory() / 'cockpit'
     table = read_files(directory, '/static/')
     index = table.pop('/static/index.html', None)
     if index is None:

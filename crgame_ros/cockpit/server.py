@@ -72,14 +72,14 @@ _JSON_BYTES = 256 * 1024
 
 
 def create_app(backend: Backend, access: Access, library: Library | None, *,
-               page: Path = page_files.PAGE, framed_by: str = '') -> web.Application:
+               page: Path | None = None, framed_by: str = '') -> web.Application:
     """
     Return the server's application, which starts the backend and stops it at cleanup.
 
     :param backend: the run or recording behind the page.
     :param access: access control of the server.
     :param library: scenarios that can be chosen; None for none.
-    :param page: the folder of the page.
+    :param page: the folder of the page; None for that of the cockpit.
     :param framed_by: origin of the one page that may frame this one; empty for none.
     :raises CrgameError: if the page or Plotly is not installed.
     """

@@ -25,12 +25,13 @@ from crgame_ros.cockpit.frames import FrameKind
 from crgame_ros.cockpit.page_messages import SeenView, Sound
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.paths import page_directory
 import pytest
 
 
 @in_loop
 async def test_the_page_plotly_and_all_files_of_the_page_are_served(tmp_path: Path) -> None:
-    page = shutil.copytree(page_files.PAGE, tmp_path / 'page')
+    page = shutil.copytree(page_directory() / 'cockpit', tmp_path / 'page')
     async with cockpit(page=page) as running:
         async with running.http.get(f'{running.address}/') as answer:
             assert answer.status == 200 and answer.content_type == 'text/html'

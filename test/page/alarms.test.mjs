@@ -5,8 +5,8 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { createAlarms } from '../../crgame_ros/cockpit/page/js/panels/alarms.js';
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import { createAlarms } from '../../page/cockpit/js/panels/alarms.js';
+import { Store } from '../../page/cockpit/js/store.js';
 import { click, liveStore, openPage, textOf } from './dom_support.mjs';
 
 const PAGE = '<div id="alarms" role="alert"></div><div id="alarm-frame" hidden></div>'

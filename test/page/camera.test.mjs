@@ -9,8 +9,8 @@ import { close } from './support.mjs';
 
 let still = false;
 globalThis.window = { matchMedia: () => ({ get matches() { return still; } }) };
-const { Camera } = await import('../../crgame_ros/cockpit/page/js/world/camera.js');
-const { Navigation } = await import('../../crgame_ros/cockpit/page/js/world/navigation.js');
+const { Camera } = await import('../../page/cockpit/js/world/camera.js');
+const { Navigation } = await import('../../page/cockpit/js/world/navigation.js');
 
 const WIDTH = 800;
 const HEIGHT = 600;

@@ -6,11 +6,11 @@ import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
 import { test } from 'node:test';
 
-import { KIND } from '../../crgame_ros/cockpit/page/js/frames.js';
-import { ask, Chunks, unpack } from '../../crgame_ros/cockpit/page/js/replay/chunks.js';
-import { ReplayDocuments } from '../../crgame_ros/cockpit/page/js/replay/documents.js';
-import { ReplayFeed } from '../../crgame_ros/cockpit/page/js/replay/replay_feed.js';
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import { KIND } from '../../page/cockpit/js/frames.js';
+import { ask, Chunks, unpack } from '../../page/cockpit/js/replay/chunks.js';
+import { ReplayDocuments } from '../../page/cockpit/js/replay/documents.js';
+import { ReplayFeed } from '../../page/cockpit/js/replay/replay_feed.js';
+import { Store } from '../../page/cockpit/js/store.js';
 import { close, frameOf, stateFrame } from './support.mjs';
 
 /** Pack frames as the server does: each after its length in bytes. */

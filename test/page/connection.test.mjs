@@ -5,8 +5,8 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { Connection } from '../../crgame_ros/cockpit/page/js/connection.js';
-import { InputSender } from '../../crgame_ros/cockpit/page/js/driving/sender.js';
+import { Connection } from '../../page/cockpit/js/connection.js';
+import { InputSender } from '../../page/cockpit/js/driving/sender.js';
 import { frameOf } from './support.mjs';
 
 /** A server that a test controls. */

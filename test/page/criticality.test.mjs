@@ -6,9 +6,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { CriticalityLog, isCritical, limitsOf } from
-  '../../crgame_ros/cockpit/page/js/criticality.js';
-import { decodeFrame, KIND } from '../../crgame_ros/cockpit/page/js/frames.js';
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+  '../../page/cockpit/js/criticality.js';
+import { decodeFrame, KIND } from '../../page/cockpit/js/frames.js';
+import { Store } from '../../page/cockpit/js/store.js';
 import { close, frameOf } from './support.mjs';
 
 const MEASURES = [

@@ -6,12 +6,12 @@ import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
 import { beforeEach, test } from 'node:test';
 
-import { breakView, clockTime } from '../../crgame_ros/study/desk/page/js/break_view.js';
+import { breakView, clockTime } from '../../page/desk/js/break_view.js';
 import { Draft, draftName, forgetOtherDrafts } from
-  '../../crgame_ros/study/desk/page/js/draft.js';
-import { entryWords, timeOfDay } from '../../crgame_ros/study/desk/page/js/log_words.js';
-import { askReason } from '../../crgame_ros/study/desk/page/js/reason_dialog.js';
-import { Words } from '../../crgame_ros/study/desk/page/js/words.js';
+  '../../page/desk/js/draft.js';
+import { entryWords, timeOfDay } from '../../page/desk/js/log_words.js';
+import { askReason } from '../../page/desk/js/reason_dialog.js';
+import { Words } from '../../page/desk/js/words.js';
 import { click, expose, openPage, Pictures, textOf } from './dom_support.mjs';
 
 let root;

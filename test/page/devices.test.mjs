@@ -5,12 +5,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { CalibrationRun } from '../../crgame_ros/cockpit/page/js/driving/calibration_run.js';
-import { PutBackNotice } from '../../crgame_ros/cockpit/page/js/driving/put_back_notice.js';
+import { CalibrationRun } from '../../page/cockpit/js/driving/calibration_run.js';
+import { PutBackNotice } from '../../page/cockpit/js/driving/put_back_notice.js';
 import {
   defaultProfile, gearAfter, keepProfiles, loadProfile, pedalValue, rawValue, saveProfile,
   steeringValue,
-} from '../../crgame_ros/cockpit/page/js/driving/gamepad_profile.js';
+} from '../../page/cockpit/js/driving/gamepad_profile.js';
 import { close, keepStorage } from './support.mjs';
 
 const axis = (index, more) => (

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { DisplayClock } from '../../crgame_ros/cockpit/page/js/display_clock.js';
+import { DisplayClock } from '../../page/cockpit/js/display_clock.js';
 import { close } from './support.mjs';
 
 /** Make samples arrive: every 10 ms of simulation, at times that a function gives. */

@@ -6,7 +6,7 @@ import { setImmediate as nextTurn } from 'node:timers/promises';
 
 import { Window } from 'happy-dom';
 
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import { Store } from '../../page/cockpit/js/store.js';
 
 const GLOBALS = ['document', 'localStorage', 'navigator', 'location', 'CSS', 'MutationObserver',
   'Node', 'Element', 'HTMLElement', 'HTMLInputElement', 'HTMLSelectElement', 'Event',

@@ -5,11 +5,11 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-const WORLD = '../../crgame_ros/cockpit/page/js/world';
+const WORLD = '../../page/cockpit/js/world';
 const { describeAround } = await import(`${WORLD}/around.js`);
 const { driverSight, hideBeyond } = await import(`${WORLD}/driver_sight.js`);
 const { OBJECT_WIDTH, VEHICLE_WIDTH } = await import(
-  '../../crgame_ros/cockpit/page/js/frames.js');
+  '../../page/cockpit/js/frames.js');
 
 /** Rows of things that stand on a line. */
 function rowsAt(width, ...xs) {

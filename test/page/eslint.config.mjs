@@ -38,8 +38,7 @@ export default [
     },
   },
   {
-    files: ['crgame_ros/cockpit/page/js/**/*.js', 'crgame_ros/study/desk/page/js/**/*.js',
-      'crgame_ros/analysis/report/page/*.js'],
+    files: ['page/**/*.js'],
     languageOptions: { globals: globals.browser },
   },
   {

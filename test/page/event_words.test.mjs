@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { baseName, conditionWords, eventKind, eventWords } from
-  '../../crgame_ros/cockpit/page/js/panels/event_words.js';
+  '../../page/cockpit/js/panels/event_words.js';
 
 const event = (kind, more) => ({ name: 'e', label: 'E', when: null, kind, ...more });
 

@@ -5,8 +5,8 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { createEvents } from '../../crgame_ros/cockpit/page/js/panels/events.js';
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import { createEvents } from '../../page/cockpit/js/panels/events.js';
+import { Store } from '../../page/cockpit/js/store.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const EVENTS = [

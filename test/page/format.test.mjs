@@ -5,15 +5,15 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { shortName } from '../../crgame_ros/cockpit/page/js/driving/device_panel.js';
-import { describeSeat } from '../../crgame_ros/cockpit/page/js/driving/seat_text.js';
+import { shortName } from '../../page/cockpit/js/driving/device_panel.js';
+import { describeSeat } from '../../page/cockpit/js/driving/seat_text.js';
 import { clockTime, count, errorText, fixed, NONE, oneLine, plural } from
-  '../../crgame_ros/cockpit/page/js/panels/format.js';
+  '../../page/cockpit/js/panels/format.js';
 import {
   TABLE_I, valueOf, worstLateStep,
-} from '../../crgame_ros/cockpit/page/js/panels/timing.js';
-import { countText } from '../../crgame_ros/cockpit/page/js/perception/unseen.js';
-import { eventText } from '../../crgame_ros/cockpit/page/js/replay/marks.js';
+} from '../../page/cockpit/js/panels/timing.js';
+import { countText } from '../../page/cockpit/js/perception/unseen.js';
+import { eventText } from '../../page/cockpit/js/replay/marks.js';
 
 test('fixed: a true minus, none before zero, a dash for other values', () => {
   assert.equal(fixed(3.14159, 2), '3.14');

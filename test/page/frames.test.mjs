@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { decodeFrame, KIND, VEHICLE, VEHICLE_WIDTH } from
-  '../../crgame_ros/cockpit/page/js/frames.js';
+  '../../page/cockpit/js/frames.js';
 import { close, frameOf, stateFrame } from './support.mjs';
 
 const HEAD = [3, 120, 12, 1.2];

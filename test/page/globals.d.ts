@@ -2,20 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 /** What scripts of the page share on `window`, and what TypeScript's library does not know yet. */
 
-import type { Connection } from '../../crgame_ros/cockpit/page/js/connection.js';
-import type { Driving } from '../../crgame_ros/cockpit/page/js/driving/driving.js';
-import type { createPerson } from '../../crgame_ros/cockpit/page/js/person.js';
-import type { createInstantReplay } from
-  '../../crgame_ros/cockpit/page/js/after/instant_replay.js';
-import type { createScenario } from '../../crgame_ros/cockpit/page/js/panels/scenario.js';
-import type { Plotly } from '../../crgame_ros/cockpit/page/js/panels/plotly.js';
-import type { createPerception } from
-  '../../crgame_ros/cockpit/page/js/perception/perception.js';
-import type { Sound } from '../../crgame_ros/cockpit/page/js/sound/sound.js';
-import type { Stage } from '../../crgame_ros/cockpit/page/js/stage/stage.js';
-import type { Store } from '../../crgame_ros/cockpit/page/js/store.js';
-import type { View3d } from '../../crgame_ros/cockpit/page/js/view3d/view3d.js';
-import type { World } from '../../crgame_ros/cockpit/page/js/world/world.js';
+import type { Connection } from '../../page/cockpit/js/connection.js';
+import type { Driving } from '../../page/cockpit/js/driving/driving.js';
+import type { createPerson } from '../../page/cockpit/js/person.js';
+import type { createInstantReplay } from '../../page/cockpit/js/after/instant_replay.js';
+import type { createScenario } from '../../page/cockpit/js/panels/scenario.js';
+import type { Plotly } from '../../page/cockpit/js/panels/plotly.js';
+import type { createPerception } from '../../page/cockpit/js/perception/perception.js';
+import type { Sound } from '../../page/cockpit/js/sound/sound.js';
+import type { Stage } from '../../page/cockpit/js/stage/stage.js';
+import type { Store } from '../../page/cockpit/js/store.js';
+import type { View3d } from '../../page/cockpit/js/view3d/view3d.js';
+import type { World } from '../../page/cockpit/js/world/world.js';
 
 /** main.js fills it: every part may be missing, because each is loaded by itself. */
 interface Crgame {

@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { Hud } from '../../crgame_ros/cockpit/page/js/driving/hud.js';
-import { Keyboard } from '../../crgame_ros/cockpit/page/js/driving/keyboard.js';
-import { VEHICLE } from '../../crgame_ros/cockpit/page/js/frames.js';
+import { Hud } from '../../page/cockpit/js/driving/hud.js';
+import { Keyboard } from '../../page/cockpit/js/driving/keyboard.js';
+import { VEHICLE } from '../../page/cockpit/js/frames.js';
 import { liveStore, openPage, Pictures, send, textOf } from './dom_support.mjs';
 import { laneletOf, stateFrame } from './support.mjs';
 

@@ -64,14 +64,14 @@ globalThis.getComputedStyle = ({ style }) => ({
 });
 page.matchMedia = () => ({ matches: false });
 
-const { HELD_MS } = await import('../../crgame_ros/cockpit/page/js/after/restart_key.js');
-const { attachKeys } = await import('../../crgame_ros/cockpit/page/js/world/keys.js');
-const { Keyboard } = await import('../../crgame_ros/cockpit/page/js/driving/keyboard.js');
-const { attachGestures } = await import('../../crgame_ros/cockpit/page/js/world/gestures.js');
-const { recall, remember } = await import('../../crgame_ros/cockpit/page/js/panels/memory.js');
-const { Palette } = await import('../../crgame_ros/cockpit/page/js/world/palette.js');
+const { HELD_MS } = await import('../../page/cockpit/js/after/restart_key.js');
+const { attachKeys } = await import('../../page/cockpit/js/world/keys.js');
+const { Keyboard } = await import('../../page/cockpit/js/driving/keyboard.js');
+const { attachGestures } = await import('../../page/cockpit/js/world/gestures.js');
+const { recall, remember } = await import('../../page/cockpit/js/panels/memory.js');
+const { Palette } = await import('../../page/cockpit/js/world/palette.js');
 const { element, setAttribute, setText, svg } = await import(
-  '../../crgame_ros/cockpit/page/js/dom.js');
+  '../../page/cockpit/js/dom.js');
 
 /** An event as a browser has it; its target is where it is sent unless said otherwise. */
 function eventOf(type, values) {

@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
+import { VEHICLE, VEHICLE_WIDTH } from '../../page/cockpit/js/frames.js';
 import { extrapolateVehicles, interpolateVehicles, moveObjects, turn } from
-  '../../crgame_ros/cockpit/page/js/interpolation.js';
+  '../../page/cockpit/js/interpolation.js';
 import { close } from './support.mjs';
 
 const vehicle = (values) => Float64Array.from(

@@ -6,10 +6,10 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { defaultProfile, loadProfile, saveProfile } from
-  '../../crgame_ros/cockpit/page/js/driving/gamepad_profile.js';
-import { interpolateVehicles } from '../../crgame_ros/cockpit/page/js/interpolation.js';
-import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
-import { LIGHT, shining } from '../../crgame_ros/cockpit/page/js/lights.js';
+  '../../page/cockpit/js/driving/gamepad_profile.js';
+import { interpolateVehicles } from '../../page/cockpit/js/interpolation.js';
+import { VEHICLE, VEHICLE_WIDTH } from '../../page/cockpit/js/frames.js';
+import { LIGHT, shining } from '../../page/cockpit/js/lights.js';
 import { keepStorage } from './support.mjs';
 
 const DARK = { left: false, right: false, horn: false, brake: false, blue: false };

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { createLobby } from '../../crgame_ros/cockpit/page/js/lobby.js';
+import { createLobby } from '../../page/cockpit/js/lobby.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = ['hv0', 'hv1'].map((id) => ({ id, role: 'human' }));

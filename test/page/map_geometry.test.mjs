@@ -9,8 +9,8 @@ import { close, laneletOf, recordPaths } from './support.mjs';
 
 recordPaths();
 const { collectBoundaries } = await import(
-  '../../crgame_ros/cockpit/page/js/world/boundaries.js');
-const { buildChunks } = await import('../../crgame_ros/cockpit/page/js/world/map_geometry.js');
+  '../../page/cockpit/js/world/boundaries.js');
+const { buildChunks } = await import('../../page/cockpit/js/world/map_geometry.js');
 
 const chunksOf = (...lanelets) => buildChunks({ lanelets });
 const only = (...lanelets) => {

@@ -5,8 +5,8 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { confirm } from '../../crgame_ros/cockpit/page/js/panels/confirm.js';
-import { createNotices } from '../../crgame_ros/cockpit/page/js/panels/notices.js';
+import { confirm } from '../../page/cockpit/js/panels/confirm.js';
+import { createNotices } from '../../page/cockpit/js/panels/notices.js';
 import { click, liveStore, openPage, textOf } from './dom_support.mjs';
 
 // The dialog is made once, so all tests have one page.

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { PadNavigation } from '../../crgame_ros/study/desk/page/js/pad_navigation.js';
+import { PadNavigation } from '../../page/desk/js/pad_navigation.js';
 import { expose, openPage, Pictures, send } from './dom_support.mjs';
 
 const radios = (name, checked = '') => `<fieldset class="question" id="${name}">${[1, 2, 3].map(

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { afterEach, beforeEach, mock, test } from 'node:test';
 
-import { createPeople } from '../../crgame_ros/cockpit/page/js/people.js';
+import { createPeople } from '../../page/cockpit/js/people.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const VEHICLES = [{ id: 'hv0', role: 'human' }, { id: 'hv1', role: 'human' },

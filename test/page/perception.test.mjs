@@ -5,10 +5,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { KIND, OBJECT_WIDTH, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
-import { Perceived } from '../../crgame_ros/cockpit/page/js/perceived.js';
-import { ellipse } from '../../crgame_ros/cockpit/page/js/perception/estimate_layer.js';
-import { Unseen } from '../../crgame_ros/cockpit/page/js/perception/unseen.js';
+import { KIND, OBJECT_WIDTH, VEHICLE_WIDTH } from '../../page/cockpit/js/frames.js';
+import { Perceived } from '../../page/cockpit/js/perceived.js';
+import { ellipse } from '../../page/cockpit/js/perception/estimate_layer.js';
+import { Unseen } from '../../page/cockpit/js/perception/unseen.js';
 import { close } from './support.mjs';
 
 const rows = (width, ...places) => Float64Array.from(

@@ -5,10 +5,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { boxOf, outlineOf } from '../../crgame_ros/cockpit/page/js/outline.js';
-import { roundStep } from '../../crgame_ros/cockpit/page/js/world/map_layer.js';
+import { boxOf, outlineOf } from '../../page/cockpit/js/outline.js';
+import { roundStep } from '../../page/cockpit/js/world/map_layer.js';
 import { addDashes, addLine, addPolygon, lengthOf, poseAlong, shifted } from
-  '../../crgame_ros/cockpit/page/js/world/polyline.js';
+  '../../page/cockpit/js/world/polyline.js';
 import { close, PathRecorder } from './support.mjs';
 
 // 3 m east, then 4 m north.

@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { Draft } from '../../crgame_ros/study/desk/page/js/draft.js';
-import { questionForm } from '../../crgame_ros/study/desk/page/js/question_form.js';
-import { Words } from '../../crgame_ros/study/desk/page/js/words.js';
+import { Draft } from '../../page/desk/js/draft.js';
+import { questionForm } from '../../page/desk/js/question_form.js';
+import { Words } from '../../page/desk/js/words.js';
 import { click, expose, openPage, send, textOf } from './dom_support.mjs';
 
 const TABLE = { next: 'Next', missing: 'Please answer', missing_one: 'One is missing',

@@ -6,9 +6,9 @@ import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
 import { beforeEach, test } from 'node:test';
 
-import { mark } from '../../crgame_ros/cockpit/page/js/replay/marks.js';
-import { createReplay } from '../../crgame_ros/cockpit/page/js/replay/player.js';
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
+import { mark } from '../../page/cockpit/js/replay/marks.js';
+import { createReplay } from '../../page/cockpit/js/replay/player.js';
+import { Store } from '../../page/cockpit/js/store.js';
 import { click, openPage, Pictures, send, textOf } from './dom_support.mjs';
 import { close, stateFrame } from './support.mjs';
 

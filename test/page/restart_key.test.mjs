@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
 import { test } from 'node:test';
 
-import { createRestart, HELD_MS } from '../../crgame_ros/cockpit/page/js/after/restart_key.js';
+import { createRestart, HELD_MS } from '../../page/cockpit/js/after/restart_key.js';
 import { liveStore, openPage, RIGHTS, send, Server } from './dom_support.mjs';
 
 let root, store;

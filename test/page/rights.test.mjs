@@ -5,10 +5,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { describeSeat } from '../../crgame_ros/cockpit/page/js/driving/seat_text.js';
+import { describeSeat } from '../../page/cockpit/js/driving/seat_text.js';
 import {
   reasonAgainst, reasonAgainstOrder, reasonAgainstSeat,
-} from '../../crgame_ros/cockpit/page/js/rights.js';
+} from '../../page/cockpit/js/rights.js';
 
 const DRIVER = { role: 'driver', directs: false, drives: true, seat: '' };
 

@@ -7,7 +7,7 @@ import { test } from 'node:test';
 
 import { close, laneletOf } from './support.mjs';
 
-const JS = '../../crgame_ros/cockpit/page/js';
+const JS = '../../page/cockpit/js';
 const { collectBoundaries } = await import(`${JS}/world/boundaries.js`);
 const { roadClass, strokesOf } = await import(`${JS}/world/marking_strokes.js`);
 const { MeshParts } = await import(`${JS}/view3d/road/mesh_parts.js`);

@@ -7,7 +7,7 @@ import { test } from 'node:test';
 
 import { close, laneletOf } from './support.mjs';
 
-const JS = '../../crgame_ros/cockpit/page/js';
+const JS = '../../page/cockpit/js';
 const { contrastLeft, extinction } = await import(`${JS}/view3d/road/fog.js`);
 const { blocksOf } = await import(`${JS}/view3d/road/obstacles.js`);
 const { placeLights, placeSigns } = await import(`${JS}/view3d/road/poles.js`);

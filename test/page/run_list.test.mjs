@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { setImmediate as soon } from 'node:timers/promises';
 import { afterEach, before, beforeEach, test } from 'node:test';
 
-import { createRunList } from '../../crgame_ros/cockpit/page/js/after/run_list.js';
+import { createRunList } from '../../page/cockpit/js/after/run_list.js';
 import { click, liveStore, openPage, send, textOf } from './dom_support.mjs';
 
 const run = (id, more = {}) => ({ id, name: `run/${id}`, title: `Title of ${id}`, scenario: 'ZAM',

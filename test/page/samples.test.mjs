@@ -5,10 +5,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { VEHICLE, VEHICLE_WIDTH } from '../../crgame_ros/cockpit/page/js/frames.js';
-import { addToHistory, emptyHistory } from '../../crgame_ros/cockpit/page/js/history.js';
-import { SampleRing } from '../../crgame_ros/cockpit/page/js/samples.js';
-import { countWhile } from '../../crgame_ros/cockpit/page/js/search.js';
+import { VEHICLE, VEHICLE_WIDTH } from '../../page/cockpit/js/frames.js';
+import { addToHistory, emptyHistory } from '../../page/cockpit/js/history.js';
+import { SampleRing } from '../../page/cockpit/js/samples.js';
+import { countWhile } from '../../page/cockpit/js/search.js';
 
 const sample = (n) => ({ n, t: n / 100 });
 const ringOf = (capacity, ...steps) => {

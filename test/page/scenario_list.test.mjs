@@ -5,8 +5,8 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { ScenarioForm } from '../../crgame_ros/cockpit/page/js/panels/scenario_form.js';
-import { ScenarioList } from '../../crgame_ros/cockpit/page/js/panels/scenario_list.js';
+import { ScenarioForm } from '../../page/cockpit/js/panels/scenario_form.js';
+import { ScenarioList } from '../../page/cockpit/js/panels/scenario_list.js';
 import { click, openPage, send, textOf } from './dom_support.mjs';
 
 const IMAGE = '<img src=x onerror="window.ran = true">';

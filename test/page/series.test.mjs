@@ -5,10 +5,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { emptyHistory } from '../../crgame_ros/cockpit/page/js/history.js';
-import { QUANTITIES, traces } from '../../crgame_ros/cockpit/page/js/panels/quantities.js';
+import { emptyHistory } from '../../page/cockpit/js/history.js';
+import { QUANTITIES, traces } from '../../page/cockpit/js/panels/quantities.js';
 import { HealthLog, MOST_POINTS, thin, unwrap } from
-  '../../crgame_ros/cockpit/page/js/panels/series.js';
+  '../../page/cockpit/js/panels/series.js';
 import { close } from './support.mjs';
 
 const times = (count, spacing_s) => Array.from({ length: count }, (_, i) => i * spacing_s);

@@ -7,18 +7,18 @@ import { test } from 'node:test';
 
 import {
   CAR, ELECTRIC, engineSpeed_rpm, gearAfter, HEAVY, lockedSpeed_rpm, REVERSE, tone_Hz,
-} from '../../crgame_ros/cockpit/page/js/sound/drive_train.js';
+} from '../../page/cockpit/js/sound/drive_train.js';
 import {
   arrival, attenuation, dopplerFactor, RANGE_M,
-} from '../../crgame_ros/cockpit/page/js/sound/hearing.js';
+} from '../../page/cockpit/js/sound/hearing.js';
 import {
   cornering, engineLevel, hardBraking, tyreLevel, volumeGain, windLevel,
-} from '../../crgame_ros/cockpit/page/js/sound/levels.js';
-import { Kerbs } from '../../crgame_ros/cockpit/page/js/sound/kerbs.js';
+} from '../../page/cockpit/js/sound/levels.js';
+import { Kerbs } from '../../page/cockpit/js/sound/kerbs.js';
 import {
   Listener, MOST_OTHERS,
-} from '../../crgame_ros/cockpit/page/js/sound/listener.js';
-import { Feeling, Rumble } from '../../crgame_ros/cockpit/page/js/sound/rumble.js';
+} from '../../page/cockpit/js/sound/listener.js';
+import { Feeling, Rumble } from '../../page/cockpit/js/sound/rumble.js';
 import { close, laneletOf } from './support.mjs';
 
 const QUIET = { collision: false, offRoad: false, kerb: 0 };

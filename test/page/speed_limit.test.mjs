@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { SpeedLimits } from '../../crgame_ros/cockpit/page/js/driving/speed_limit.js';
+import { SpeedLimits } from '../../page/cockpit/js/driving/speed_limit.js';
 import { laneletOf } from './support.mjs';
 
 const limits = (...lanelets) => new SpeedLimits({ lanelets });

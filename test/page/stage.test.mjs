@@ -5,9 +5,9 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { readStage } from '../../crgame_ros/cockpit/page/js/stage/stage_address.js';
-import { WORDS } from '../../crgame_ros/cockpit/page/js/stage/stage_words.js';
-import { readViewWindow } from '../../crgame_ros/cockpit/page/js/view3d/view_window.js';
+import { readStage } from '../../page/cockpit/js/stage/stage_address.js';
+import { WORDS } from '../../page/cockpit/js/stage/stage_words.js';
+import { readViewWindow } from '../../page/cockpit/js/view3d/view_window.js';
 
 test('an address without a seat is the page with everything', () => {
   assert.equal(readStage(''), null);

@@ -5,10 +5,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { KIND } from '../../crgame_ros/cockpit/page/js/frames.js';
-import { Store } from '../../crgame_ros/cockpit/page/js/store.js';
-import { keepShown } from '../../crgame_ros/cockpit/page/js/world/shown.js';
-import { PlanLayer } from '../../crgame_ros/cockpit/page/js/world/plan_layer.js';
+import { KIND } from '../../page/cockpit/js/frames.js';
+import { Store } from '../../page/cockpit/js/store.js';
+import { keepShown } from '../../page/cockpit/js/world/shown.js';
+import { PlanLayer } from '../../page/cockpit/js/world/plan_layer.js';
 import { close, frameOf, stateFrame } from './support.mjs';
 
 const scene = (epoch, more) => ({ type: 'scene', time: { epoch, dt_s: 0.01, dt_c_s: 0.1 },

@@ -5,8 +5,8 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { recall, remember } from '../../crgame_ros/cockpit/page/js/panels/memory.js';
-import { addPanels, createTabs } from '../../crgame_ros/cockpit/page/js/panels/tabs.js';
+import { recall, remember } from '../../page/cockpit/js/panels/memory.js';
+import { addPanels, createTabs } from '../../page/cockpit/js/panels/tabs.js';
 import { click, openPage, send } from './dom_support.mjs';
 
 const NAMES = ['drive', 'history', 'scenario', 'events', 'criticality', 'timing', 'runs'];

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
-import { createTaskPanel } from '../../crgame_ros/cockpit/page/js/tasks/task_panel.js';
+import { createTaskPanel } from '../../page/cockpit/js/tasks/task_panel.js';
 import { click, liveStore, openPage, RIGHTS, Server, textOf } from './dom_support.mjs';
 
 const TASKS = [

@@ -4,7 +4,7 @@
 
 import { setImmediate as soon } from 'node:timers/promises';
 
-import { createTasks } from '../../crgame_ros/cockpit/page/js/tasks/tasks.js';
+import { createTasks } from '../../page/cockpit/js/tasks/tasks.js';
 import { liveStore, openPage, Pictures, send, Server } from './dom_support.mjs';
 
 const TIMES = { shown_s: 1, latest_s: 2.5, lead_s: null, show: true };

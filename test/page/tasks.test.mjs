@@ -5,12 +5,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { isTaken } from '../../crgame_ros/cockpit/page/js/tasks/answers.js';
-import { Prompt } from '../../crgame_ros/cockpit/page/js/tasks/prompt.js';
-import { RunningTime } from '../../crgame_ros/cockpit/page/js/tasks/running_time.js';
-import { languageOf, wordsIn } from '../../crgame_ros/cockpit/page/js/tasks/task_words.js';
+import { isTaken } from '../../page/cockpit/js/tasks/answers.js';
+import { Prompt } from '../../page/cockpit/js/tasks/prompt.js';
+import { RunningTime } from '../../page/cockpit/js/tasks/running_time.js';
+import { languageOf, wordsIn } from '../../page/cockpit/js/tasks/task_words.js';
 
-/** @import { GameTask } from '../../crgame_ros/cockpit/page/js/tasks/task_messages.js' */
+/** @import { GameTask } from '../../page/cockpit/js/tasks/task_messages.js' */
 
 /** @type {GameTask} */
 const LIGHT = { name: 'light', kind: 'detection_response', label: '', seat: 'hv0', shown_s: 1,

@@ -15,9 +15,7 @@ import pytest
 # In one worker with the other tests that scan this folder, as npm writes into it.
 pytestmark = pytest.mark.xdist_group('test_lint')
 
-PAGE = ROOT / 'crgame_ros' / 'cockpit' / 'page' / 'js'
-DESK = ROOT / 'crgame_ros' / 'study' / 'desk' / 'page' / 'js'
-REPORT = ROOT / 'crgame_ros' / 'analysis' / 'report' / 'page'
+PAGE = ROOT / 'page'
 MAX_COLUMNS = 99
 
 
@@ -37,8 +35,7 @@ def check_rules(root: Path) -> None:
     """Check the page of a tree and its tests with eslint."""
     here = root / HERE.relative_to(ROOT)
     run('node', here / 'node_modules' / 'eslint' / 'bin' / 'eslint.js', '--max-warnings', '0',
-        '--config', here / 'eslint.config.mjs',
-        *(root / pages.relative_to(ROOT) for pages in (PAGE, DESK)), here, cwd=root)
+        '--config', here / 'eslint.config.mjs', root / 'page', here, cwd=root)
 
 
 @pytest.mark.slow
@@ -73,14 +70,13 @@ def test_units() -> None:
 def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], None], code: str,
                         told: list[str]) -> None:
     """Each check fails on a page with a faulty file and gives the reason."""
-    for pages in (PAGE, DESK):
-        shutil.copytree(pages, tmp_path / pages.relative_to(ROOT))
+    shutil.copytree(PAGE, tmp_path / 'page')
     here = tmp_path / HERE.relative_to(ROOT)
     here.mkdir(parents=True)
     for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs'):
         shutil.copy2(HERE / name, here)
     (here / 'node_modules').symlink_to(tools)
-    (tmp_path / PAGE.relative_to(ROOT) / 'wrong.js').write_text(code, encoding='utf-8')
+    (tmp_path / 'page' / 'desk' / 'js' / 'wrong.js').write_text(code, encoding='utf-8')
     with pytest.raises(pytest.fail.Exception) as failure:
         check(tmp_path)
     found = re.findall(r'error\b.*', str(failure.value))
@@ -126,8 +122,7 @@ def test_tools_are_pinned_and_come_from_whatever_registry_is_set() -> None:
 
 
 def test_lines_have_99_columns() -> None:
-    files = [*PAGE.rglob('*.js'), *DESK.rglob('*.js'), *REPORT.glob('*.js'),
-             *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
+    files = [*PAGE.rglob('*.js'), *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
     assert len(files) > 90
     assert not [file.name for file in sorted(files)
                 if max(map(len, file.read_text(encoding='utf-8').splitlines())) > MAX_COLUMNS]

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
 import { createTiming, TABLE_I, valueOf, worstLateStep } from
-  '../../crgame_ros/cockpit/page/js/panels/timing.js';
+  '../../page/cockpit/js/panels/timing.js';
 import { liveStore, openPage, textOf } from './dom_support.mjs';
 
 const GOOD = { final_error_ms: 0.5, mean_step_error_ms: 0.0123, max_cumulative_error_ms: 1.234,

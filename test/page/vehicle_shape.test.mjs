@@ -9,7 +9,7 @@ import { close, recordPaths } from './support.mjs';
 
 recordPaths();
 const { vehicleLook, TYRE } = await import(
-  '../../crgame_ros/cockpit/page/js/world/vehicle_shape.js');
+  '../../page/cockpit/js/world/vehicle_shape.js');
 
 const rectangle = (length, width) => ({ kind: 'rectangle', length, width, vertices: [] });
 const parts = (look) => ['glass', 'roof', 'lamps', 'brakes'].filter((name) => look[name]);

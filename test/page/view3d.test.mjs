@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-const VIEW = '../../crgame_ros/cockpit/page/js/view3d';
+const VIEW = '../../page/cockpit/js/view3d';
 const { above, chasing, mountedAt } = await import(`${VIEW}/cameras.js`);
 const { acrossAngle, heightAngle, readSeat, trueAngle } = await import(
   `${VIEW}/field_of_view.js`);

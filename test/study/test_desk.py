@@ -208,7 +208,7 @@ async def test_other_sites_names_and_tokens(tmp_path: Path) -> None:
         for headers in ({}, {'Origin': 'http://evil.example'}):
             with pytest.raises(WSServerHandshakeError):
                 await running.http.ws_connect(f'{running.root}/ws/participant', headers=headers)
-        async with running.http.get(f'{running.root}/static/study/desk/page/desk.css') as answer:
+        async with running.http.get(f'{running.root}/static/desk/desk.css') as answer:
             assert answer.status == 403
         # The experimenter needs no token but that of the own link.
         await (await running.direct()).close()

@@ -10,15 +10,14 @@ import base64
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import hashlib
-from pathlib import Path
 import re
 
 from crgame_ros.analysis.report.plot_data import plot_data
 from crgame_ros.analysis.report.section import Plot, Section
 from crgame_ros.analysis.report.text import free, plain
 from crgame_ros.page_libraries import plotly_script
+from crgame_ros.paths import page_directory
 
-PAGE = Path(__file__).resolve().parent / 'page'
 # Plotly creates an empty `<style>`, and then adds rules to it by script.
 _EMPTY = ''
 # On loading, it also adds a style for maps, which reports do not have, unless it exists already.
@@ -102,10 +101,11 @@ class Page:
             '</main>' + (f'<footer>{self.footer}</footer>' if self.footer else '')))
         plots = [(f'{article.address(section)}-{plot.key}', plot) for article in self.articles
                  for section in article.sections for plot in section.plots]
-        style = f'{(PAGE / "report.css").read_text(encoding="utf-8")}\n{self.style}'
+        page = page_directory() / 'report'
+        style = f'{(page / "report.css").read_text(encoding="utf-8")}\n{self.style}'
         if not plots:
             return _document(self.title, (style,), '', body, ())
-        script = (PAGE / 'report.js').read_text(encoding='utf-8')
+        script = (page / 'report.js').read_text(encoding='utf-8')
         plotly = plotly_script().read_text(encoding='utf-8')
         done = ''.join(f'<template id="{found}"></template>'
                        for found in dict.fromkeys(_STYLE_OF_MAPS.findall(plotly)))

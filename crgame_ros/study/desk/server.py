@@ -29,6 +29,7 @@ from crgame_ros.cockpit.request_guard import (
 )
 from crgame_ros.cockpit.server import listen
 from crgame_ros.errors import CrgameError, InputError
+from crgame_ros.paths import page_directory
 from crgame_ros.study.desk.desk import Desk
 from crgame_ros.study.desk.messages import MAX_BYTES, parse_experimenter, parse_participant
 from crgame_ros.study.desk.page_markdown import picture
@@ -136,11 +137,9 @@ def _end_with(writer: asyncio.Task[None], client: Client) -> None:
         client.drop('cannot be sent to')
 
 
-PACKAGE = Path(__file__).resolve().parents[2]
-# JavaScript modules import each other by their path in the package.
-SHARED = ('cockpit/page', 'study/desk/page')
-PAGES = {'/': 'study/desk/page/participant.html',
-         '/experimenter': 'study/desk/page/experimenter.html'}
+# JavaScript modules import each other by their path among the pages.
+SHARED = ('cockpit', 'desk')
+PAGES = {'/': 'desk/participant.html', '/experimenter': 'desk/experimenter.html'}
 LINKS = 'desk_links.json'
 MAX_PAGES = 12
 _STALL_CHECK_S = 0.5
@@ -251,12 +250,13 @@ def _add_pages(app: web.Application, desk: Desk, access: Access,
 
 
 def _read_files() -> Mapping[str, PageFile]:
+    pages = page_directory()
     table: dict[str, PageFile] = {}
     for folder in SHARED:
-        table |= read_files(PACKAGE / folder, f'/static/{folder}/')
+        table |= read_files(pages / folder, f'/static/{folder}/')
     for path, file in PAGES.items():
         if f'/static/{file}' not in table:
-            raise CrgameError(f'{PACKAGE / file}: a page of the desk is missing; '
+            raise CrgameError(f'{pages / file}: a page of the desk is missing; '
                               'install crgame_ros again')
         table[path] = table[f'/static/{file}']
     return table

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The experimenter's page, which shows the session's state and sends orders. */
 
-import { element, part, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { element, part, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { DeskConnection } from './desk_connection.js';
 import { entryWords, timeOfDay } from './log_words.js';
 import { askReason } from './reason_dialog.js';

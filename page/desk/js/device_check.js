@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The device check: the participant moves each control once, and the page detects it. */
 
-import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
-import { CalibrationDialog } from '../../../../cockpit/page/js/driving/calibration.js';
-import { connectedPads } from '../../../../cockpit/page/js/driving/gamepad.js';
+import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
+import { CalibrationDialog } from '../../cockpit/js/driving/calibration.js';
+import { connectedPads } from '../../cockpit/js/driving/gamepad.js';
 import {
   loadProfile, pedalValue, sampleOf, saveProfile, steeringValue,
-} from '../../../../cockpit/page/js/driving/gamepad_profile.js';
-import { ACTIONS } from '../../../../cockpit/page/js/driving/keyboard.js';
+} from '../../cockpit/js/driving/gamepad_profile.js';
+import { ACTIONS } from '../../cockpit/js/driving/keyboard.js';
 import { button } from './page_view.js';
 
 /** @import { DeviceDocument } from './desk_messages.js' */
@@ -211,7 +211,7 @@ export class DeviceCheck {
 
   /**
    * @param {number} index
-   * @param {import('../../../../cockpit/page/js/driving/gamepad_profile.js').Profile|null} profile
+   * @param {import('../../cockpit/js/driving/gamepad_profile.js').Profile|null} profile
    */
   #keep(index, profile) {
     const pad = connectedPads().find((candidate) => candidate.index === index);

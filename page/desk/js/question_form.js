@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Questions that are answered together, with their drafts and errors. */
 
-import { element, setText } from '../../../../cockpit/page/js/dom.js';
+import { element, setText } from '../../cockpit/js/dom.js';
 import { QuestionView } from './question_view.js';
 
 /** @import { QuestionsDocument, Told } from './desk_messages.js' */

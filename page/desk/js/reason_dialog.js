@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A question to the experimenter, with a reason for the journal. */
 
-import { element } from '../../../../cockpit/page/js/dom.js';
+import { element } from '../../cockpit/js/dom.js';
 
 /**
  * Show the dialog and return the reason.

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The participant's page, which shows the server's documents and sends the answers. */
 
-import { element, part, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { element, part, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { breakView } from './break_view.js';
 import { DeskConnection } from './desk_connection.js';
 import { DeviceCheck } from './device_check.js';

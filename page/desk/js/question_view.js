@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** One question on the page: its controls, its answer and its error. */
 
-import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { sliderControls } from './slider.js';
 
 /** @import { Answer, ChoiceQuestion, LikertQuestion, NumberQuestion, Question, TextQuestion

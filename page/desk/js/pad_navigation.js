@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** Answering with the buttons of a gamepad or wheel: next and previous option, confirm. */
 
-import { connectedPads } from '../../../../cockpit/page/js/driving/gamepad.js';
+import { connectedPads } from '../../cockpit/js/driving/gamepad.js';
 
 /** @typedef {'previous'|'next'|'up'|'down'|'confirm'} PadOrder */
 

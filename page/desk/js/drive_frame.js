@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /** The cockpit's stage inside the participant's page, and the gate before each drive. */
 
-import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { calibrations } from './device_check.js';
 import { button } from './page_view.js';
 
 /** @import { DriveDocument, Progress } from './desk_messages.js' */
 /** @import { Words } from './words.js' */
 
-/** @import { StageState } from '../../../../cockpit/page/js/stage/stage_messages.js' */
+/** @import { StageState } from '../../cockpit/js/stage/stage_messages.js' */
 
 const LOOPBACK = ['127.0.0.1', 'localhost'];
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A break with its minimum duration. */
 
-import { element, setAttribute, setText } from '../../../../cockpit/page/js/dom.js';
+import { element, setAttribute, setText } from '../../cockpit/js/dom.js';
 import { button } from './page_view.js';
 
 /** @import { BreakDocument } from './desk_messages.js' */

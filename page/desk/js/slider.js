@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A line without a mark until the participant sets one. */
 
-import { element, setAttribute } from '../../../../cockpit/page/js/dom.js';
+import { element, setAttribute } from '../../cockpit/js/dom.js';
 
 /** @import { SliderQuestion } from './desk_messages.js' */
 /** @import { Controls } from './question_view.js' */

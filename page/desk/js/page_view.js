@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** A page to read, made of Markdown elements only. */
 
-import { element } from '../../../../cockpit/page/js/dom.js';
+import { element } from '../../cockpit/js/dom.js';
 
 /** @import { PageDocument, PageNode } from './desk_messages.js' */
 /** @import { Words } from './words.js' */
