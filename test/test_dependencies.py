@@ -39,6 +39,8 @@ THIRD_PARTY = {
     'rosbags': ('rosbags', None),
     'scipy': ('scipy', 'python3-scipy'),
     'shapely': ('shapely', 'python3-shapely'),
+    'tree_sitter': ('tree-sitter', None),
+    'tree_sitter_typescript': ('tree-sitter-typescript', None),
     'yaml': ('pyyaml', 'python3-yaml'),
     'zstandard': ('zstandard', None),
 }
