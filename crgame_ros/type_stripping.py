@@ -53,6 +53,8 @@ _NEXT = re.compile(rb'(?:\s|//[^\n]*|/\*.*?\*/)*+', re.DOTALL)
 _NO_BLANK = re.compile(r'[^\s]')
 
 
+# Each server of a process reads the same files.
+@cache
 def strip_types(source: bytes, name: str) -> bytes:
     """
     Replace all types of a TypeScript module by spaces.

@@ -180,7 +180,7 @@ def test_the_page_is_installed_without_what_checks_it(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         names = archive.namelist()
     assert {Path(name).suffix for name in names if '/share/crgame_ros/page/' in name} == {
-        '.html', '.css', '.js', '.ts'}
+        '.html', '.css', '.ts'}
     assert not [name for name in names if 'node_modules' in name or name.startswith('test')]
 
 

@@ -10,13 +10,14 @@ from pathlib import Path
 from crgame_ros.errors import CrgameError
 from crgame_ros.page_libraries import find_libraries, PLOTLY, THREE_SCRIPTS
 from crgame_ros.paths import page_directory
+from crgame_ros.type_stripping import strip_types
 
 INDEX = '/'
 # The libraries by request path: '/three/three.module.js' imports the other script of three.js
 # by its relative path.
 LIBRARIES = {'/plotly.js': PLOTLY, **{f'/three/{name}': name for name in THREE_SCRIPTS}}
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
-         '.svg': 'image/svg+xml', '.png': 'image/png'}
+         '.ts': 'text/javascript', '.svg': 'image/svg+xml', '.png': 'image/png'}
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def read_page(directory: Path | None = None) -> Mapping[str, PageFile]:
 
     :param directory: the folder with index.html; None for that of the cockpit.
     :return: files by request path.
-    :raises CrgameError: if the page is not installed.
+    :raises CrgameError: if the page is not installed, or cannot be read.
     """
     directory = directory or page_directory() / 'cockpit'
     table = read_files(directory, '/static/')
@@ -69,16 +70,23 @@ def read_library(path: str) -> PageFile | None:
 
 def read_files(directory: Path, prefix: str) -> dict[str, PageFile]:
     """
-    Read all files of a folder that can be part of a page.
+    Read all files of a folder that can be part of a page, TypeScript as JavaScript.
 
     :param prefix: prefix of their request paths.
     :return: files by request path.
+    :raises CrgameError: if types cannot be taken out of a file.
     """
-    return {f'{prefix}{path.relative_to(directory).as_posix()}': _read(path)
-            for path in sorted(directory.rglob('*'))
-            if path.suffix in TYPES and path.is_file()}
+    paths = [path for path in sorted(directory.rglob('*'))
+             if path.suffix in TYPES and path.is_file() and not path.name.endswith('.d.ts')]
+    return {prefix + _served_name(path.relative_to(directory)): _read(path) for path in paths}
+
+
+def _served_name(path: Path) -> str:
+    return (path.with_suffix('.js') if path.suffix == '.ts' else path).as_posix()
 
 
 def _read(path: Path) -> PageFile:
     body = path.read_bytes()
+    if path.suffix == '.ts':
+        body = strip_types(body, str(path))
     return PageFile(body, TYPES[path.suffix], hashlib.sha256(body).hexdigest()[:32])

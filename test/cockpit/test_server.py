@@ -26,6 +26,7 @@ from crgame_ros.cockpit.page_messages import SeenView, Sound
 from crgame_ros.cockpit.server import create_app, listen
 from crgame_ros.errors import CrgameError, InputError
 from crgame_ros.paths import page_directory
+from crgame_ros.type_stripping import strip_types
 import pytest
 
 
@@ -39,13 +40,13 @@ async def test_the_page_plotly_and_all_files_of_the_page_are_served(tmp_path: Pa
         async with running.http.get(f'{running.address}/plotly.js') as answer:
             assert answer.content_type == 'text/javascript'
             assert b'plotly.js (basic' in (await answer.read())[:200]
-        scripts = list(page.rglob('*.js'))
+        scripts = [path for path in page.rglob('*.ts') if not path.name.endswith('.d.ts')]
         assert scripts
         for script in scripts:
-            name = script.relative_to(page).as_posix()
+            name = script.relative_to(page).with_suffix('.js').as_posix()
             async with running.http.get(f'{running.address}/static/{name}') as answer:
                 assert (answer.status, answer.content_type) == (200, 'text/javascript'), name
-                assert await answer.read() == script.read_bytes()
+                assert await answer.read() == strip_types(script.read_bytes(), name)
 
 
 @in_loop
@@ -61,13 +62,14 @@ async def test_an_unchanged_file_is_not_sent_again() -> None:
 @in_loop
 async def test_only_kinds_that_a_page_has_are_read(tmp_path: Path) -> None:
     (tmp_path / 'js').mkdir()
-    for name in ('index.html', 'js/a.js', 'notes.txt', 'key.pem', '.hidden'):
-        (tmp_path / name).write_text(name)
+    for name in ('index.html', 'js/a.ts', 'js/b.d.ts', 'notes.txt', 'key.pem', '.hidden'):
+        (tmp_path / name).write_text('a;')
+    absent = ('js/a.ts', 'js/b.d.ts', 'js/b.js', 'js/b.d.js', 'notes.txt', 'key.pem', '.hidden',
+              'index.html', '')
     async with cockpit(page=tmp_path) as running:
         found = {name: (await get(running.port, f'/static/{name}'))[0]
-                 for name in ('js/a.js', 'notes.txt', 'key.pem', '.hidden', 'index.html', '')}
-    assert found == {'js/a.js': 200, 'notes.txt': 404, 'key.pem': 404, '.hidden': 404,
-                     'index.html': 404, '': 404}
+                 for name in ('js/a.js', *absent)}
+    assert found == {'js/a.js': 200, **dict.fromkeys(absent, 404)}
 
 
 def test_a_missing_page_is_one_clear_error(tmp_path: Path) -> None:

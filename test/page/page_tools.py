@@ -35,12 +35,13 @@ def missing(path: str | None = None) -> str:
     return ''
 
 
-def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> None:
-    """Run a tool; fail with its output."""
+def run(*command: str | Path, cwd: Path = ROOT, timeout_s: float = CHECK_S) -> str:
+    """Run a tool and return its output; fail with it."""
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout_s)
     if done.returncode != 0:
         pytest.fail(f'{Path(command[0]).name} {command[1]}:\n{done.stdout}{done.stderr}',
                     pytrace=False)
+    return done.stdout
 
 
 def is_stale(folder: Path) -> bool:

@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 import shutil
 
+from crgame_ros.type_stripping import strip_types
 from page_tools import HERE, installed_tools, is_stale, missing, ROOT, run
 import pytest
 
@@ -17,6 +18,13 @@ pytestmark = pytest.mark.xdist_group('test_lint')
 
 PAGE = ROOT / 'page'
 MAX_COLUMNS = 99
+# Prints named files without types, as a list.
+STRIP = """
+import { readFileSync } from 'node:fs';
+import { withoutTypes } from './ts_hooks.mjs';
+console.log(JSON.stringify(process.argv.slice(1).map((file) => (
+  withoutTypes(readFileSync(file, 'utf8'))))));
+"""
 
 
 @pytest.fixture(scope='module')
@@ -58,14 +66,14 @@ def test_units() -> None:
     """The unit tests without a browser pass in Node's own runner."""
     files = sorted(HERE.glob('*.test.mjs'))
     assert len(files) > 10
-    run('node', '--test', *files)
+    run('node', '--import', HERE / 'ts_loader.mjs', '--test', *files)
 
 
 @pytest.mark.exhaustive
 @pytest.mark.parametrize(('check', 'code', 'told'), [
-    (check_types, 'export const f = (/** @type {number} */ x, y) => x.length + y;\n',
-     ['TS2339', 'TS7006']),
-    (check_rules, 'export const f = (node, x) => { node.innerHTML = x == 1 ? y : x; };\n',
+    (check_types, 'export const f = (x: number, y) => x.length + y;\nexport enum A { b }\n',
+     ['TS2339', 'TS7006', 'TS1294']),
+    (check_rules, 'export const f = (node, x: number) => { node.innerHTML = x == 1 ? y : x; };\n',
      ['no-restricted-properties', 'eqeqeq', 'no-undef'])], ids=['types', 'rules'])
 def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], None], code: str,
                         told: list[str]) -> None:
@@ -73,15 +81,28 @@ def test_the_checks_see(tools: Path, tmp_path: Path, check: Callable[[Path], Non
     shutil.copytree(PAGE, tmp_path / 'page')
     here = tmp_path / HERE.relative_to(ROOT)
     here.mkdir(parents=True)
-    for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs'):
+    for name in ('tsconfig.json', 'globals.d.ts', 'eslint.config.mjs', 'ts_hooks.mjs'):
         shutil.copy2(HERE / name, here)
     (here / 'node_modules').symlink_to(tools)
-    (tmp_path / 'page' / 'desk' / 'js' / 'wrong.js').write_text(code, encoding='utf-8')
+    (tmp_path / 'page' / 'desk' / 'js' / 'wrong.ts').write_text(code, encoding='utf-8')
     with pytest.raises(pytest.fail.Exception) as failure:
         check(tmp_path)
     found = re.findall(r'error\b.*', str(failure.value))
     assert len(found) == len(told), failure.value
     assert all(any(name in line for line in found) for name in told), failure.value
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures('tools')
+def test_the_server_takes_out_types_as_node_does() -> None:
+    """Every script has the same words on the same lines."""
+    files = [path for path in sorted(PAGE.rglob('*.ts')) if not path.name.endswith('.d.ts')]
+    assert len(files) > 200
+    for path, wanted in zip(files, json.loads(run(
+            'node', '--input-type=module', '--eval', STRIP, *files, cwd=HERE)), strict=True):
+        found = strip_types(path.read_bytes(), path.name).decode()
+        assert [line.split() for line in found.split('\n')] == [
+            line.split() for line in wanted.split('\n')], path
 
 
 def test_a_machine_without_node_is_told(tmp_path: Path) -> None:
@@ -122,7 +143,7 @@ def test_tools_are_pinned_and_come_from_whatever_registry_is_set() -> None:
 
 
 def test_lines_have_99_columns() -> None:
-    files = [*PAGE.rglob('*.js'), *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
+    files = [*PAGE.rglob('*.ts'), *HERE.glob('*.mjs'), *HERE.glob('*.ts')]
     assert len(files) > 90
     assert not [file.name for file in sorted(files)
                 if max(map(len, file.read_text(encoding='utf-8').splitlines())) > MAX_COLUMNS]

@@ -17,6 +17,7 @@ from crgame_ros.analysis.report.section import Plot, Section
 from crgame_ros.analysis.report.text import free, plain
 from crgame_ros.page_libraries import plotly_script
 from crgame_ros.paths import page_directory
+from crgame_ros.type_stripping import strip_types
 
 # Plotly creates an empty `<style>`, and then adds rules to it by script.
 _EMPTY = ''
@@ -105,7 +106,7 @@ class Page:
         style = f'{(page / "report.css").read_text(encoding="utf-8")}\n{self.style}'
         if not plots:
             return _document(self.title, (style,), '', body, ())
-        script = (page / 'report.js').read_text(encoding='utf-8')
+        script = strip_types((page / 'report.ts').read_bytes(), 'report.ts').decode()
         plotly = plotly_script().read_text(encoding='utf-8')
         done = ''.join(f'<template id="{found}"></template>'
                        for found in dict.fromkeys(_STYLE_OF_MAPS.findall(plotly)))
